@@ -66,6 +66,13 @@ def _given(kinds: tuple[re.Pattern[str], ...], text: str) -> frozenset[float]:
     return found or frozenset(n for sentence in stated for n in _paired([*_marks(sentence, kinds)]))
 
 
+# "2 people in the offices" are no 2 offices.
+_PLACE = re.compile(
+    r"\b(?:in|at|from|across|around) (?:(?:all|the|their|your|my|our|each|every) ){0,2}$", re.IGNORECASE
+)
+NEAR = 30  # characters before a thing, in which such words are looked for
+
+
 def _word(pattern: str) -> re.Pattern[str]:
     """A regex as a whole word, in the singular or the plural; a sign such as `%` may touch a word."""
     return compile_regex(rf"(?:\b|(?=\W))(?:{pattern})(?:e?s)?(?:\b|(?<=\W))")
@@ -93,6 +100,7 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
         (match.start(), -match.end(), kind)
         for kind, regex in enumerate(kinds)
         for match in regex.finditer(text)
+        if kind == 0 or not _PLACE.search(text, max(0, match.start() - NEAR), match.start())
     ]
     reached = -1
     for start, end, kind in sorted(named):

@@ -48,9 +48,32 @@ _IN_VAIN = re.compile(r"\bwould\s+(?:like|love|have\s+(?:liked|loved))\s+to(?=\W
 _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 
+_ANSWERED = re.compile(r"(?<![^.!?;\n] )\b(\w[\w' ]{0,30})\?\s+(yes|no|none)\b", re.IGNORECASE)
+_INSTEAD = re.compile(r"\b(?:rather than|instead of)\b", re.IGNORECASE)
+_EXCEPT = re.compile(
+    r"\b(?P<of>all|every\w*|each|no(?:ne|body|thing| ?one)?)\b(?P<what>[^,.;:]*?)\W(?:"
+    r"(?P<but>but)|except(?: for)?|apart from|other than|besides)\b\s*"
+    r"(?P<whom>(?!(?:no|nobody|none|nothing|i|he|she|it|they|we|there)\b)(?:\w[\w']*\s+){0,3}?\w[\w']*)(?P<rest>\s+(?:is|are|was|were|has|have|had|will|would|can|wants?|gave|needs?|lacks?)\b.*|\W*)$",
+    re.IGNORECASE,
+)
+_SEARCHED = re.compile(
+    r"\b(?:look|search|check|hunt|visit|inspect)\w*\b|\bwas in\b|\b(?:is|was) done\b", re.IGNORECASE
+)
+_IN_VAIN_THERE = re.compile(
+    r"\W*(?:but )?(?:(?:there (?:is|was|were)|i|we|it|you)\s+)?"
+    r"(?:could ?n[o'\u2019]t|did ?n[o'\u2019]t|no|nothing|none)\b"
+    r"(?!.*\b(?:rooms?|offices?|labs?)\b)",
+    re.IGNORECASE,
+)
+
+
 def sentences(text: str) -> list[str]:
-    """The sentences of a text, questions with their question marks; `4 p.m.` and `1.5` end none."""
-    return [part for part in _END.split(_HALF_DAY.sub(r"\1m", text)) if part.strip().strip("?")]
+    """The sentences of a text, questions with their question marks; `4 p.m.` and `1.5` end none.
+
+    Who asks and answers, as in `Butter? No`, says one sentence.
+    """
+    text = _ANSWERED.sub(r"\1: \2", _HALF_DAY.sub(r"\1m", text))
+    return [part for part in _END.split(text) if part.strip().strip("?")]
 
 
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
@@ -62,15 +85,37 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     sentence = _ASIDE.sub(" ", _TAG.sub("", sentence))
     if _PROPOSES.match(sentence):  # "How about 75 degrees?" is no question
         sentence = sentence.rstrip("? ")
+    sentence = _with_exception(_INSTEAD.sub(", not", sentence))
     parts = _with_subjects([clause for part in _at_colon(sentence) for clause in _divided(part)])
     if sentence.rstrip().endswith("?"):
         parts = [f"{part}?" if _INVERTED.match(part) and part[-1] != "?" else part for part in parts]
-    return [*_gathered(parts)] if lists else parts
+    return [*_gathered(_with_results(parts))] if lists else parts
 
 
 def _divided(sentence: str) -> list[str]:
     # "She would love to, but is busy" does not affirm.
     return [part for part in _JOINT.split(_IN_VAIN.sub("might", sentence)) if part.strip()]
+
+
+def _with_exception(sentence: str) -> str:
+    """The sentence, with a clause for who is excepted: `all come, not Bob` for `all but Bob come`."""
+    match = _EXCEPT.search(sentence)
+    if match is None or (match["but"] and _VERB.search(match["what"])):
+        return sentence
+    rule = f"{sentence[: match.start()]}{match['of']}{match['what']}{match['rest']}".rstrip(" .")
+    excepted = f"{match['whom']} does" if denies_something(rule) else f"not {match['whom']}"
+    return f"{rule}, {excepted}"
+
+
+def _with_results(parts: list[str]) -> list[str]:
+    """The parts, with what was not found behind where it was sought, as in `I looked, but found none`."""
+    whole: list[str] = []
+    for part in parts:
+        if whole and _SEARCHED.search(whole[-1]) and _IN_VAIN_THERE.match(part):
+            whole[-1] = f"{whole[-1]} {part}"
+        else:
+            whole.append(part)
+    return whole
 
 
 def _at_colon(sentence: str) -> list[str]:

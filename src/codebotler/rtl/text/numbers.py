@@ -11,7 +11,10 @@ _ONES = [
 ]
 _TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
 _WORDS = {word: n for n, word in enumerate(_ONES)} | {word: 20 + 10 * n for n, word in enumerate(_TENS)}
-_NOTHING = r"no one|no-one|noone|nobody|nothing|none|neither|not (?:one|a single)|no"
+_NOTHING = (
+    r"no one|no-one|noone|nobody|nothing|none|neither|not (?:one|a single)|no"
+    r"|(?:(?<=\bnot )|(?<=n['\u2019]t ))(?:needed|wanted|chosen|picked)"
+)
 
 _NEAR = 60  # characters within which words belong together; without a limit, long texts would take forever
 
@@ -26,6 +29,7 @@ _NUMBER = re.compile(
     rf"|\b(?P<tens>{'|'.join(_TENS)})(?:[ -](?P<units>{_UNITS}))?\b"
     rf"|\b(?P<hundred>(?:(?:a|one) )?hundred)\b"
     rf"|\b(?P<nothing>{_NOTHING})\b"
+    rf"|\b(?P<dozen>(?:a|one) dozen)\b|\b(?P<single>a single)\b"
     rf"|(?P<negated>(?:\bnot|n['\u2019]t)\b[^.,;!?]{{0,{_NEAR}}}?\bany(?:body|one|thing)?\b)"
     rf"|\b(?P<word>{'|'.join(_ONES)})\b",
     re.IGNORECASE,
@@ -34,13 +38,17 @@ _PRONOUN = re.compile(
     r"\b(?:any|some|every|each|which|this|that|the|another|other|sweet|savory|savoury|right|last|first)[ -]$",
     re.IGNORECASE,
 )
+_TAKES = re.compile(
+    r"\b(?:takes?|took|wants?|wanted|needs?|needed|likes?|liked|gets?|got|chose|picked)[ -]$", re.IGNORECASE
+)
+_LAST = re.compile(r"\s*(?:[.,;!)]|and\b|but\b|$)", re.IGNORECASE)
 # "2 of 4" gives 2, and "a total of 2" gives 2 as well; "2 of a total of 4" does not give 4.
 _OF = re.compile(
     r"(?:(?:(?<!\btotal )|(?<=\bof a total )|(?<=\bof the total ))"
     r"\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$",
     re.IGNORECASE,
 )
-_NOT = re.compile(r"(?:\bnot|n['\u2019]t)\s+$", re.IGNORECASE)
+_NOT = re.compile(r"(?:\bnot|n['\u2019]t|\binstead of|\brather than)\s+$", re.IGNORECASE)
 _ROUGHLY = re.compile(
     r"\b(?:at (?:least|most)|(?:more|less|fewer|other) than|almost|nearly|up to"
     r"|(?:do not|don['\u2019]t|never) (?:buy|get|need|bring)(?: \w+)?)\s+$",
@@ -76,11 +84,18 @@ def _alternatives(matches: list[re.Match[str]]) -> tuple[int, int, tuple[float, 
 
 def _is_ignored(match: re.Match[str], text: str) -> bool:
     before = text[max(0, match.start() - _NEAR) : match.start()]
-    if match["word"] and match["word"].lower() == "one" and _PRONOUN.search(before):
+    if match["word"] and match["word"].lower() == "one" and _is_pronoun(match, before):
         return True
     if _MORE.match(text, match.end()):
         return True
     return not match["nothing"] and any(words.search(before) for words in (_OF, _NOT, _ROUGHLY))
+
+
+def _is_pronoun(match: re.Match[str], before: str) -> bool:
+    """Whether `one` stands for something, as in `some one` and `would take one`."""
+    return _PRONOUN.search(before) is not None or (
+        _TAKES.search(before) is not None and _LAST.match(match.string, match.end()) is not None
+    )
 
 
 def _value(match: re.Match[str]) -> float:
@@ -90,4 +105,6 @@ def _value(match: re.Match[str]) -> float:
         return _WORDS[match["tens"].lower()] + _WORDS.get((match["units"] or "").lower(), 0)
     if match["hundred"]:
         return 100.0
+    if match["dozen"] or match["single"]:
+        return 12.0 if match["dozen"] else 1.0
     return 0.0 if match["nothing"] or match["negated"] else float(_WORDS[match["word"].lower()])

@@ -16,7 +16,7 @@ _HARMLESS = re.compile(
     r"|\bwithout (?:a )?(?:doubt|problems?|delay|hesitation|further ado)\b"
     rf"|\b{_NOT} (?:even )?(?:worry|mind|forget|hesitate|panic|get lost|be (?:late|afraid|shy))\b"
     r"|\b(?:can(?:no|['\u2019])t|can not) wait\b|\bcould(?:n['\u2019]t| not) be (?:happier|better)\b"
-    rf"|\b{_NOT} miss\b|\b(?:nobody|no ?one|nothing) else\b"
+    rf"|\b{_NOT} miss\b|\bno shortage\b|\b(?:nobody|no ?one|nothing) else\b"
     # A double denial is none.
     rf"|\b(?:no|nothing|nobody|no ?one|none|neither|nowhere|{_NOT})\s+{_WORDS}{{0,4}}"
     r"(?:lack\w*|miss(?:es|ing)|absent|alone|declin\w*|refus\w*|without)\b"
@@ -26,7 +26,9 @@ _HARMLESS = re.compile(
 _DENIAL = re.compile(
     r"\b(?:no|not|none|nobody|nothing|noone|never|neither|nor|nowhere|without|cannot|cant|dont|doesnt|wont"
     r"|isnt|declin\w*|refus\w*|reject\w*|turn(?:s|ed|ing) (?:\w+ ){0,4}down|unable|unavailable|absent|missing"
-    r"|lack\w*|negative|busy|alone|empty|other plans|(?:run|ran|is|are|was|were) out|will pass)\b"
+    r"|lack\w*|negative|busy|alone|empty|other plans|(?:run|ran|is|are|was|were) out"
+    r"|(?:will|ha(?:s|ve) to) pass)\b"
+    r"|['\u2019](?:s|re|m) out of\b"
     r"|n['\u2019]t\b",
     re.IGNORECASE,
 )
@@ -36,6 +38,10 @@ _OPEN = re.compile(
     r"|\bmay\b(?! (?:i|we|want|need)\b)|\bhop(?:e|es|ing)\b(?!.{0,60}\b(?:you|your|every\w+|all)\b)"
     rf"|\b{_NOT} (?:yet )?(?:be )?(?:know|knows|sure|certain|clear|decided?|told|tell)\b"
     r"|\bno (?:idea|answer)\b"
+    # What the robot is about to do, and who has yet to answer.
+    r"|\bi(?:['\u2019]ll| will|(?:['\u2019]m| am) (?:going|about) to| (?:still )?(?:have|need) to)"
+    r"(?: \w+){0,2}? (?:look|check|search|ask|find out|see whether)\b"
+    r"|\b(?:needs?|has|have|wants?) to think\b|\b(?:wants?|wanted|would like) to know\b"
     # "I asked Alice": she has not answered yet.
     r"|\basked(?:\s+(?!said|declin|refus|accept|agree|is|are|will|has|have|had|does|did|would|want|lack|need)"
     r"\w+){1,4}\W*$",

@@ -33,6 +33,10 @@ _CLOCK = re.compile(
     r"|\b(?P<noon>noon|mid-?day)\b|\b(?P<midnight>midnight)\b",
     re.IGNORECASE,
 )
+_IN_THE = re.compile(
+    rf"\b({'|'.join(_NAMES)}|\d{{1,2}})(?: o['\u2019]?clock)? in the (morning|afternoon|evening)\b",
+    re.IGNORECASE,
+)
 _ALONE = re.compile(rf"\s*(?:(?:at|around|about)\s+)?{_hour('')}\s*", re.IGNORECASE)
 _EXCLUDED = re.compile(
     r"\b(?:before|after|except|(?:any ?(?:thing|time)|all|everything) but|not)\s+(?:at\s+)?$", re.IGNORECASE
@@ -45,10 +49,11 @@ _DAY = 24 * 60
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
     """The times of day in a text, each with both readings if it may be in the morning or the afternoon.
 
-    `12 pm`, `12:00`, `noon`, `twelve o'clock` and `half past twelve` are times, and so is a text that is only
-    an hour; `before 12 pm` is none.
+    `12 pm`, `12:00`, `noon`, `twelve o'clock`, `half past twelve` and `six in the evening` are times, and so
+    is a text that is only an hour; `before 12 pm` is none.
     """
     plain = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
+    plain = _IN_THE.sub(lambda match: f"{match[1]} {'am' if match[2].lower() == 'morning' else 'pm'}", plain)
     if alone := _ALONE.fullmatch(plain):
         return (*_readings(alone["hour"], 0, None),)
     named = [match for match in _CLOCK.finditer(plain) if not _is_excluded(match)]

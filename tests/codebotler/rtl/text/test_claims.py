@@ -43,6 +43,15 @@ SAVORY = [
     ("2 chose savory. That was no problem", {2}),
     ("Did 2 choose savory?", set()),
     ("I looked into 4 offices", set()),
+    ("2 people in the offices would take one", {2}),
+    ("Nobody in the offices would take one", {0}),
+    ("Of those in all the offices, 2 took one", {2}),
+    ("Savory snacks are not needed", {0}),
+    ("Savory snacks aren't wanted", {0}),
+    ("A dozen savory snacks", {12}),
+    ("A single savory snack", {1}),
+    ("2 savory snacks instead of 3", {2}),
+    ("Sweet? Two. Savory? None.", {0}),
     ("someone", set()),
     ("", set()),
 ]
@@ -132,6 +141,10 @@ TIMES = [
     ("at 12p.m. or 11:30a.m.", [(720,), (690,)]),
     ("in room 1a. Maybe 12 pm", [(720,)]),
     ("half past twelve", [(30, 750)]),
+    (
+        "at six in the evening, at 4 in the morning, or at two o'clock in the afternoon",
+        [(1080,), (240,), (840,)],
+    ),
     ("quarter to 12 pm", [(705,)]),
     ("twelve o'clock", [(0, 720)]),
     ("12:00 - 13:00", [(0, 720), (780,)]),
@@ -227,6 +240,30 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("You need not go: Alice, Bob", "", "alice bob"),
         ("As for Alice, it is there, and Bob, I am afraid, is not", "alice", "bob"),
         ("Anything but Alice", "alice", ""),
+        # Exceptions.
+        ("Everyone but Bob is coming", "", "bob"),
+        ("Nobody apart from Alice wants to come", "alice", ""),
+        ("All the rooms except Bob's have one", "", "bob"),
+        ("All of them are missing other than Alice", "alice", ""),
+        ("All is well, but Bob is coming, and none of them was late, but Alice is here", "alice bob", ""),
+        ("I told everybody but nobody believed Alice", "", "alice"),
+        # What was sought and not found.
+        ("I looked for one in the room of Alice, but could not find any", "", "alice"),
+        (
+            "Alice's room is done, nothing there. I checked the one of Bob, and there was no pen",
+            "",
+            "alice bob",
+        ),
+        ("I looked in on Alice, but there was no pen in Bob's room", "alice", "bob"),
+        # Answers, and what is taken instead.
+        ("Alice? Yes. Bob? No.", "alice", "bob"),
+        ("I took Alice rather than Bob", "alice", "bob"),
+        # What is still to be done.
+        ("I will ask Alice. I'm going to look for Bob", "", ""),
+        ("Alice needs to think about it, and Bob wants to know more", "", ""),
+        ("We are out of tea, Alice. He's out of milk, Bob", "", "alice bob"),
+        ("There is no shortage of Alice", "alice", ""),
+        ("Alice will have to pass", "", "alice"),
     ],
 )
 def test_what_is_affirmed_and_what_denied(text: str, affirmed: str, denied: str) -> None:
