@@ -24,6 +24,9 @@ def tasks(
     accepted: Annotated[
         bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
     ] = False,
+    clauses: Annotated[
+        bool, typer.Option("--clauses", help="Show which checks cover each clause of each prompt.")
+    ] = False,
     new: Annotated[
         str | None,
         typer.Option(help="Start a task of this name in the folder --suite, which is created if needed."),
@@ -31,27 +34,38 @@ def tasks(
     json: JsonOption = False,
 ) -> None:
     """List a suite's tasks, show one, lint them, start a new one."""
-    from roboeval.cli.views.tasks import suite_task_view, suite_view
-
     if new is not None:
-        if task is not None or lint or accepted or json:
+        if task is not None or lint or accepted or clauses or json:
             fail("--new takes no other option but --suite; leave the rest out")
         start(new, suite)
         return
     if accepted and not lint:
         fail("--accepted needs --lint; add it")
+    if json and (lint or clauses):
+        fail(f"{'--lint' if lint else '--clauses'} has no JSON output; leave out --json")
     known = load(suite)
     if lint:
-        if json:
-            fail("--lint has no JSON output; leave out --json")
         lint_tasks(known, task, accepted=accepted)
     elif json:
         print_json(suite_data(known, None if task is None else known.task(task).name))
-    elif task is not None:
-        print_rich(suite_task_view(known.task(task)))
     else:
-        print_rich(suite_view(known))
-        for sentence in other_suites(known.name):
+        show(known, task, clauses=clauses)
+
+
+def show(suite: Suite, task: str | None, *, clauses: bool) -> None:
+    """Print the tasks of a suite, or one; or the clauses of their prompts."""
+    from roboeval.cli.views.tasks import clauses_view, suite_task_view, suite_view
+
+    if clauses:
+        shown = suite.tasks.values() if task is None else [suite.task(task)]
+        if not any(one.covered_by for one in shown):
+            fail(f'the suite "{suite.name}" does not say which checks cover what; add covered_by to a task')
+        print_rich(clauses_view(shown))
+    elif task is not None:
+        print_rich(suite_task_view(suite.task(task)))
+    else:
+        print_rich(suite_view(suite))
+        for sentence in other_suites(suite.name):
             note(sentence)
 
 

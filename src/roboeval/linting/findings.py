@@ -14,6 +14,7 @@ Kind = Literal[
     "unused",
     "misjudged",
     "unsaid",
+    "uncovered",
     "untripped",
     "dead-regex",
     "slow-regex",

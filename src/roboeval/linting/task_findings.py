@@ -15,6 +15,7 @@ from codebotler.simulator.robot import whole_words
 from roboeval.evaluation.failures import failure
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.backtracking import slow_text
+from roboeval.linting.clauses import clauses_of
 from roboeval.linting.findings import Finding
 from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import judged_worlds
@@ -24,7 +25,7 @@ from roboeval.suites.solutions import solutions
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     """All findings that are not about one world."""
-    yield from (*_unused(task), *_unsaid(task), *_slow(task))
+    yield from (*_unused(task), *_unsaid(task), *_uncovered(task), *_slow(task))
     yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
 
 
@@ -41,11 +42,10 @@ def _unused(task: Task) -> Iterator[Finding]:
 
 
 def _unsaid(task: Task) -> Iterator[Finding]:
-    """Facts that a prompt leaves out, or says although they are common sense."""
-    if task.borrows:
-        return
+    """Facts of the task's own file that a prompt leaves out, or says although they are common sense."""
     file = YamlFile.read(task.path)
-    for number, fact in enumerate(task.facts):
+    own = len(file.data.get("facts", ())) if isinstance(file.data, dict) else 0
+    for number, fact in enumerate(task.facts[len(task.facts) - own :]):
         for prompt, text in enumerate(task.prompts):
             word = next((word for word in fact.words if re.search(word, text, re.IGNORECASE)), None)
             if word is None and not fact.commonsense:
@@ -56,6 +56,23 @@ def _unsaid(task: Task) -> Iterator[Finding]:
                 continue
             line = file.line(("facts", number))
             yield Finding("unsaid", fact.fact, f"prompt {prompt} {wrong}", task.path, line)
+
+
+def _uncovered(task: Task) -> Iterator[Finding]:
+    """Facts and clauses of the prompts that no check covers, where a task says which checks cover what."""
+    if not task.covered_by:
+        return
+    line = YamlFile.read(task.path).line(("covered_by",))
+    for fact in task.facts:
+        if fact.fact not in dict(task.covered_by):
+            message = f'nobody says which checks cover "{fact.fact}"; add it under covered_by'
+            yield Finding("uncovered", fact.fact, message, task.path, line)
+    for clause in clauses_of(task):
+        if not clause.is_covered:
+            message = (
+                f'no check covers "{clause.text}" in prompt {clause.prompt}; add a fact with these words'
+            )
+            yield Finding("uncovered", f"{clause.prompt}: {clause.text}", message, task.path, line)
 
 
 # --- solutions

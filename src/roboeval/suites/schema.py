@@ -145,6 +145,7 @@ class _AnyTaskFile(_Form):
     abilities: tuple[Ability, ...] = ()
     prompts: Annotated[list[Name], Field(min_length=1)]
     facts: tuple[Fact, ...] = ()
+    covered_by: dict[Name, list[Name] | Text] = {}
     checks: dict[str, CheckFile]
     accepted: tuple[Accepted, ...] = ()
 

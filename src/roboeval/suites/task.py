@@ -82,6 +82,7 @@ class Task:
         abilities: what a robot needs for it.
         prompts: phrasings of the same instruction.
         facts: what the requirements rest on.
+        covered_by: for facts, the names of the checks that cover each, or why none does.
         checks: the named constraints.
         scenarios: the worlds with their requirements, also those that only some prompts ask for.
         ablation: the same with the requirements of common sense only; None where the task has none.
@@ -105,6 +106,7 @@ class Task:
     borrows: bool = False
     drawn: bool = False
     phrases: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    covered_by: tuple[tuple[str, tuple[str, ...] | str], ...] = ()
 
     def __repr__(self) -> str:
         prompts, worlds = counted(len(self.prompts), "prompt"), counted(len(self.scenarios), "world")

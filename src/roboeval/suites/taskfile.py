@@ -78,6 +78,7 @@ def read_task(
         borrows=lender is not None,
         drawn=isinstance(form, DrawnTaskFile),
         phrases=tuple(form.phrases.items()) if isinstance(form, DrawnTaskFile) else (),
+        covered_by=tuple(_covered_by(form, file, reader.checks)),
     )
 
 
@@ -88,6 +89,18 @@ def _borrowed(file: YamlFile, lender: YamlFile | None) -> object:
     lent = {name: lender.data[name] for name in LENT if name in lender.data}
     facts = [*lender.data.get("facts", []), *file.data.get("facts", [])]
     return {**lent, **file.data, "facts": facts}
+
+
+def _covered_by(
+    form: TaskFile | DrawnTaskFile, file: YamlFile, checks: Mapping[str, Check]
+) -> Iterator[tuple[str, tuple[str, ...] | str]]:
+    facts = {fact.fact for fact in form.facts}
+    for fact, names in form.covered_by.items():
+        if fact not in facts:
+            raise file.wrong(f'there is no fact "{fact}"; they are under facts', "covered_by", fact)
+        if unknown := next((name for name in names if isinstance(names, list) and name not in checks), None):
+            raise file.wrong(f'there is no check "{unknown}"; add it under checks', "covered_by", fact)
+        yield fact, names if isinstance(names, str) else tuple(names)
 
 
 def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:

@@ -49,7 +49,10 @@ _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 
 _ANSWERED = re.compile(r"(?<![^.!?;\n] )\b(\w[\w' ]{0,30})\?\s+(yes|no|none)\b", re.IGNORECASE)
-_INSTEAD = re.compile(r"\b(?:rather than|instead of)\b", re.IGNORECASE)
+_INSTEAD = re.compile(
+    r"\b(?:rather than|instead of)\s+((?:(?!(?:and|but|is|are|was|were)\b)\w[\w'\u2019]*\s?){1,3})",
+    re.IGNORECASE,
+)
 _EXCEPT = re.compile(
     r"\b(?P<of>all|every\w*|each|no(?:ne|body|thing| ?one)?)\b(?P<what>[^,.;:]*?)\W(?:"
     r"(?P<but>but)|except(?: for)?|apart from|other than|besides)\b\s*"
@@ -85,11 +88,12 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     sentence = _ASIDE.sub(" ", _TAG.sub("", sentence))
     if _PROPOSES.match(sentence):  # "How about 75 degrees?" is no question
         sentence = sentence.rstrip("? ")
-    sentence = _with_exception(_INSTEAD.sub(", not", sentence))
+    rejected = [f"not {match[1]}" for match in _INSTEAD.finditer(sentence)]
+    sentence = _with_exception(_INSTEAD.sub(" ", sentence))
     parts = _with_subjects([clause for part in _at_colon(sentence) for clause in _divided(part)])
     if sentence.rstrip().endswith("?"):
         parts = [f"{part}?" if _INVERTED.match(part) and part[-1] != "?" else part for part in parts]
-    return [*_gathered(_with_results(parts))] if lists else parts
+    return [*(_gathered(_with_results(parts)) if lists else parts), *rejected]
 
 
 def _divided(sentence: str) -> list[str]:

@@ -11,6 +11,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from codebotler.core.words import listed
+from roboeval.linting.clauses import clauses_of
 from roboeval.suites.load import Check, Scenario, Suite, Task
 from roboeval.suites.task import describe_person
 
@@ -45,6 +47,28 @@ def suite_task_view(task: Task) -> RenderableType:
     return Group(*parts)
 
 
+def clauses_view(tasks: Iterable[Task]) -> RenderableType:
+    """The clauses of each prompt, with the checks that cover each, or the reason why none does."""
+    parts: list[RenderableType] = []
+    for task in tasks:
+        table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
+        table.add_column("prompt", justify="right")
+        table.add_column("clause", ratio=3)
+        table.add_column("covered by", ratio=2)
+        last = None
+        for clause in clauses_of(task):
+            by = (
+                [Text(", ".join(clause.checks))]
+                if clause.checks
+                else [Text(why, "dim") for why in clause.because]
+            )
+            number = "" if clause.prompt == last else str(clause.prompt)
+            table.add_row(number, Text(clause.text), *(by[:1] or [Text("none", "bold")]))
+            last = clause.prompt
+        parts += [Text(task.name, "bold"), table, Text()]
+    return Group(*parts[:-1])
+
+
 def _section(title: str, lines: Iterable[RenderableType]) -> list[RenderableType]:
     return [Text(), Text(title, "bold"), *(Padding(line, (0, 0, 0, 2)) for line in lines)]
 
@@ -63,7 +87,9 @@ def _world_lines(scenario: Scenario) -> Iterator[RenderableType]:
         yield Text(f"{room.name}: {', '.join(there) or 'empty'}")
     if world.may_wait_forever:
         yield Text("a program may wait here for ever", "italic")
-    yield from (_Formula(f"requires {requirement.text}") for requirement in scenario.require)
+    for requirement in scenario.require:
+        asked = listed([str(prompt) for prompt, _ in requirement.words], "or")
+        yield _Formula(f"requires {requirement.text}{asked and f' for prompt {asked}'}")
 
 
 @dataclass(frozen=True)

@@ -258,6 +258,7 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         # Answers, and what is taken instead.
         ("Alice? Yes. Bob? No.", "alice", "bob"),
         ("I took Alice rather than Bob", "alice", "bob"),
+        ("Choose Alice instead of Bob. Instead of Bob, Alice", "alice", "bob"),
         # What is still to be done.
         ("I will ask Alice. I'm going to look for Bob", "", ""),
         ("Alice needs to think about it, and Bob wants to know more", "", ""),

@@ -1,0 +1,83 @@
+"""What each clause of a prompt asks for: the checks that cover it, or why none does."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from roboeval.suites.load import Task
+
+FEW = 4  # words; what is shorter, such as an item of a list, belongs to the clause before it
+_JOINT = re.compile(r"[.,;:!?]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
+_WORD = re.compile(r"\w+")
+
+Span = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Clause:
+    """A clause of a prompt.
+
+    Args:
+        prompt: the number of the prompt, counted from 0.
+        text: the clause.
+        checks: the checks that cover it.
+        because: why no check does, if the task says so.
+    """
+
+    prompt: int
+    text: str
+    checks: tuple[str, ...]
+    because: tuple[str, ...]
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether a check covers it, or it is said why none does."""
+        return bool(self.checks or self.because)
+
+
+def clauses_of(task: Task) -> Iterator[Clause]:
+    """The clauses of all prompts, in their order.
+
+    A check covers a clause that shares a word with a fact that it is said to cover, or with the words on
+    which a requirement of it rests.
+    """
+    for number, prompt in enumerate(task.prompts):
+        text = " ".join(prompt.split())
+        covering = [*_covering(task, number, text)]
+        for start, end in _divided(text):
+            found = [what for (first, last), what in covering if first < end and last > start]
+            checks = dict.fromkeys(name for what in found if isinstance(what, tuple) for name in what)
+            reasons = dict.fromkeys(what for what in found if isinstance(what, str))
+            yield Clause(number, text[start:end].strip(), tuple(checks), tuple(reasons))
+
+
+def _covering(task: Task, number: int, text: str) -> Iterator[tuple[Span, tuple[str, ...] | str]]:
+    """Parts of a prompt, each with the checks that cover it, or why none does."""
+    by_fact = dict(task.covered_by)
+    for fact in task.facts:
+        for word in fact.words if fact.fact in by_fact else ():
+            for match in re.finditer(word, text, re.IGNORECASE):
+                yield match.span(), by_fact[fact.fact]
+    required = {requirement for scenario in task.scenarios for requirement in scenario.require}
+    quotes = {(words, one.check) for one in required for asked, words in one.words if asked == number}
+    for words, check in sorted(quotes):
+        start = text.lower().find(" ".join(words.split()).lower())
+        yield (start, start + len(words)), (check,)
+
+
+def _divided(text: str) -> list[Span]:
+    """Where the clauses of a text begin and end."""
+    ends = [*(match.end() for match in _JOINT.finditer(text)), len(text)]
+    spans: list[Span] = []
+    start = 0
+    for end in ends:
+        is_short = len(_WORD.findall(text, start, end)) < FEW
+        if is_short and spans:
+            spans[-1] = (spans[-1][0], end)
+            start = end
+        elif not is_short or end == len(text):
+            spans.append((start, end))
+            start = end
+    return spans
