@@ -25,9 +25,9 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
     worlds = [*judged_worlds(task)]
     found = [*task_findings(task, verdicts)]
     if task.drawn:
-        found += _of_drawn(worlds)
+        found += _of_drawn([asked for world in worlds for asked in world.by_prompt()])
     else:
-        found += [*_same_worlds(worlds), *(finding for world in worlds for finding in world.findings())]
+        found += [*_same_worlds(worlds), *(finding for world in worlds for finding in _of_listed(world))]
     distinct = {(finding.name, finding.line): finding for finding in reversed(found)}
     ordered = sorted(distinct.values(), key=lambda finding: (finding.line or 0, finding.name))
     reasons = {accepted.finding: accepted.because for accepted in task.accepted}
@@ -41,6 +41,18 @@ def _stale(findings: Iterable[Finding], task: Task) -> Iterator[Finding]:
             line = YamlFile.read(task.path).line(("accepted", index))
             message = f'"{accepted.finding}" is accepted but not found; remove the entry'
             yield Finding("stale-acceptance", accepted.finding, message, task.path, line)
+
+
+def _of_listed(world: JudgedWorld) -> Iterator[Finding]:
+    """Findings in a world; a requirement is implied only if it is so for each prompt that asks for it."""
+    needed: set[str] = set()
+    found: list[Finding] = []
+    for asked in world.by_prompt():
+        several = [*asked.findings()]
+        implied = {finding.subject for finding in several if finding.kind == "implied"}
+        needed |= {requirement.text for requirement in asked.require} - implied
+        found += several
+    yield from (one for one in found if one.kind != "implied" or one.subject not in needed)
 
 
 def _of_drawn(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:

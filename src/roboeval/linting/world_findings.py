@@ -7,7 +7,7 @@ one room of the world each, then with any.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.words import listed
@@ -158,6 +158,11 @@ class JudgedWorld:
                     message = f"no visit was found that matches {text} {there}"
                     yield self.finding("dead-regex", subject, message, line)
 
+    def by_prompt(self) -> list[JudgedWorld]:
+        """The same world with what each prompt asks for, once where two ask for the same."""
+        asked = {self.scenario.asked_by(prompt): None for prompt in range(len(self.task.prompts))}
+        return [replace(self, scenario=scenario) for scenario in asked]
+
     def _leads_somewhere(self, text: Text) -> bool:
         if any(map(text.matches, self._requests)):
             return True
@@ -166,8 +171,7 @@ class JudgedWorld:
 
 
 def judged_worlds(task: Task) -> Iterator[JudgedWorld]:
-    """The worlds of a task, with what each prompt asks for, and behind them those of its ablation."""
+    """The worlds of a task, and behind them those of its ablation."""
     for ablated in (False, True):
         for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
-            for asked in {scenario.asked_by(prompt): None for prompt in range(len(task.prompts))}:
-                yield JudgedWorld(task, number, asked, ablated)
+            yield JudgedWorld(task, number, scenario, ablated)

@@ -51,6 +51,7 @@ def linted(tmp_path: Path) -> Lint:
         solutions: str = SOLUTIONS,
         untripped: bool = False,
         replaced: tuple[str, str] = ("", ""),
+        edited: Sequence[tuple[str, str]] = (),
     ) -> list[Finding]:
         suite = tmp_path / f"suite{len([*tmp_path.iterdir()])}"
         (suite / "tasks").mkdir(parents=True)
@@ -66,7 +67,11 @@ def linted(tmp_path: Path) -> Lint:
         if accepted:
             lines.append("accepted:")
             lines += [f"  - {{finding: '{name}', because: {why}}}" for name, why in accepted.items()]
-        (suite / "tasks" / "Hello.yaml").write_text("\n".join(lines) + "\n")
+        text = "\n".join(lines) + "\n"
+        for old, new in edited:
+            assert old in text
+            text = text.replace(old, new)
+        (suite / "tasks" / "Hello.yaml").write_text(text)
         loaded = load_suite(str(suite))
         task = loaded.task("Hello")
         findings = lint(task, tried(task, loaded) if untripped else [])
@@ -123,6 +128,36 @@ def test_a_requirement_that_follows_from_another(linted: Lint) -> None:
     for name in ('"goes"', "world 1", '"greets"'):
         assert name in one.message
     assert linted(checks, ["goes", "speaks"], ["greets"]) == []
+
+
+def test_what_follows_only_by_a_prompt_that_asks_for_more_is_no_finding(linted: Lint) -> None:
+    checks = {"greets": GREETS_THERE, "goes": GOES}
+    more = ("[Say hello in the kitchen.]", "[Say hello in the kitchen., Go there.]")
+    greets = "{check: greets, prompts: {0: Say hello in the kitchen}}"
+    assert names(linted(checks, ["goes", "greets"])) == ["implied: goes"]
+    assert linted(checks, ["goes", "greets"], edited=(more, ("'greets'", greets))) == []
+
+
+def test_a_clause_that_no_check_covers(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "goes": GOES}
+    lines = (
+        "facts:",
+        "  - {fact: where, words: [kitchen]}",
+        "  - {fact: what, words: [hello]}",
+        "covered_by: {where: [goes], what: [speaks]}",
+        "checks:",
+    )
+    facts = ("checks:", "\n".join(lines))
+    more = ("[Say hello in the kitchen.]", "['Say hello in the kitchen, and then come back here.']")
+    (finding,) = linted(checks, ["speaks", "goes"], edited=(facts, more))
+    assert finding.name == "uncovered: 0: and then come back here."
+    assert linted(checks, ["speaks", "goes"], edited=(facts,)) == []
+    forgotten = ("what: [speaks]", "")
+    assert names(linted(checks, ["speaks", "goes"], edited=(facts, forgotten))) == ["uncovered: what"]
+    reason = ("what: [speaks]", "what: it goes without saying")
+    assert linted(checks, ["speaks", "goes"], edited=(facts, reason)) == []
+    quoted = ("'goes'", "{check: goes, prompts: {0: and then come back here}}")
+    assert linted(checks, ["speaks", "goes"], edited=(facts, more, quoted)) == []
 
 
 def test_a_requirement_that_follows_from_several(linted: Lint) -> None:
@@ -501,7 +536,10 @@ def test_a_fact_that_a_prompt_does_not_say(
     assert [one.name for one in found] == ["unsaid: where"] * (named is not None)
     assert all(name in one.message for one in found for name in named or [])
     assert all(path.read_text().splitlines()[(one.line or 0) - 1].startswith("facts:") for one in found)
-    assert not any(one.kind == "unsaid" for one in lint(replace(task, borrows=True), []))
+    borrowed = task.facts[0].model_copy(update={"fact": "lent", "words": ("attic",)})
+    assert [
+        one for one in lint(replace(task, facts=(borrowed, *task.facts)), []) if one.kind == "unsaid"
+    ] == found
 
 
 # --- drawn worlds

@@ -72,6 +72,13 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("[goes,", "[{check: goes, prompts: {}},", 11, '"prompts" has too few entries'),
         ("[goes,", "[{prompts: {0: p}},", 11, '"check" is missing'),
         ("[goes,", "[{check: goes, prompt: {0: p}},", 11, '"prompt" is unknown'),
+        ("prompts: [p]", "prompts: [p]\ncovered_by: {f: [goes]}", 4, 'no fact "f"'),
+        (
+            "prompts: [p]",
+            "prompts: [p]\nfacts:\n  - {fact: f, words: [p]}\ncovered_by: {f: [went]}",
+            6,
+            'no check "went"',
+        ),
         ('say("{what}")', 'say("{waht}")', 6, '"waht"'),
         ("tr.Exists(goto(", 'tr.Exists(goto("{room}",', 5, '"room"'),
         ('say("{what}")', 'say("x{3}")', 6, "{what}"),

@@ -1,0 +1,41 @@
+"""The verdicts of `plus` are those of a fair reader, who knew the instructions and nothing else."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.suites.load import load_suite
+
+FAIR = Path(__file__).parent / "fair"
+AT_LEAST = 0.98
+
+
+def programs(name: str) -> list[tuple[str, dict[str, Any]]]:
+    """The programs of a set with their task, prompt, label and the reason for it."""
+    files = sorted((FAIR / name).glob("*.yaml"))
+    return [(file.stem, one) for file in files for one in yaml.safe_load(file.read_text(encoding="utf-8"))]
+
+
+@pytest.mark.parametrize("name", ["first", "second"])
+def test_verdicts_are_those_of_a_fair_reader(name: str) -> None:
+    told = programs(name)
+    assert len(told) == 160
+    assert sum(one["label"] == "right" for _, one in told) == 80
+    completions = [
+        Completion(task=task, prompt=one["prompt"], index=index, program=one["program"])
+        for index, (task, one) in enumerate(told)
+    ]
+    passed = [row["passed"] for row in evaluate(completions, load_suite("plus"), workers=2)]
+    right = [one["label"] == "right" for _, one in told]
+    both = sum(one and other for one, other in zip(passed, right, strict=True))
+    otherwise = [
+        (task, one["prompt"], one["label"], one["reason"])
+        for (task, one), was in zip(told, passed, strict=True)
+        if was != (one["label"] == "right")
+    ]
+    assert both >= AT_LEAST * sum(passed), otherwise
+    assert both >= AT_LEAST * sum(right), otherwise
