@@ -97,7 +97,15 @@ OTHERWISE = {
         "looks for Zarko in the lobby too": True,
         "one question with the ingredients as options": False,
     },
+    "CountSavory": {
+        # Asks only the owner of an office.
+        "knows the four offices by heart": False,
+    },
+    "HalloweenShopping": {
+        "Counter with the owner asked by name": False,
+    },
     "HalloweenList": {
+        "uses a Counter and looks for the owner by name": False,
         # No word where nobody is in.
         "plain loop over the rooms": False,
     },

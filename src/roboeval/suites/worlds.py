@@ -123,9 +123,8 @@ class WorldSampler:
         for pattern, wanted in corner.set.items():
             level = wanted.option if isinstance(wanted, OptionFile) else wanted
             named = fnmatch.filter(self.factors, pattern)
-            fitting = [
-                f for f in named if level in self.factors[f] or (level == NOWHERE and f.endswith(".in"))
-            ]
+            anywhere = level in (*self.described.rooms, NOWHERE)
+            fitting = [f for f in named if level in self.factors[f] or (anywhere and f.endswith(".in"))]
             if not fitting:
                 known = ", ".join(self._free)
                 sentence = f'nothing that "{pattern}" names can be "{level}"; there is {known}'

@@ -107,6 +107,13 @@ def test_the_robot_may_start_in_one_of_several_rooms(tmp_path: Path) -> None:
         assert start == "hall" or f"robot in {start}" in scenario.world.about or scenario is scenarios[0]
 
 
+def test_a_corner_may_put_somebody_into_any_room(tmp_path: Path) -> None:
+    task = TASK.replace('{"*.in": nowhere}', '{"*.in": nowhere, kim.in: hall}')
+    scenarios = load_suite(str(suite(tmp_path, task))).tasks["Tea"].scenarios
+    in_hall = [room.people for each in scenarios for room in each.world.rooms if room.name == "hall"]
+    assert [len(people) for people in in_hall] == [1] + [0] * (len(scenarios) - 1)
+
+
 def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: Path) -> None:
     mine = load_suite(str(suite(tmp_path)))
     again, other, more = mine.with_worlds(12, 3), mine.with_worlds(seed=4), mine.with_worlds(40)
@@ -170,7 +177,7 @@ def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list
     ("good", "bad", "line", "named"),
     [
         ("in: lab,", "in: attic,", 9, '"attic"'),
-        ('"*.in": nowhere', '"kim.in": hall', 14, '"kim.in" names can be "hall"'),
+        ('"*.in": nowhere', '"kim.in": attic', 14, '"kim.in" names can be "attic"'),
         ("counts(cups) if cups", "counts(cup) if cups", 31, '"cup"'),
         ("not counts(3)", "not counts(here)", 32, "argument"),
         ("not counts(3)", "not 3", 32, "not a requirement"),

@@ -68,7 +68,9 @@ def _given(kinds: tuple[re.Pattern[str], ...], text: str) -> frozenset[float]:
 
 # "2 people in the offices" are no 2 offices.
 _PLACE = re.compile(
-    r"\b(?:in|at|from|across|around) (?:(?:all|the|their|your|my|our|each|every) ){0,2}$", re.IGNORECASE
+    r"\b(?:(?:in|at|from|across|around) (?:(?:all|the|their|your|my|our|each|every) ){0,2}"
+    r"|(?:all|each|every) (?:the )?)$",
+    re.IGNORECASE,
 )
 NEAR = 30  # characters before a thing, in which such words are looked for
 

@@ -55,7 +55,7 @@ _INSTEAD = re.compile(
 )
 _EXCEPT = re.compile(
     r"\b(?P<of>all|every\w*|each|no(?:ne|body|thing| ?one)?)\b(?P<what>[^,.;:]{0,60}?)\W(?:"
-    r"(?P<but>but)|except(?: for)?|apart from|other than|besides)\b\s*"
+    r"(?P<but>but)|except(?: for)?|with the exception of|apart from|other than|besides)\b\s*"
     r"(?P<whom>(?!(?:no|nobody|none|nothing|i|he|she|it|they|we|there)\b)(?:\w[\w']*\s+){0,3}?\w[\w']*)(?P<rest>\s+(?:is|are|was|were|has|have|had|will|would|can|wants?|gave|needs?|lacks?)\b.*|\W*)$",
     re.IGNORECASE,
 )

@@ -35,7 +35,8 @@ _NUMBER = re.compile(
     re.IGNORECASE,
 )
 _PRONOUN = re.compile(
-    r"\b(?:any|some|every|each|which|this|that|the|another|other|sweet|savory|savoury|right|last|first)[ -]$",
+    r"\b(?:any|some|every|each|which|this|that|(?<!just )(?<!only )the|another|other|sweet|savory|savoury"
+    r"|right|last|first)[ -]$",
     re.IGNORECASE,
 )
 _TAKES = re.compile(

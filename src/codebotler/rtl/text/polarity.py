@@ -26,7 +26,7 @@ _HARMLESS = re.compile(
 _DENIAL = re.compile(
     r"\b(?:no|not|none|nobody|nothing|noone|never|neither|nor|nowhere|without|cannot|cant|dont|doesnt|wont"
     r"|isnt|declin\w*|refus\w*|reject\w*|turn(?:s|ed|ing) (?:\w+ ){0,4}down|unable|unavailable|absent|missing"
-    r"|lack\w*|negative|busy|alone|empty|other plans|(?:run|ran|is|are|was|were) out"
+    r"|lack\w*|in vain|negative|busy|alone|empty|other plans|(?:run|ran|is|are|was|were) out"
     r"|(?:will|ha(?:s|ve) to) pass)\b"
     r"|['\u2019](?:s|re|m) out of\b"
     r"|n['\u2019]t\b",
@@ -35,7 +35,7 @@ _DENIAL = re.compile(
 _OPEN = re.compile(
     r"\b(?:maybe|perhaps|possibly|probably|presumably|might|whether|if|unless|unclear|unknown|uncertain|unsure"
     r"|undecided|almost|nearly|(?:guess|wonder)(?:es|s|ing)?|another time|next (?:time|week))\b"
-    r"|\bmay\b(?! (?:i|we|want|need)\b)|\bhop(?:e|es|ing)\b(?!.{0,60}\b(?:you|your|every\w+|all)\b)"
+    r"|\bmay\b(?! (?:i|we|your?|want|need)\b)|\bhop(?:e|es|ing)\b(?!.{0,60}\b(?:you|your|every\w+|all)\b)"
     rf"|\b{_NOT} (?:yet )?(?:be )?(?:know|knows|sure|certain|clear|decided?|told|tell)\b"
     r"|\bno (?:idea|answer)\b"
     # What the robot is about to do, and who has yet to answer.

@@ -29,7 +29,7 @@ _CLOCK = re.compile(
     rf"|{_START}(?P<past>half|(?:a )?quarter) (?P<side>past|to) {_hour('1')}\b{_half('1')}?"
     rf"|{_START}{_hour('2')}[ -](?P<word>thirty|fifteen|forty-five)\b{_half('2')}?"
     rf"|{_START}{_hour('3')}(?:{_half('3')}|\s*o['\u2019]?\s?clock\b{_half('4')}?)"
-    rf"|(?:\b(?:at|is|for|around|about)|:)\s+{_hour('4')}(?=\s*(?:[,;!?)]|\.(?!\d)|$))"
+    rf"|(?:\b(?:at|is|for|around|about|make it)|:)\s+{_hour('4')}(?=\s*(?:[,;!?)]|\.(?!\d)|$))"
     r"|\b(?P<noon>noon|mid-?day)\b|\b(?P<midnight>midnight)\b",
     re.IGNORECASE,
 )

@@ -45,6 +45,8 @@ SAVORY = [
     ("I looked into 4 offices", set()),
     ("2 people in the offices would take one", {2}),
     ("Nobody in the offices would take one", {0}),
+    ("Savory takers, all offices together: 2", {2}),
+    ("Just the one savory snack was taken, and the one sweet", {1}),
     ("Of those in all the offices, 2 took one", {2}),
     ("Savory snacks are not needed", {0}),
     ("Savory snacks aren't wanted", {0}),
@@ -246,6 +248,9 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("All the rooms except Bob's have one", "", "bob"),
         ("All of them are missing other than Alice", "alice", ""),
         ("All is well, but Bob is coming, and none of them was late, but Alice is here", "alice bob", ""),
+        ("Everything of theirs is here with the exception of Alice", "", "alice"),
+        ("May your visit be nice, Alice. Bob may come", "alice", ""),
+        ("You will look for Alice in vain", "", "alice"),
         ("I told everybody but nobody believed Alice", "", "alice"),
         # What was sought and not found.
         ("I looked for one in the room of Alice, but could not find any", "", "alice"),
