@@ -310,7 +310,8 @@ def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Ru
     if answer in {"yes", "no"} and rules.words_for_no:
         return _in_other_words(answer, options, rules)
     means = "yes" if finds(question, answer, rules.matching) else "no"
-    return _first_saying((means,), options, rules.matching)
+    found = _first_saying((means,), options, rules.matching)
+    return _in_other_words(means, options, rules) if found is None and rules.words_for_no else found
 
 
 def _in_other_words(answer: str, options: tuple[Option, ...], rules: Rules) -> int | None:

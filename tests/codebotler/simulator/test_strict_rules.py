@@ -77,6 +77,13 @@ def test_yes_and_no_are_understood_in_other_words(
     assert [choose(answer, "Tea?", offered, WORDS) for answer in ("yes", "no")] == [by_yes, by_no]
 
 
+def test_who_wants_something_says_yes_to_it_in_other_words() -> None:
+    offered = (Option("Sure"), Option("No, let me choose again"))
+    assert [choose("tea", f"So that is {drink}?", offered, WORDS) for drink in ("tea", "water")] == [0, 1]
+    assert choose("tea", "So that is tea?", offered, STRICT) is None
+    assert choose("tea", "So what is it?", (Option("water"), Option("milk")), WORDS) is None
+
+
 def test_without_such_words_only_yes_is_yes() -> None:
     offered = (Option("Sure"), Option("No thanks"))
     assert [choose(answer, "Tea?", offered, STRICT) for answer in ("yes", "no")] == [1, 1]
