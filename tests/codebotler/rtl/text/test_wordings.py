@@ -18,10 +18,8 @@ OPPOSITE = {"affirms": "denies", "denies": "affirms", "open": "open"}
 
 def reading(message: str, about: str) -> str:
     """What a message says of something."""
-    found = [Claim(re.escape(about), denied=denied).matches(message) for denied in (False, True)]
-    return {(True, False): "affirms", (False, True): "denies", (False, False): "open"}.get(
-        tuple(found), "both"
-    )
+    affirmed, denied = (Claim(re.escape(about), denied=which).matches(message) for which in (False, True))
+    return "both" if affirmed and denied else "affirms" if affirmed else "denies" if denied else "open"
 
 
 def test_claims_are_read_as_meant() -> None:
