@@ -187,7 +187,7 @@ def go_to(room):
 
 
 AROUND = [
-    "say('Hello, I am on my way.'); _task(); say('All done!')",
+    "say('I am on my way.'); _task(); say('All done!')",
     "_task(); say('That was no problem at all.')",
     "say('One moment, please.'); _task(); say('That was all.')",
     "_task(); say('It took me 5 minutes. Thank you, and have a nice day.')",

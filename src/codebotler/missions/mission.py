@@ -25,6 +25,9 @@ from codebotler.simulator.worker import EngineError, Worker
 GRACE = 10.0
 """Real seconds that a robot has to confirm a stop."""
 
+SHUTTING_DOWN = "CodeBotler, shutting down"
+"""Who stops a mission that is still going on when the program ends."""
+
 UNCONFIRMED = (
     "the robot has not confirmed the stop; check it now, and press its emergency stop if it still moves"
 )
@@ -219,7 +222,7 @@ class Mission:
             self._wake.wait()
         except BaseException:
             with suppress(MissionError):
-                self.stop("CodeBotler, shutting down")
+                self.stop(SHUTTING_DOWN)
             raise
         finally:
             if not self._over.wait(GRACE):
@@ -282,7 +285,7 @@ class Mission:
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state.is_moving:
-            self.stop("CodeBotler, shutting down")
+            self.stop(SHUTTING_DOWN)
         elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
             self.stop("CodeBotler")
         else:

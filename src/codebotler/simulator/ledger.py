@@ -9,7 +9,7 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.core.skills import SkillTable
 from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.simulator.robot import Argument, Result, RobotError, SimulatedRobot
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.rules import Limits, Rules
 
 FEW = 50  # calls of which nothing is remembered
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
@@ -112,9 +112,14 @@ class Ledger:
         if self.calls > limits.calls:
             self.limit = f"{limits.calls:,} skill calls"
         elif size + OPTION_OVERHEAD * len(arguments) > limits.text and longest(arguments) > limits.text:
-            self.limit = f"a text of more than {limits.text:,} characters"
+            self.limit = too_long(limits)
         elif self.text > limits.trace:
             self.limit = f"texts of more than {limits.trace:,} characters in all"
+
+
+def too_long(limits: Limits) -> str:
+    """The limit that a text has reached, in words."""
+    return f"a text of more than {limits.text:,} characters"
 
 
 def longest(arguments: Sequence[Argument]) -> int:

@@ -243,8 +243,13 @@ def go_to(robot: SimulatedRobot, location: str) -> None:
     elif room is not None:
         robot.record("goto", room)
     if room is None:
-        raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
+        raise no_room(location)
     robot.room = room
+
+
+def no_room(location: str) -> RobotError:
+    """The error of a drive to what is no room."""
+    return RobotError("GoToInvalidLocation", f'there is no room "{location}"')
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:

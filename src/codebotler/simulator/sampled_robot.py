@@ -244,7 +244,7 @@ def drive(robot: SampledRobot, location: str) -> None:
     robot.record("goto", location)
     room = robot.room_map.room(location)
     if room is None:
-        raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
+        raise real.no_room(location)
     robot.room = room
 
 

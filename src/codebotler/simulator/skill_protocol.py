@@ -14,7 +14,7 @@ from codebotler.simulator.isolated_process import (
     ProtocolError,
     cause_of_death,
 )
-from codebotler.simulator.ledger import STOP, WAITS, Ledger, SkillAnswer, SkillPerformer
+from codebotler.simulator.ledger import STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
@@ -87,7 +87,7 @@ class SkillProtocol:
             case "wait", _:
                 self.ledger.limit = WAITS
             case "too-long", _:
-                self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
+                self.ledger.limit = too_long(self.limits)
             case _:
                 raise ProtocolError("there is no such skill")
         return STOP

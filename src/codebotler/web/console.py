@@ -16,7 +16,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
 from codebotler.missions.log import Summary
-from codebotler.missions.mission import GRACE, MissionError
+from codebotler.missions.mission import GRACE, SHUTTING_DOWN, MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.store import recover
 from codebotler.missions.view import Order, SessionView
@@ -70,7 +70,7 @@ class Console:
         session = self._session
         if session is not None:
             if not session.view.is_over:
-                session.stop("CodeBotler, shutting down")
+                session.stop(SHUTTING_DOWN)
             session.join(GRACE + 1)
         with self._checking:
             self._held.close()

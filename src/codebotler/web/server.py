@@ -27,6 +27,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from codebotler import __version__
 from codebotler.core.terminal import note
 from codebotler.core.words import listed
+from codebotler.missions.mission import SHUTTING_DOWN
 from codebotler.web import api, api_page, face, page
 from codebotler.web.access import Access, Place, Role
 from codebotler.web.console import Console
@@ -195,7 +196,5 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:
-            threading.Thread(
-                target=self._console.stop, args=("CodeBotler, shutting down",), daemon=True
-            ).start()
+            threading.Thread(target=self._console.stop, args=(SHUTTING_DOWN,), daemon=True).start()
         super().handle_exit(sig, frame)

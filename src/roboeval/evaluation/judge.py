@@ -187,7 +187,7 @@ def run_in_worlds(
 def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> tuple[bytes, ...] | None:
     """The judgements on a program that ran in all worlds of a task, as JSON; None if judging takes too long.
 
-    There is one for each prompt: for which of them a program was written, does not matter before.
+    There is one for each prompt; until then it does not matter for which of them a program was written.
     """
     name, outcomes = ran
     task = suite.tasks[name]

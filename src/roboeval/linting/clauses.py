@@ -61,9 +61,14 @@ def _covering(task: Task, number: int, text: str) -> Iterator[tuple[Span, tuple[
             for match in re.finditer(word, text, re.IGNORECASE):
                 yield match.span(), by_fact[fact.fact]
     required = {requirement for scenario in task.scenarios for requirement in scenario.require}
-    quotes = {(words, one.check) for one in required for asked, words in one.words if asked == number}
+    quotes = {
+        (" ".join(words.split()), one.check)
+        for one in required
+        for asked, words in one.words
+        if asked == number
+    }
     for words, check in sorted(quotes):
-        start = text.lower().find(" ".join(words.split()).lower())
+        start = text.lower().find(words.lower())
         yield (start, start + len(words)), (check,)
 
 

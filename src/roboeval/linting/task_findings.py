@@ -65,7 +65,7 @@ def _uncovered(task: Task) -> Iterator[Finding]:
     line = YamlFile.read(task.path).line(("covered_by",))
     for fact in task.facts:
         if fact.fact not in dict(task.covered_by):
-            message = f'nobody says which checks cover "{fact.fact}"; add it under covered_by'
+            message = f'covered_by does not say which checks cover "{fact.fact}"; add it there'
             yield Finding("uncovered", fact.fact, message, task.path, line)
     for clause in clauses_of(task):
         if not clause.is_covered:

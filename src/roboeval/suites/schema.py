@@ -70,7 +70,7 @@ class RequirementFile(_Form):
     """
 
     check: Text
-    prompts: Annotated[dict[int, Text], Field(min_length=1)] | None = None
+    prompts: Annotated[dict[int, Name], Field(min_length=1)] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -145,7 +145,7 @@ class _AnyTaskFile(_Form):
     abilities: tuple[Ability, ...] = ()
     prompts: Annotated[list[Name], Field(min_length=1)]
     facts: tuple[Fact, ...] = ()
-    covered_by: dict[Name, list[Name] | Text] = {}
+    covered_by: dict[Name, Annotated[list[Name], Field(min_length=1)] | Name] = {}
     checks: dict[str, CheckFile]
     accepted: tuple[Accepted, ...] = ()
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.words import listed
 from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
 from roboeval.suites.schema import DrawnTaskFile, RequirementFile, ScenarioFile, TaskFile
@@ -98,6 +99,8 @@ def _covered_by(
     for fact, names in form.covered_by.items():
         if fact not in facts:
             raise file.wrong(f'there is no fact "{fact}"; they are under facts', "covered_by", fact)
+        if isinstance(names, str) and names in checks:
+            raise file.wrong(f'"{names}" is a check; write [{names}]', "covered_by", fact)
         if unknown := next((name for name in names if isinstance(names, list) and name not in checks), None):
             raise file.wrong(f'there is no check "{unknown}"; add it under checks', "covered_by", fact)
         yield fact, names if isinstance(names, str) else tuple(names)
@@ -149,6 +152,8 @@ class _Reader:
             raise wrong(f'"{head}" is not the head of a check; write name or name(p1, p2)')
         name = match[1]
         parameters = tuple(p.strip() for p in match[2].split(",")) if match[2] else ()
+        if START in parameters:
+            raise wrong(f'a parameter cannot be called "{START}", which is the room of the robot; rename it')
         if again := next((p for n, p in enumerate(parameters) if p in parameters[:n]), None):
             raise wrong(f'the check "{name}" has two parameters "{again}"; rename one')
         for used in re.findall(r"\{([^\W\d]\w*)\}", body.rtl):
@@ -229,8 +234,10 @@ class _Reader:
         known = self.form.prompts
         for number, words in prompts.items():
             if not 0 <= number < len(known):
-                raise self.file.wrong(f"there is no prompt {number}; they are 0 to {len(known) - 1}", *at)
-            if " ".join(words.split()).lower() not in " ".join(known[number].split()).lower():
+                sentence = f"there is no prompt {number}; there is {listed([*map(str, range(len(known)))])}"
+                raise self.file.wrong(sentence, *at, number)
+            quoted = rf"(?<!\w){re.escape(' '.join(words.split()))}(?!\w)"
+            if re.search(quoted, " ".join(known[number].split()), re.IGNORECASE) is None:
                 sentence = f'prompt {number} does not say "{words}"; quote it word for word'
                 raise self.file.wrong(sentence, *at, number)
         return tuple(prompts.items())

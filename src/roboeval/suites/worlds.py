@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.words import listed
 from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
@@ -88,7 +89,7 @@ class WorldSampler:
         known = self.described.rooms if place == (ROBOT,) else [*self.described.rooms, NOWHERE]
         for room in _levels(where):
             if room not in known:
-                sentence = f'there is no room "{room}"; there is {", ".join(known[:-1])} and {known[-1]}'
+                sentence = f'there is no room "{room}"; there is {listed(known)}'
                 raise self.file.wrong(sentence, "worlds", *place)
         return _levels(where)
 
@@ -124,7 +125,10 @@ class WorldSampler:
             level = wanted.option if isinstance(wanted, OptionFile) else wanted
             named = fnmatch.filter(self.factors, pattern)
             anywhere = level in (*self.described.rooms, NOWHERE)
-            fitting = [f for f in named if level in self.factors[f] or (anywhere and f.endswith(".in"))]
+            alone = len(named) == 1 or level == NOWHERE  # who is named may be put into any room
+            fitting = [
+                f for f in named if level in self.factors[f] or (anywhere and alone and f.endswith(".in"))
+            ]
             if not fitting:
                 known = ", ".join(self._free)
                 sentence = f'nothing that "{pattern}" names can be "{level}"; there is {known}'

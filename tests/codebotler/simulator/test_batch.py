@@ -529,13 +529,11 @@ def test_a_child_that_is_not_believed_ends_at_once(worker: Worker, monkeypatch: 
     def receive(child: IsolatedProcess, most: int) -> bytes | None:
         if most != MAX_FRAME:  # from the preparer
             return honest(child, most)
-        begun.extend(children_of(fork_server))
-        for pid in begun:
-            os.kill(pid, signal.SIGSTOP)  # so that it does not come to an end by itself
+        begun.append(child.pid)
+        os.kill(child.pid, signal.SIGSTOP)  # so that it does not come to an end by itself
         raise ProtocolError("nonsense")
 
     begun: list[int] = []
-    fork_server = worker._fork_server(BATCH_SERVER).pid
     monkeypatch.setattr(IsolatedProcess, "receive_bytes", receive)
     assert not worker.run_tame([(WAVING["once"], [Waves(lambda *_: "done").robot])])
     assert len(begun) == 1

@@ -39,9 +39,7 @@ _PRONOUN = re.compile(
     r"|right|last|first)[ -]$",
     re.IGNORECASE,
 )
-_TAKES = re.compile(
-    r"\b(?:takes?|took|wants?|wanted|needs?|needed|likes?|liked|gets?|got|chose|picked)[ -]$", re.IGNORECASE
-)
+_TAKES = re.compile(r"\b(?:takes?|took)[ -]$", re.IGNORECASE)
 _LAST = re.compile(r"\s*(?:[.,;!)]|and\b|but\b|$)", re.IGNORECASE)
 # "2 of 4" gives 2, and "a total of 2" gives 2 as well; "2 of a total of 4" does not give 4.
 _OF = re.compile(
