@@ -527,9 +527,10 @@ def test_a_child_that_is_not_believed_ends_at_once(worker: Worker, monkeypatch: 
     honest = IsolatedProcess.receive_bytes
 
     def receive(child: IsolatedProcess, most: int) -> bytes | None:
+        frame = honest(child, most)
         if most != MAX_FRAME:  # from the preparer
-            return honest(child, most)
-        begun.append(child.pid)
+            return frame
+        begun.append(child.pid)  # which waits for an answer
         os.kill(child.pid, signal.SIGSTOP)  # so that it does not come to an end by itself
         raise ProtocolError("nonsense")
 
