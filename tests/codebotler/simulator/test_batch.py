@@ -8,6 +8,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import closing
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -523,7 +524,7 @@ def test_a_child_that_says_no_more_costs_only_the_program_that_it_ran(
     assert worker.run_tame([job(saying(text), [WORLD]) for text in "abc"]).keys() == {(0, 0), (2, 0)}
 
 
-def test_a_child_that_is_not_believed_ends_at_once(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_child_that_is_not_believed_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = IsolatedProcess.receive_bytes
 
     def receive(child: IsolatedProcess, most: int) -> bytes | None:
@@ -536,9 +537,10 @@ def test_a_child_that_is_not_believed_ends_at_once(worker: Worker, monkeypatch: 
 
     begun: list[int] = []
     monkeypatch.setattr(IsolatedProcess, "receive_bytes", receive)
-    assert not worker.run_tame([(WAVING["once"], [Waves(lambda *_: "done").robot])])
-    assert len(begun) == 1
-    assert are_gone(set(begun))
+    with closing(Worker()) as worker:
+        assert not worker.run_tame([(WAVING["once"], [Waves(lambda *_: "done").robot])])
+        assert len(begun) == 1
+        assert are_gone(set(begun))
 
 
 # --- replay
