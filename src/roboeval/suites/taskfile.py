@@ -186,6 +186,8 @@ class _Reader:
 
     def drawn(self, sampler: WorldSampler, count: int, seed: int) -> Iterator[Scenario]:
         known: dict[tuple[str, int, str], Requirement] = {}
+        for number, form in enumerate(sampler.form.require):  # also of what no world requires
+            self._words(form.prompts or {}, ("require", number, "prompts"))
         for setting in sampler.settings(count, seed):
             require = [(text, number, setting.start) for text, number in sampler.requirements(setting)]
             for text, number, start in require:

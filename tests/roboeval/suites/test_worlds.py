@@ -187,6 +187,8 @@ def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list
         ("if p.room]'", "if p.age]'", 17, '".age"'),
         ("{option: -1}", "{option: 0}", 8, "no option 0"),
         ("robot: hall", "robot: [hall, attic]", 5, '"attic"'),
+        ("- not counts(3)", "- {check: not counts(3) if 1 > 2, prompts: {9: tea}}", 32, "no prompt 9"),
+        ("- not counts(3)", "- {check: not counts(3), prompts: {0: hat tea}}", 32, '"hat tea"'),
         ("robot: hall", "robot: [hall, nowhere]", 5, '"nowhere"'),
     ],
 )
