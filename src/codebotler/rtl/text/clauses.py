@@ -48,17 +48,21 @@ _IN_VAIN = re.compile(r"\bwould\s+(?:like|love|have\s+(?:liked|loved))\s+to(?=\W
 _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 
+# "Butter? No." is one sentence.
 _ANSWERED = re.compile(r"(?<![^.!?;\n] )\b(\w[\w' ]{0,30})\?\s+(yes|no|none)\b", re.IGNORECASE)
+# "75 rather than 72" rejects 72.
 _INSTEAD = re.compile(
     r"\b(?:rather than|instead of)\s+((?:(?!(?:and|but|is|are|was|were)\b)\w[\w'\u2019]*\s?){1,3})",
     re.IGNORECASE,
 )
+# "All rooms except room 3 have one": who is excepted has a clause of its own.
 _EXCEPT = re.compile(
     r"\b(?P<of>all|every\w*|each|no(?:ne|body|thing| ?one)?)\b(?P<what>[^,.;:]{0,60}?)\W(?:"
     r"(?P<but>but)|except(?: for)?|with the exception of|apart from|other than|besides)\b\s*"
     r"(?P<whom>(?!(?:no|nobody|none|nothing|i|he|she|it|they|we|there)\b)(?:\w[\w']*\s+){0,3}?\w[\w']*)(?P<rest>\s+(?:is|are|was|were|has|have|had|will|would|can|wants?|gave|needs?|lacks?)\b.*|\W*)$",
     re.IGNORECASE,
 )
+# "I looked in room 2, but there was none": the second part tells of the room in the first.
 _SEARCHED = re.compile(
     r"\b(?:look|search|check|hunt|visit|inspect)\w*\b|\bwas in\b|\b(?:is|was) done\b", re.IGNORECASE
 )
