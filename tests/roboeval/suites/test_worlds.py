@@ -114,6 +114,13 @@ def test_a_corner_may_put_somebody_into_any_room(tmp_path: Path) -> None:
     assert [len(people) for people in in_hall] == [1] + [0] * (len(scenarios) - 1)
 
 
+def test_a_corner_for_several_moves_those_who_may_be_there(tmp_path: Path) -> None:
+    task = TASK.replace('{"*.in": nowhere}', '{"*.in": office}')
+    rooms = load_suite(str(suite(tmp_path, task))).tasks["Tea"].scenarios[0].world.rooms
+    there = {room.name: [*room.objects, *(person.name for person in room.people)] for room in rooms}
+    assert there == {"lab": ["lou|louise"], "office": ["mug", "kim"], "hall": []}
+
+
 def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: Path) -> None:
     mine = load_suite(str(suite(tmp_path)))
     again, other, more = mine.with_worlds(12, 3), mine.with_worlds(seed=4), mine.with_worlds(40)
