@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 from roboeval.suites.load import Task
 
-FEW = 4  # words; what is shorter, such as an item of a list, belongs to the clause before it
-_JOINT = re.compile(r"[.,;:!?]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
+FEW = 4  # words; what is shorter belongs to the clause before or after it, if there is one in its sentence
+_SENTENCE = re.compile(r"[.!?][\"”)]*\s+")
+_JOINT = re.compile(r"[,;:]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
 _WORD = re.compile(r"\w+")
+_SKIP = re.compile(r"\.\*|\[\^[^\]]+\]\*")  # the part of a regex that finds any words
 
 Span = tuple[int, int]
 
@@ -41,7 +43,7 @@ def clauses_of(task: Task) -> Iterator[Clause]:
     """The clauses of all prompts, in their order.
 
     A check covers a clause that shares a word with a fact that it is said to cover, or with the words on
-    which a requirement of it rests.
+    which a requirement of it rests. What stands for `.*` in a fact's regex is no word of the fact.
     """
     for number, prompt in enumerate(task.prompts):
         text = " ".join(prompt.split())
@@ -57,9 +59,8 @@ def _covering(task: Task, number: int, text: str) -> Iterator[tuple[Span, tuple[
     """Parts of a prompt, each with the checks that cover it, or why none does."""
     by_fact = dict(task.covered_by)
     for fact in task.facts:
-        for word in fact.words if fact.fact in by_fact else ():
-            for match in re.finditer(word, text, re.IGNORECASE):
-                yield match.span(), by_fact[fact.fact]
+        for words in fact.words if fact.fact in by_fact else ():
+            yield from ((span, by_fact[fact.fact]) for span in _found(words, text))
     required = {requirement for scenario in task.scenarios for requirement in scenario.require}
     quotes = {
         (" ".join(words.split()), one.check)
@@ -72,17 +73,29 @@ def _covering(task: Task, number: int, text: str) -> Iterator[tuple[Span, tuple[
         yield (start, start + len(words)), (check,)
 
 
-def _divided(text: str) -> list[Span]:
+def _found(words: str, text: str) -> Iterator[Span]:
+    """Where a regex finds words, without those that it skips."""
+    marked = _SKIP.sub(lambda skip: f"(?P<skip{skip.start()}>{skip[0]})", words)
+    for match in re.finditer(marked, text, re.IGNORECASE):
+        skipped = (match.span(name) for name in match.re.groupindex)
+        edges = [match.start(), *(edge for span in skipped if span[0] >= 0 for edge in span), match.end()]
+        yield from zip(edges[::2], edges[1::2], strict=True)
+
+
+def _divided(text: str) -> Iterator[Span]:
     """Where the clauses of a text begin and end."""
-    ends = [*(match.end() for match in _JOINT.finditer(text)), len(text)]
-    spans: list[Span] = []
-    start = 0
-    for end in ends:
-        is_short = len(_WORD.findall(text, start, end)) < FEW
-        if is_short and spans:
-            spans[-1] = (spans[-1][0], end)
+    first = 0
+    for last in [*(match.end() for match in _SENTENCE.finditer(text)), len(text)]:
+        spans: list[Span] = []
+        start = first
+        for end in [*(match.end() for match in _JOINT.finditer(text, first, last)), last]:
+            is_short = len(_WORD.findall(text, start, end)) < FEW
+            if is_short and spans:
+                spans[-1] = (spans[-1][0], end)
+            elif is_short and end < last:
+                continue  # it belongs to what follows
+            else:
+                spans.append((start, end))
             start = end
-        elif not is_short or end == len(text):
-            spans.append((start, end))
-            start = end
-    return spans
+        yield from spans
+        first = last

@@ -39,8 +39,8 @@ def mutation_score(
 ) -> MutationScore:
     """Run the solutions of a task and further originals, make mutants of the right ones, and try these.
 
-    An original is right if it does what some prompt asks for. Its mutants are judged by that prompt: of those
-    that fit, the one that asks for most.
+    An original is right if it does what some prompt asks for. Its mutants are judged by all prompts for which
+    it is right: one that is wrong for any of these is a wrong mutant.
 
     Raises UserError if a number of worlds is given, but the suite's are written by hand.
     """
@@ -69,9 +69,14 @@ def mutation_score(
     programs = originals(task, further)
     ran = pool.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
     before = dict(zip(programs, watched(ran, f"running {task.name}", len(programs)), strict=True))
-    asked = asked_by_prompts(scenarios, len(task.prompts))
+    prompts = range(len(task.prompts))
+    asked = [tuple(one.asked_by(prompt) for one in scenarios) for prompt in prompts]
     faults = {original: [fault_in(before[original], one) for one in asked] for original in programs}
-    judges = {original: asked[found.index(None)] for original, found in faults.items() if None in found}
+    judges = {
+        original: tuple(one.asked_by(*(n for n in prompts if found[n] is None)) for one in scenarios)
+        for original, found in faults.items()
+        if None in found
+    }
     right = tuple(original for original in programs if original in judges)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
     made = drawn(mutants(right, context), most, seed)
@@ -98,12 +103,6 @@ def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[S
             "leave --worlds out"
         )
     return task.scenarios
-
-
-def asked_by_prompts(scenarios: Sequence[Scenario], prompts: int) -> list[tuple[Scenario, ...]]:
-    """The scenarios with what each prompt asks for; those that ask for most first, and none twice."""
-    asked = {tuple(one.asked_by(prompt) for one in scenarios): None for prompt in range(prompts)}
-    return sorted(asked, key=lambda some: -sum(len(one.require) for one in some))
 
 
 def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> Result | None:

@@ -43,9 +43,9 @@ class Scenario:
     world: World
     require: tuple[Requirement, ...]
 
-    def asked_by(self, prompt: int) -> Scenario:
-        """The same with what a prompt asks for, and no other requirements."""
-        return replace(self, require=tuple(one for one in self.require if one.is_asked_by(prompt)))
+    def asked_by(self, *prompts: int) -> Scenario:
+        """The same with what some of these prompts ask for, and no other requirements."""
+        return replace(self, require=tuple(one for one in self.require if any(map(one.is_asked_by, prompts))))
 
     def __repr__(self) -> str:
         return f"Scenario({self.world!r}, {counted(len(self.require), 'requirement')})"

@@ -156,8 +156,33 @@ def test_a_clause_that_no_check_covers(linted: Lint) -> None:
     assert names(linted(checks, ["speaks", "goes"], edited=(facts, forgotten))) == ["uncovered: what"]
     reason = ("what: [speaks]", "what: it goes without saying")
     assert linted(checks, ["speaks", "goes"], edited=(facts, reason)) == []
+    skipping = ("[hello]", "['hello.*here']")
+    assert names(linted(checks, ["speaks", "goes"], edited=(facts, more, skipping))) == []
+    between = ("and then come back here", "sing a long song, and then come back here")
+    (finding,) = linted(checks, ["speaks", "goes"], edited=(facts, more, skipping, between))
+    assert finding.name == "uncovered: 0: sing a long song,"
     quoted = ("'goes'", "{check: goes, prompts: {0: and then come back here}}")
     assert linted(checks, ["speaks", "goes"], edited=(facts, more, quoted)) == []
+
+
+def test_a_clause_ends_with_its_sentence(linted: Lint) -> None:
+    lines = (
+        "facts: [{fact: where, words: [kitchen]}, {fact: what, words: [hello]}]",
+        "covered_by: {where: [speaks], what: [speaks]}",
+        "checks:",
+    )
+    facts = ("checks:", "\n".join(lines))
+    for said, left in (
+        ("Say hello in the kitchen. Come back.", "Come back."),
+        ("Come back, then go home. Say hello in the kitchen, please.", "Come back, then go home."),
+        (
+            'Say "hello" in the kitchen! Then, when you are done, come back.',
+            "Then, when you are done, come back.",
+        ),
+    ):
+        prompt = ("[Say hello in the kitchen.]", f"['{said}']")
+        found = linted({"speaks": SPEAKS}, ["speaks"], edited=(facts, prompt))
+        assert names(found) == [f"uncovered: 0: {left}"]
 
 
 def test_a_requirement_that_follows_from_several(linted: Lint) -> None:
