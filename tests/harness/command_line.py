@@ -75,14 +75,14 @@ def roboeval(
 
 
 def refused(
-    *arguments: str | Path, name: str = "roboeval", cwd: Path | None = None, given: str = ""
+    *arguments: str | Path, name: str = "roboeval", cwd: Path | None = None, given: str = "", lines: int = 1
 ) -> Refusal:
-    """The one sentence with which a command refuses; nothing but it is printed."""
+    """The one sentence with which a command refuses, or its few lines; nothing but it is printed."""
     ended = command(name, *arguments, cwd=cwd, given=given)
     assert ended.status == 2, ended
     assert ended.out == ""
     assert ended.err.startswith(f"{name}: ")
-    assert ended.err.count("\n") == 1
+    assert ended.err.count("\n") == lines
     return Refusal.parsed(ended.err.removeprefix(f"{name}: ").rstrip("\n"))
 
 

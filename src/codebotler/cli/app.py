@@ -38,7 +38,7 @@ RobotOption = Annotated[
 @app.command()
 def generate(
     instruction: Annotated[str, typer.Argument(help="What the robot should do, in plain words.")],
-    model: options.ModelOption = "recorded",
+    model: options.ModelOption = None,
     world: options.WorldOption = None,
     retries: Annotated[
         int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
@@ -70,16 +70,18 @@ def generate(
     from codebotler.cli.generate import show, write
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
+    from codebotler.models.chosen import chosen_model
     from codebotler.prompts import prompt_for
 
+    chosen = chosen_model(model, base_url)
     known = None if world is None else World.read(world)
     prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
     if show_prompt:
-        show(prompt, model)
+        show(prompt, chosen.name)
         return
-    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, chosen.base_url)
     tries = int(repair) if retries is None else retries
-    accepted = write(prompt, model, settings, world=known, retries=tries, repair=repair, record=record)
+    accepted = write(prompt, chosen.name, settings, world=known, retries=tries, repair=repair, record=record)
     raise typer.Exit(0 if accepted else 1)
 
 
@@ -133,9 +135,8 @@ def run(
     ],
     robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file of a simulated robot.")] = None,
-    model: Annotated[
-        str, typer.Option(help="The model that writes the program for an instruction.")
-    ] = "recorded",
+    model: options.ModelOption = None,
+    base_url: options.BaseUrlOption = None,
     yes: Annotated[bool, typer.Option("--yes", help="Run the program without asking.")] = False,
     despite_problems: Annotated[
         bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
@@ -153,11 +154,14 @@ def run(
     from codebotler.core.files import home
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
+    from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
     from codebotler.robots.base import Options
     from codebotler.robots.open import open_robot
 
-    request = Request(program, model, yes, despite_problems)
+    chosen = chosen_model(model, base_url)
+    request = Request(program, chosen.name, yes, despite_problems)
+    asked = SamplingSettings(base_url=chosen.base_url)
     settings = Options(
         world=None if world is None else World.read(world),
         speed=speed or None,
@@ -165,7 +169,7 @@ def run(
         ros_python=ros_python,
     )
     body = open_robot(robot, settings)
-    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, SamplingSettings())))
+    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked)))
 
 
 @app.command()
@@ -196,6 +200,28 @@ def missions(
         show_mission(home(), mission, json=json)
     else:
         write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall")
+
+
+@app.command()
+def models(
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """List the models that can be asked here and now.
+
+    It finds keys in the environment, and servers of models on this machine.
+    """
+    from dataclasses import asdict
+
+    from codebotler.cli.views import models_view
+    from codebotler.core.terminal import print_json, print_rich
+    from codebotler.models.chosen import chosen_model
+    from codebotler.models.usable import usable_models
+
+    found = usable_models()
+    if json:
+        print_json([asdict(model) for model in found])
+    else:
+        print_rich(models_view(found, chosen_model()))
 
 
 @app.command()
@@ -257,6 +283,7 @@ def serve(
     """
     from codebotler.core.files import home
     from codebotler.core.world import World
+    from codebotler.models.chosen import chosen_model
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
@@ -266,8 +293,9 @@ def serve(
     place = Place(host, port, tuple(name or ()))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
     known = None if world is None else World.read(world)
-    models = tuple(model or ("recorded:careful", "recorded:hasty"))
-    opened = _opener(models, base_url)
+    chosen = chosen_model(model[0] if model else None, base_url)
+    models = tuple(model or dict.fromkeys((chosen.name, "recorded:careful", "recorded:hasty")))
+    opened = _opener(models, chosen.base_url)
     settings = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
     body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)

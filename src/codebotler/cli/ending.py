@@ -58,6 +58,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for a fault of ours."""
     from codebotler.models.base import BudgetSpentError, ModelError
+    from codebotler.models.recorded import UnknownInstructionError
     from codebotler.robots.base import NotReadyError, RobotLostError
     from codebotler.simulator.worker import EngineError
 
@@ -65,6 +66,10 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 2, str(error) if isinstance(error, UserError) else _usage_sentence(error)
     if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
         return 1, str(error)
+    if isinstance(error, UnknownInstructionError):
+        from codebotler.models.usable import how_to_use_a_model
+
+        return 2, f"{error.sentence}\nfor other instructions, {how_to_use_a_model()}"
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):

@@ -12,6 +12,7 @@ from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore, write_checked_program
 from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of, open_model
+from codebotler.models.recorded import NOTICE, is_recorded
 from codebotler.prompts import Prompt
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -41,6 +42,8 @@ def write(
                 asked, prompt, room_map=room_map, retries=retries, repair=repair, tried=tried
             )
         print_source(made.program)
+    if is_recorded(asked.name):
+        note(NOTICE)
     return not made.problems
 
 

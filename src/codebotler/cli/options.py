@@ -11,10 +11,11 @@ from codebotler import __version__
 from codebotler.core.terminal import print_text
 
 ModelOption = Annotated[
-    str,
+    str | None,
     typer.Option(
         help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, completions:NAME, "
-        "or hf:PATH."
+        "or hf:PATH; by default that of CODEBOTLER_MODEL or config.yaml, or else recorded. "
+        "`codebotler models` lists what works here."
     ),
 ]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file with the rooms.")]

@@ -20,6 +20,7 @@ from codebotler.missions.session import MissionSession
 from codebotler.missions.store import recover
 from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
+from codebotler.models.recorded import NOTICE, is_recorded
 from codebotler.robots.base import Robot
 
 SIGNALS = {
@@ -105,6 +106,8 @@ def _prepared(session: MissionSession) -> SessionView:
 def _show_check(view: SessionView, request: Request) -> None:
     assert view.check is not None, "the program is checked"
     if not request.is_program:
+        if is_recorded(view.author):
+            note(NOTICE)
         print_rich(source_view(view.program))
     name = request.what if request.is_program and request.what != "-" else "the program"
     print_rich(check_view(view.check, view.program, name))

@@ -16,6 +16,8 @@ from codebotler.core.terminal import console, shortened, visible
 from codebotler.missions.log import Line, State, Summary
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import event_text
+from codebotler.models.chosen import ChosenModel
+from codebotler.models.usable import SETUP, UsableModel
 from codebotler.robots.base import Readiness
 
 STYLES: Mapping[State, str] = {
@@ -147,6 +149,17 @@ def source_view(program: str) -> Group:
     """A program as it stands, without breaks in its lines, and an empty line."""
     lines = [f"    {visible(text.expandtabs(4))}\n" for text in program.splitlines()]
     return Group(Text("".join(lines), no_wrap=True, overflow="ignore"))
+
+
+def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
+    """Which models can be asked here, with the options for each, and which is asked by default."""
+    table = grid("left", "left")
+    for model in models:
+        table.add_row(Text(model.options, "bold"), Text(model.why, "dim"))
+    lines = [f"asked by default: {visible(chosen.name)}"]
+    if all(model.is_recorded for model in models):
+        lines.append(f"for other instructions, {SETUP}")
+    return Group(table, Text(), *map(Text, lines))
 
 
 def robots_view(kinds: Sequence[Readiness]) -> Table:

@@ -250,6 +250,17 @@ def home() -> Path:
         raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder") from None
 
 
+def config_file() -> Path | None:
+    """The file of a user's settings, which need not exist; None for a user without a home."""
+    named, config = os.environ.get("CODEBOTLER_HOME"), os.environ.get("XDG_CONFIG_HOME")
+    if named:
+        return Path(named).absolute() / "config.yaml"
+    try:
+        return (Path(config) if config else Path.home() / ".config") / "codebotler" / "config.yaml"
+    except RuntimeError:  # a user without a home, as in containers
+        return None
+
+
 def make_folder(folder: Path) -> None:
     """Create a folder to write into; a UserError if that is not allowed."""
     with suppress(PermissionError):

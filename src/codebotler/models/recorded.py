@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from functools import cache
@@ -23,7 +23,7 @@ FOLDER = Path(__file__).with_name("recorded")
 NAMES = ("careful", "hasty")
 CLOSEST, SHOWN = 3, 100  # how many instructions are suggested, and how much of each, in characters
 LONG = re.compile(r"[^\W\d_]{4,}")  # shorter words are in every instruction
-REAL_MODEL = "use a real model to have a program written for it, such as --model openai-chat:gpt-5.1"
+NOTICE = "recorded program, no language model; use --model, and see `codebotler models`"
 
 
 class Solution(BaseModel):
@@ -57,6 +57,27 @@ class RecordedFile(BaseModel):
     recorded: tuple[InstructionSolutions, ...]
 
 
+class UnknownInstructionError(ModelError):
+    """A recorded model does not know an instruction.
+
+    Args:
+        model: its name.
+        instruction: what it was asked for.
+        closest: the instructions that it knows and that are most alike.
+    """
+
+    def __init__(self, model: str, instruction: str, closest: Sequence[str]) -> None:
+        alike = " or ".join(f'"{_short(known)}"' for known in closest)
+        super().__init__(
+            f'{model} has no program for "{_short(instruction)}"; the closest that it knows: {alike}',
+            may_pass=False,
+        )
+        self.model, self.instruction, self.closest = model, instruction, tuple(closest)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.model, self.instruction, self.closest)
+
+
 @dataclass(frozen=True)
 class RecordedModel:
     """A model that knows a few instructions by heart."""
@@ -74,20 +95,15 @@ class RecordedModel:
         known = {_words(instruction): instruction for instruction in self.replies}
         instruction = known.get(_words(prompt.instruction))
         if instruction is None:
-            raise ModelError(self._unknown(prompt.instruction), may_pass=False)
+            raise UnknownInstructionError(
+                self.name, prompt.instruction, closest_to(prompt.instruction, self.replies)
+            )
         program = self.solution(instruction, number).program
         heard(program)
         return Reply(program, program, Usage(), 0.0, "stop")
 
     async def close(self) -> None:
         """Nothing to close."""
-
-    def _unknown(self, instruction: str) -> str:
-        closest = " or ".join(f'"{_short(known)}"' for known in closest_to(instruction, self.replies))
-        return (
-            f'{self.name} has no program for "{_short(instruction)}"; '
-            f"the closest instructions it knows are {closest}; {REAL_MODEL}"
-        )
 
 
 def closest_to(instruction: str, known: Iterable[str]) -> list[str]:
@@ -107,6 +123,11 @@ def _words(text: str) -> tuple[str, ...]:
 
 def _short(text: str) -> str:
     return textwrap.shorten(text, SHOWN, placeholder=" ...")
+
+
+def is_recorded(name: str) -> bool:
+    """Whether a name is that of a recorded model."""
+    return name.partition(":")[0] == "recorded"
 
 
 def recorded_model(name: str) -> RecordedModel:

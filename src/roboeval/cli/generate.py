@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 
 def completed(
-    model: ModelOption = "recorded",
+    model: ModelOption = None,
     out: OutOption = None,
     num_completions: NumOption = 50,
     temperature: TemperatureOption = 0.2,
@@ -64,16 +64,19 @@ def completed(
 ) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
     from codebotler.models.base import SamplingSettings
+    from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
+    from codebotler.models.recorded import NOTICE, is_recorded
     from roboeval.evaluation.generate import Pace, generate_run
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
 
-    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    chosen = chosen_model(model, base_url)
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, chosen.base_url)
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    opened = open_model(model, settings)
+    opened = open_model(chosen.name, settings)
     run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", opened.name).strip("-.")))
     meter = Meter()
     try:
@@ -85,6 +88,8 @@ def completed(
     if progress.missing is not None:
         note(f"roboeval: {progress.missing}; the same command continues where it stopped")
         raise SystemExit(1)
+    if is_recorded(opened.name):
+        note(NOTICE)
     return run.path
 
 

@@ -198,3 +198,25 @@ def test_windows_is_told_of_wsl_with_the_platform_patched(
         obey(app, "codebotler")
     assert end.value.code == 1
     assert re.fullmatch(r"codebotler: .*\bWSL\n", capsys.readouterr().err)
+
+
+def test_models_that_can_be_asked_here(tmp_path: Path) -> None:
+    """Where a server of models happens to run on this machine, its models come first."""
+    environment = {
+        **os.environ,
+        "ANTHROPIC_API_KEY": "sk-ant-none-of-yours",
+        "CODEBOTLER_HOME": str(tmp_path),
+    }
+    status, out, err = command("codebotler", "models", environment={**environment, "COLUMNS": "100"})
+    assert (status, err) == (0, "")
+    assert re.search(r"^--model anthropic:\S+ +ANTHROPIC_API_KEY is set$", out, re.MULTILINE)
+    assert out.rstrip().endswith("asked by default: recorded:careful")
+    assert "none-of-yours" not in out
+    (tmp_path / "config.yaml").write_text("model: anthropic:claude-sonnet-4-5\n")
+    listed = json.loads(command("codebotler", "models", "--json", environment=environment)[1])
+    assert {"name", "why", "base_url"} == set(listed[0])
+    assert listed[-1]["name"] == "recorded:hasty"
+    shown = command("codebotler", "generate", "Go.", "--show-prompt", environment=environment)
+    assert shown.status == 0
+    refusal = command("codebotler", "generate", "Go.", "--model", "recorded", environment=environment)
+    assert "\nfor other instructions, add --model " in refusal.err

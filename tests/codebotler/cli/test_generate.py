@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import command_line
+from codebotler.models.recorded import NOTICE
 from command_line import Ended, Refusal, command, process
 from roboeval.suites.load import Suite
 from server import Fault, Request, Server
@@ -31,8 +32,8 @@ def codebotler(*arguments: str | Path, cwd: Path | None = None, before: str = ""
     return command("codebotler", *arguments, cwd=cwd, environment=variables)
 
 
-def refused(*arguments: str | Path, cwd: Path | None = None) -> Refusal:
-    return command_line.refused("generate", *arguments, name="codebotler", cwd=cwd)
+def refused(*arguments: str | Path, cwd: Path | None = None, lines: int = 1) -> Refusal:
+    return command_line.refused("generate", *arguments, name="codebotler", cwd=cwd, lines=lines)
 
 
 def instruction(suite: Suite) -> str:
@@ -53,18 +54,19 @@ def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, p
     world = tmp_path / "world.yaml"
     world.write_text(paper.tasks["StaplerDelivery"].scenarios[0].world.to_yaml())
     alone = codebotler("generate", instruction(paper), "--model", "recorded")
-    assert (alone.status, alone.err) == (0, "")
+    assert (alone.status, alone.err) == (0, f"{NOTICE}\n")
     compile(alone.out, "program", "exec")
     assert alone.out.startswith("def task_program():\n")
     piped = codebotler("generate", instruction(paper), after=f"| {CODEBOTLER} check - --world {world}")
-    assert (piped.status, piped.err) == (0, "")
+    assert (piped.status, piped.err) == (0, f"{NOTICE}\n")
     assert piped.out.startswith("accepted: no problem in the program")
 
 
 def test_an_instruction_that_nobody_recorded() -> None:
-    refusal = refused("Bring me the moon.")
+    refusal = refused("Bring me the moon.", lines=2)
     assert "recorded:careful" in refusal.sentence
     assert '"Bring me the moon."' in refusal.sentence
+    assert "\nfor other instructions, " in refusal.sentence
 
 
 @pytest.mark.parametrize("instruction", ["", "  \n"])

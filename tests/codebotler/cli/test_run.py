@@ -19,7 +19,7 @@ from mcap.reader import make_reader
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import home
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import NOTICE, recorded_model
 from command_line import Ended, command
 from forked import Forked
 from processes import are_gone, children_of
@@ -149,8 +149,8 @@ def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) ->
     task = paper.tasks["StaplerDelivery"]
     instruction = task.prompts[0]
     (folder / "world.yaml").write_text(task.scenarios[0].world.to_yaml())
-    status, out, _ = run(folder, instruction, "--yes")
-    assert status == 0
+    status, out, err = run(folder, instruction, "--yes")
+    assert (status, err.splitlines()[0]) == (0, NOTICE)
     assert "accepted: " in out
     program = "".join(line.removeprefix("    ") for line in out.splitlines(keepends=True)[:40])
     assert recorded_model("recorded:careful").solution(instruction, 0).program in program
@@ -171,7 +171,7 @@ def test_program_on_standard_input(folder: Path) -> None:
         (["-"], ["--yes"]),
         (["", "--yes"], ["empty"]),
         (["good.py", "--robot", "simm"], ['"simm"', "sim, pyrobosim"]),
-        (["no such thing", "--yes"], ["recorded:careful", '"no such thing"']),
+        (["no such thing", "--yes"], ["recorded:careful", '"no such thing"', "\nfor other instructions, "]),
     ],
 )
 def test_what_cannot_be_run_is_said_in_a_sentence(
@@ -179,7 +179,7 @@ def test_what_cannot_be_run_is_said_in_a_sentence(
 ) -> None:
     status, out, err = run(folder, *arguments)
     assert (status, out) == (2, "")
-    assert err.count("\n") == 1
+    assert err.count("\n") == 1 + ("\nfor other" in err)
     assert all(name in err for name in named), err
     assert "running" not in states(folder)
 

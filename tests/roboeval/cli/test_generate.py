@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.models.recorded import NOTICE
 from command_line import ENVIRONMENT, refused, roboeval
 from forked import Forked
 from seals import unseal
@@ -74,7 +75,8 @@ def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
 def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
     ended = roboeval("generate", "--tasks", "LunchTime", "--num-completions", "1", cwd=tmp_path)
     assert (ended.status, ended.out) == (0, "")
-    assert ended.err.count("\n") == 1
+    assert ended.err.splitlines()[0] == NOTICE
+    assert ended.err.count("\n") == 2
     assert " runs/recorded-careful; " in ended.err
     assert "`roboeval evaluate runs/recorded-careful`" in ended.err
     assert sorted(path.name for path in (tmp_path / "runs" / "recorded-careful").iterdir()) == [
@@ -124,7 +126,7 @@ def test_no_more_than_10000_completions_of_a_prompt(tmp_path: Path, command: str
 
 def test_a_suite_that_nobody_recorded(tmp_path: Path) -> None:
     roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
-    assert "recorded:careful" in refused("generate", "--suite", "mine", cwd=tmp_path).sentence
+    assert "recorded:careful" in refused("generate", "--suite", "mine", cwd=tmp_path, lines=2).sentence
     assert not (tmp_path / "runs").exists()
 
 

@@ -15,13 +15,12 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import unknown_rooms
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import is_recorded, recorded_model
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
 
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
-RECORDED = "recorded"
 ABOUT_RECORDED = (
     "These programs were written by people and recorded, so that you can try everything without an API key. "
     "They cover known instructions only, such as the examples below."
@@ -87,7 +86,7 @@ class InstructionPane:
             scroll_up()
 
     def _about_model(self) -> None:
-        self._about.set_visibility(str(self._model.value).startswith(RECORDED))
+        self._about.set_visibility(is_recorded(str(self._model.value)))
 
     def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
         where.clear()
@@ -109,7 +108,7 @@ def _examples(console: Console) -> list[str]:
     plan = None if console.world is None else RoomMap.of(console.world)
     found: dict[frozenset[str], str] = {}
     for instruction, replies in sorted(
-        recorded_model("recorded").replies.items(), key=lambda known: len(known[0])
+        recorded_model("recorded:careful").replies.items(), key=lambda known: len(known[0])
     ):
         program = replies[0].program
         if plan is None or (named_rooms(tree_of(program)) and not unknown_rooms(program, plan)):

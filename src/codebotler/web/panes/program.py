@@ -18,6 +18,7 @@ from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
+from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_strips
@@ -66,11 +67,7 @@ class ProgramPane:
         self._tell(view, shown)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
         author = view.author
-        what = (
-            "Recorded program, written by a person."
-            if author.startswith("recorded")
-            else f"Written by {author}."
-        )
+        what = "Recorded program, written by a person." if is_recorded(author) else f"Written by {author}."
         self._writer.say(what if author and view.program else "")
         self._show_verdict(view)
         self._show_approval(view)

@@ -1,0 +1,58 @@
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.errors import UserError
+from codebotler.models.chosen import ChosenModel, chosen_model
+
+URL = "http://localhost:11434/v1"
+
+
+@pytest.fixture(autouse=True)
+def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("CODEBOTLER_HOME", str(tmp_path))
+    monkeypatch.delenv("CODEBOTLER_MODEL", raising=False)
+    return tmp_path / "config.yaml"
+
+
+def test_without_a_choice_it_is_the_recorded_model() -> None:
+    assert chosen_model() == ChosenModel("recorded:careful")
+
+
+def test_a_name_comes_before_the_environment_and_that_before_the_file(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config.write_text(f"model: openai-chat:qwen3\nbase_url: {URL}\n")
+    assert chosen_model() == ChosenModel("openai-chat:qwen3", URL)
+    assert chosen_model(base_url="http://localhost:1/v1").base_url == "http://localhost:1/v1"
+    monkeypatch.setenv("CODEBOTLER_MODEL", "anthropic:claude-sonnet-4-5")
+    assert chosen_model() == ChosenModel("anthropic:claude-sonnet-4-5")
+    assert chosen_model("recorded:hasty") == ChosenModel("recorded:hasty")
+    assert chosen_model("openai-chat:qwen3") == ChosenModel("openai-chat:qwen3", URL)
+    monkeypatch.setenv("CODEBOTLER_MODEL", " ")
+    assert chosen_model().name == "openai-chat:qwen3"
+
+
+def test_without_codebotlers_home_the_file_is_where_settings_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CODEBOTLER_HOME")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    (tmp_path / "codebotler").mkdir()
+    (tmp_path / "codebotler" / "config.yaml").write_text("model: recorded:hasty\n")
+    assert chosen_model().name == "recorded:hasty"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "config.yaml"),
+        ("modl: a\nmodel: b\n", "line 1.*modl"),
+        ("model: [a]\n", "line 1"),
+        ("model: ''\n", "line 1"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_line(text: str, told: str, config: Path) -> None:
+    config.write_text(text)
+    with pytest.raises(UserError, match=told):
+        chosen_model()

@@ -1,0 +1,73 @@
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from codebotler.models.usable import KEYS, UsableModel, how_to_use_a_model, usable_models
+
+RECORDED = ["recorded:careful", "recorded:hasty"]
+
+
+@pytest.fixture(autouse=True)
+def no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    for key in KEYS:
+        monkeypatch.delenv(key, raising=False)
+
+
+@contextmanager
+def server(body: bytes, status: int = 200) -> Iterator[int]:
+    """A server that lists models, as those of models do; its port."""
+
+    class Listing(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            assert self.path == "/v1/models"
+            self.send_response(status)
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Listing) as http:
+        threading.Thread(target=http.serve_forever, daemon=True).start()
+        yield http.server_port
+        http.shutdown()
+
+
+def test_the_models_of_a_server_on_this_machine_come_first() -> None:
+    body = json.dumps({"object": "list", "data": [{"id": "qwen3:8b"}, {"id": "llama 3"}]})
+    with server(body.encode()) as port:
+        found = usable_models({"Ollama": port, "vLLM": 1})
+    url = f"http://127.0.0.1:{port}/v1"
+    assert found[0] == UsableModel("openai-chat:qwen3:8b", "Ollama answers on this machine", url)
+    assert found[1].options == f"--model 'openai-chat:llama 3' --base-url {url}"
+    assert [one.name for one in found[2:]] == RECORDED
+    assert [one.is_recorded for one in found] == [False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        (b"<html>", 200),
+        (b"[]", 200),
+        (b'{"data": [1]}', 200),
+        (b'{"data": {}}', 200),
+        (b'{"error": "no"}', 401),
+    ],
+)
+def test_what_is_no_server_of_models_is_passed_over(body: bytes, status: int) -> None:
+    with server(body, status) as port:
+        assert [one.name for one in usable_models({"vLLM": port})] == RECORDED
+
+
+def test_a_key_in_the_environment_opens_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "OPENAI_API_KEY" in how_to_use_a_model({})
+    monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-secret-of-mine")
+    monkeypatch.setenv("OPENAI_API_KEY", " ")
+    (first, *rest) = usable_models({})
+    assert (first.why, first.base_url) == ("ANTHROPIC_API_KEY is set", None)
+    assert [one.name for one in rest] == RECORDED
+    assert how_to_use_a_model({}) == f"add --model {KEYS['ANTHROPIC_API_KEY']}"
