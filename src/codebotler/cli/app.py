@@ -254,7 +254,12 @@ def serve(
     token: options.TokenOption = None,
     no_token: options.NoTokenOption = False,
     robot: RobotOption = "sim",
-    world: Annotated[Path | None, typer.Option(help="The world file, for the robot and for the map.")] = None,
+    world: Annotated[
+        Path | None,
+        typer.Option(
+            help="The world file, for the robot and for the map; by default an office for --robot sim."
+        ),
+    ] = None,
     model: Annotated[
         list[str] | None, typer.Option(help="A model that may write programs; may be given several times.")
     ] = None,
@@ -287,11 +292,15 @@ def serve(
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
+    from codebotler.robots.simulated import OFFICE
     from codebotler.web.access import Access, Place
     from codebotler.web.console import Console
 
     place = Place(host, port, tuple(name or ()))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
+    if world is None and robot == "sim":
+        world = OFFICE
+        note("the robot works in an example office; --world FILE names another world")
     known = None if world is None else World.read(world)
     chosen = chosen_model(model[0] if model else None, base_url)
     models = tuple(model or dict.fromkeys((chosen.name, "recorded:careful", "recorded:hasty")))

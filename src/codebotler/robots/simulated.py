@@ -30,6 +30,10 @@ METRES_PER_SECOND = 0.5
 FEEDBACK_EVERY = 0.25  # real seconds
 
 
+OFFICE = Path(__file__).with_name("office.yaml")
+"""The world of an example: printer rooms, a supply room and an office."""
+
+
 class Simulated:
     """A simulated robot that takes its time.
 

@@ -12,6 +12,8 @@ from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, prin
 
 __all__ = ["fail", "metered", "note", "print_json", "print_rich", "print_text", "watched"]
 
+FEWEST = 5  # things that must be done before it is told how long the rest takes
+
 Item = TypeVar("Item")
 
 
@@ -48,7 +50,8 @@ def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, 
 
 def _left(done: int, to_do: int, seconds: float) -> str:
     """How long the rest takes, at the rate so far."""
-    is_telling = to_do and done * 50 >= done + to_do  # at first, what starts takes most of the time
+    # At first, what starts takes most of the time.
+    is_telling = to_do and done >= FEWEST and done * 50 >= done + to_do
     return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_telling else ""
 
 

@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from codebotler.missions.store import missions
+from codebotler.robots.simulated import OFFICE
 from pageserver import SERVE, WORLD, PageServer
 from server import Server
 
@@ -121,6 +122,15 @@ def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None
     with PageServer(tmp_path) as server:
         begun(server, HELLO)
         assert server.call("POST", "/api/missions/current/again", {}).status == 409, "nobody wrote it"
+
+
+def test_without_a_world_the_robot_works_in_the_office_of_the_examples(tmp_path: Path) -> None:
+    office = Path(__file__).parents[3] / "examples" / "office.yaml"
+    assert OFFICE.read_bytes() == office.read_bytes()
+    with PageServer(tmp_path, serve=("codebotler", "serve")) as server:
+        assert server.said.startswith("the robot works in an example office; --world FILE ")
+        view = begun(server, "def task_program():\n    go_to('printer room 3')\n")
+        assert view["check"]["problems"] == []
 
 
 def test_who_does_not_read_holds_nothing_up(tmp_path: Path) -> None:

@@ -95,7 +95,16 @@ def test_the_tables_fit_and_break_no_number(width: int) -> None:
     assert "pass@2 over all prompts: 0.000 (95% interval 0.000 to 0.000, 2 prompts)" in text
     assert "no completions of Wait" in text
     assert re.search(r"\n  NameError +4,000  100\.0%", text)
-    assert "ExhaustiveSearch" in text
+    assert re.search(r"failed checks +0 +0.0%", text)
+    assert "ExhaustiveSearch" not in text
+
+
+def test_of_a_single_program_only_what_happened_is_told() -> None:
+    tasks = {name: replace(TASK, name=name) for name in ("Visit", "A", "B", "C", "D")}
+    counts = summary([row(0, 0, ("PythonError", "NameError"))], replace(SUITE, tasks=tasks))
+    text = printed(summary_view(counts, title="mine"), 100)
+    assert text.rstrip().endswith("Python errors  1  100.0%\n  NameError    1  100.0%")
+    assert "\nno completions of 4 tasks\n" in text
 
 
 @pytest.mark.parametrize(

@@ -555,7 +555,7 @@ def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
     shown = roboeval("show", "run", cwd=tmp_path)
     assert "2 of 4 completions judged\n" in shown.out
     assert re.search(r"not judged.*: LunchTime\n", shown.out)
-    assert re.search(r"not selected.*: CountSavory, ", shown.out)
+    assert "not selected: 14 tasks\n" in shown.out
     assert "2 of 4 completions" in shown.err
     assert "`roboeval evaluate run --tasks LunchTime,SayGoodDay`" in shown.err
     data = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
+from codebotler.core.words import counted
 from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import Failures, Missing, Summary
 from roboeval.analysis.tasks import by_hand
@@ -21,6 +22,7 @@ from roboeval.evaluation.explanation import NOT_RECORDED
 from roboeval.evaluation.failures import label_of, plural_of
 from roboeval.evaluation.runs.completions import how_many
 
+FEW = 3  # tasks that are named; of more, their number is told
 ALL_GONE = "the judged programs are no longer in this run"
 
 
@@ -46,7 +48,8 @@ def summary_view(summary: Summary, *, title: str) -> RenderableType:
     parts += [Text(), _TaskTable(summary), Text(), *_overall(summary), *_missed(summary.missing)]
     if failed:
         told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all completions:"
-        tables = Columns([_failure_table(each) for each in summary.failures], padding=(1, 3))
+        listed = [_failure_table(each) for each in summary.failures if each.count or n > 1]
+        tables = Columns(listed, padding=(1, 3))
         parts += [Text(), Text(told), Text(), tables]
     return Group(*parts)
 
@@ -58,7 +61,8 @@ def _missed(missing: Missing) -> Iterator[Text]:
         ("not selected:", missing.not_selected),
     ]:
         if tasks:
-            yield Text(f"{reason} {', '.join(map(visible, tasks))}", style="dim")
+            named = ", ".join(map(visible, tasks)) if len(tasks) <= FEW else counted(len(tasks), "task")
+            yield Text(f"{reason} {named}", style="dim")
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def _overall(summary: Summary) -> list[Text]:
 def _failure_table(failures: Failures) -> Table:
     table = grid("left", "right", "right")
     rows = [(plural_of(failures.name), failures, "bold")]
-    rows += [(f"  {kind.name}", kind, "" if kind.count else "dim") for kind in failures.kinds]
+    rows += [(f"  {kind.name}", kind, "") for kind in failures.kinds if kind.count]
     for name, one, style in rows:
         table.add_row(Text(visible(name)), f"{one.count:,}", f"{one.share:.1%}", style=style)
     return table
