@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from roboeval.suites.load import Task
 
 FEW = 4  # words; what is shorter belongs to the clause before or after it, if there is one in its sentence
-_SENTENCE = re.compile(r"[.!?][\"”)]*\s+")
+_SENTENCE = re.compile(r"(?<!\W\w)[.!?][\"”)]*\s+")  # no end: "e.g. a cup", "5 p.m. sharp"
 _JOINT = re.compile(r"[,;:]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
 _WORD = re.compile(r"\w+")
-_SKIP = re.compile(r"\.\*|\[\^[^\]]+\]\*")  # the part of a regex that finds any words
+_SKIP = re.compile(r"(?<!\\)\.\*\??|\[\^[^\]]+\]\*\??")  # the part of a regex that finds any words
 
 Span = tuple[int, int]
 
@@ -77,7 +77,7 @@ def _found(words: str, text: str) -> Iterator[Span]:
     """Where a regex finds words, without those that it skips."""
     marked = _SKIP.sub(lambda skip: f"(?P<skip{skip.start()}>{skip[0]})", words)
     for match in re.finditer(marked, text, re.IGNORECASE):
-        skipped = (match.span(name) for name in match.re.groupindex)
+        skipped = (match.span(name) for name in match.re.groupindex if name.startswith("skip"))
         edges = [match.start(), *(edge for span in skipped if span[0] >= 0 for edge in span), match.end()]
         yield from zip(edges[::2], edges[1::2], strict=True)
 

@@ -30,7 +30,7 @@ _PROPOSES = re.compile(
     re.IGNORECASE,
 )
 _ASIDE = re.compile(
-    r",\s{1,3}(?:which|who|(?:I am|I['\u2019]m) (?:afraid|sorry)|unfortunately|sadly|luckily)\b[^,;:]{0,60},",
+    r",\s{1,3}(?:which|who|(?:I am|I['\u2019]m) (?:afraid|sorry)|unfortunately|sadly|luckily)\b[^,;:\d]{0,60},",
     re.IGNORECASE,
 )
 _THERE = re.compile(r"\s*(?:there|it)\b", re.IGNORECASE)
@@ -45,6 +45,13 @@ _INVERTED = re.compile(
     re.IGNORECASE,
 )
 _IN_VAIN = re.compile(r"\bwould\s+(?:like|love|have\s+(?:liked|loved))\s+to(?=\W{1,3}but\b)", re.IGNORECASE)
+# A list ends where what is missing begins, which has no subject of its own.
+_LIST = re.compile(
+    r"(?:(?:,| and| or)\s+(?!(?:no|not|but|and|or)\b)\w[\w']*(?: \w[\w']*)?){1,9}"
+    r"(?=,?\s+(?:but|and)\s+(?:no|not|lacks?|(?:does|do|did|has|have|is|are)(?: not|n['\u2019]t))\b)",
+    re.IGNORECASE,
+)
+_LISTED = re.compile(r",?\s+(?:and|or)\s+|,\s+", re.IGNORECASE)
 _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 
@@ -92,12 +99,19 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     sentence = _ASIDE.sub(" ", _TAG.sub("", sentence))
     if _PROPOSES.match(sentence):  # "How about 75 degrees?" is no question
         sentence = sentence.rstrip("? ")
+    if lists:
+        sentence = _with_whole_lists(sentence)
     rejected = [f"not {match[1]}" for match in _INSTEAD.finditer(sentence)]
     sentence = _with_exception(_INSTEAD.sub(" ", sentence))
     parts = _with_subjects([clause for part in _at_colon(sentence) for clause in _divided(part)])
     if sentence.rstrip().endswith("?"):
         parts = [f"{part}?" if _INVERTED.match(part) and part[-1] != "?" else part for part in parts]
     return [*(_gathered(_with_results(parts)) if lists else parts), *rejected]
+
+
+def _with_whole_lists(sentence: str) -> str:
+    """The sentence, in which `cheese and butter` is one item in `has cheese and butter but no bread`."""
+    return _LIST.sub(lambda match: _LISTED.sub(" plus ", match[0]), sentence)
 
 
 def _divided(sentence: str) -> list[str]:
