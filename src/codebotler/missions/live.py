@@ -44,6 +44,7 @@ class LiveRobot:
         self.robot, self.skills, self._note = robot, robot.skills, note
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
         self.rules = Rules(literals="as-written", limits=ENDLESS, clock_starts=starts)
+        self.line: int | None = None  # of the program, which calls a skill there
         self._place = place
         self._events: list[Event] = []
         self._number = 0
@@ -103,7 +104,8 @@ class LiveRobot:
         self._number += 1
         which = {"number": self._number, "skill": skill.name}
         named = dict(zip((p.name for p in skill.parameters), given, strict=True))
-        self._note("skill", **which, arguments=named)
+        at = {} if self.line is None else {"line": self.line}
+        self._note("skill", **which, **at, arguments=named)
         started = self.now
         try:
             result = self._done(skill, given, event)

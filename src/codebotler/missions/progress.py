@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,10 +15,12 @@ from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point
 from codebotler.missions.log import SKILL_ENDS, Line
-from codebotler.missions.wording import event_text
+from codebotler.missions.wording import activity, event_text, stop_text
 
 AT = re.compile(r"at \((-?\d+(?:\.\d+)?), (-?\d+(?:\.\d+)?)\)")
 MOST = 200
+NEAR = 0.05  # metres; a robot that moves less stays where it is
+UNTOLD = frozenset({"state", "cancelled"})  # events that other events or the page tell
 ANSWER = "answer"  # the kind of moment at which the robot hears something
 
 
@@ -31,16 +34,31 @@ class Moment:
 
 
 @dataclass(frozen=True)
+class Find:
+    """Something or somebody that the robot has met."""
+
+    room: str  # in the program's words; empty for where the robot began
+    name: str
+    is_person: bool = False
+
+
+@dataclass(frozen=True)
 class Progress:
     """How far a mission has come."""
 
     doing: str = ""  # now, in words
     skill: str = ""  # the skill under way
+    subject: str = ""  # its first argument
+    activity: str = ""  # the skill in words, such as `going to supply room`, also once it is cancelled
     line: int | None = None  # of the program, where only one call can be meant
     clock: float = 0.0  # seconds by the robot's clock since the program began
     room: str = ""  # the last destination, in the program's words
     at: Point | None = None  # the position in metres, if known
     is_driving: bool = False  # to `room`
+    visited: tuple[str, ...] = ()  # the destinations that were reached, in the program's words
+    trail: tuple[Point, ...] = ()  # the last 200 positions
+    finds: tuple[Find, ...] = ()  # what was seen, and who was asked, by room; each once
+    held: str = ""  # what the robot holds
     moments: tuple[Moment, ...] = ()  # the last 200
 
     def after(self, line: Line, program: str) -> Progress:
@@ -49,12 +67,17 @@ class Progress:
         now = replace(self, clock=max(self.clock, line["clock"]))
         if event == "feedback":
             place = AT.search(line["text"])
-            return replace(now, at=(float(place[1]), float(place[2]))) if place else now
+            return now.moved((float(place[1]), float(place[2]))) if place else now
         if event == "skill":
             now = now.with_skill(line, program)
         elif event in SKILL_ENDS:
-            now = replace(now, doing="", skill="", line=None, is_driving=False)
-        text = "" if event == "state" else event_text(line)
+            if event == "result":
+                now = now.with_result(line["result"])
+            still = self.activity if event == "cancelled" else ""
+            now = replace(now, doing="", skill="", line=None, is_driving=False, activity=still)
+        text = "" if event in UNTOLD else event_text(line)
+        if event == "stop":
+            text = stop_text(line["by"], self.activity)
         if not text or (event == "sleep" and not line["seconds"]):
             return now
         return replace(now, moments=(*now.moments, _moment(line, text))[-MOST:])
@@ -64,14 +87,45 @@ class Progress:
         name = line["skill"]
         recording = SKILLS[name].recording if name in SKILLS else None
         drives = recording is not None and recording.is_drive
+        arguments = tuple(map(_plain, line["arguments"].values()))
         now = replace(
             self,
             doing=event_text(line),
             skill=name,
-            line=line_of(program, name, tuple(map(_plain, line["arguments"].values()))),
+            line=line.get("line") or line_of(program, name, arguments),
             is_driving=drives,
+            subject=str(next(iter(arguments), "")),
+            activity=activity(line),
         )
-        return replace(now, room=next(iter(line["arguments"].values()))) if drives else now
+        return replace(now, room=now.subject) if drives else now
+
+    def moved(self, at: Point) -> Progress:
+        """The progress when the robot is somewhere."""
+        if self.trail and math.dist(self.trail[-1], at) < NEAR:
+            return replace(self, at=at)
+        return replace(self, at=at, trail=(*self.trail, at)[-MOST:])
+
+    def with_result(self, result: object) -> Progress:
+        """The progress when the skill under way has ended well."""
+        recording = SKILLS[self.skill].recording if self.skill in SKILLS else None
+        if recording is None:
+            return self
+        if recording.is_drive:
+            return replace(self, visited=(*self.visited, self.subject))
+        match recording.kind:
+            case "pick":
+                return replace(self, held=self.subject)
+            case "place":
+                return replace(self, held="")
+            case "check" if result is True:
+                return self._found(Find(self.room, self.subject))
+            case "ask" if self.subject:
+                return self._found(Find(self.room, self.subject, is_person=True))
+        return self
+
+    def _found(self, find: Find) -> Progress:
+        known = [one for one in self.finds if (one.room, one.name) != (find.room, find.name)]
+        return replace(self, finds=(*known, find))
 
 
 def _moment(line: Line, words: str) -> Moment:

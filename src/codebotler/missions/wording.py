@@ -8,11 +8,30 @@ from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.log import Line
 
+PAGE = "the page"  # as whoever presses STOP there is logged
+
 
 def event_text(line: Line) -> str:
     """An event as people read it, such as `drives to "kitchen"`; empty if there is nothing to read."""
     words = EVENTS.get(line["event"])
     return words(line) if words else ""
+
+
+def activity(line: Line) -> str:
+    """What a robot is at while a skill is under way, such as `going to supply room`."""
+    skill = SKILLS.get(line["skill"])
+    if skill is None or skill.verb is None:
+        return f"executing {visible(line['skill'])}"
+    if skill.recording is None:
+        return skill.verb.ing
+    text = shortened(str(line["arguments"][skill.recording.text]), 100)
+    return f'{skill.verb.ing} "{text}"' if skill.recording.is_spoken else f"{skill.verb.ing} {text}"
+
+
+def stop_text(by: str, doing: str) -> str:
+    """A stop in words, and what it interrupted, such as `going to supply room`, if anything."""
+    during = f" while {doing}" if doing else ""
+    return f"stopped {'from' if by == PAGE else 'by'} {visible(by)}{during}"
 
 
 def call_text(skill: str, arguments: Sequence[str | Sequence[str]]) -> str:
@@ -56,7 +75,7 @@ EVENTS: Mapping[str, Callable[[Line], str]] = {
     "picture": lambda line: shortened(line.get("text") or f"picture: {line.get('file')}"),
     "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",
     "sleep": lambda line: f"waits for {line['seconds']:g} s",
-    "stop": lambda line: f"stop requested by {visible(line['by'])}",
+    "stop": lambda line: stop_text(line["by"], ""),
     "cancelled": lambda _: "cancelled",
     "late": lambda _: "finished after the stop; nothing more will run",
     "log": lambda line: shortened(line["text"]),

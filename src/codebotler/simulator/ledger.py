@@ -27,6 +27,7 @@ class SkillPerformer(Protocol):
     rules: Rules
     skills: SkillTable
     is_live: bool  # time passes by itself: sleeping takes it, and each skill refuels the program
+    line: int | None  # of a live program, which asks for something there
 
     @property
     def now(self) -> float:

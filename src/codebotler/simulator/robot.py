@@ -103,6 +103,7 @@ class SimulatedRobot:
         self.held: str | None = None
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
+        self.line: int | None = None
         self.events: list[Event] = []
 
     # Made when they are first needed: whose run is remembered needs neither.

@@ -14,7 +14,7 @@ from codebotler.simulator.isolated_process import (
     ProtocolError,
     cause_of_death,
 )
-from codebotler.simulator.ledger import STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
+from codebotler.simulator.ledger import LAST_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
@@ -62,9 +62,14 @@ class SkillProtocol:
                 return message
             match message:
                 case [str() as name, list() as values, int() | float() as now]:
-                    self.child.send((*self._answer(name, values, now), self.robot.now))
+                    line = 0
+                case [str() as name, list() as values, int() | float() as now, int() as line]:
+                    pass  # a live program says where it is, and may lie: it is only shown
                 case _:
                     raise ProtocolError("a request is malformed")
+            if self.robot.is_live:
+                self.robot.line = line if 0 < line <= LAST_LINE else None
+            self.child.send((*self._answer(name, values, now), self.robot.now))
             overrun += self.ledger.limit is not None
             if overrun > OVERRUN:
                 return None

@@ -22,13 +22,11 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.store import find, missions
 from codebotler.missions.view import Order, SessionView
+from codebotler.missions.wording import PAGE
 from codebotler.web.console import MOST_PROGRAM, QUIET, Console
 
 HERE = "current"
 """The current mission, in an address."""
-
-STOPS = "the page"
-"""Who stops a mission over the API."""
 
 Text = Annotated[str, Field(max_length=MOST_PROGRAM)]
 
@@ -167,7 +165,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     async def stop_mission(mission: str) -> dict[str, Any]:
         """Stop the current mission; `state` says when it has stopped."""
         _at_hand(console, mission)
-        console.stop_soon(STOPS)
+        console.stop_soon(PAGE)
         return view_data(console.view)
 
     @api.post("/stop", status_code=202)
@@ -175,7 +173,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         *, only_moving: Annotated[bool, Query(description="Stop only a robot that runs a program.")] = False
     ) -> dict[str, Any]:
         """Stop the current mission, or only one whose robot moves; says whether there is any."""
-        return {"stopping": console.stop_soon(STOPS, only_moving=only_moving)}
+        return {"stopping": console.stop_soon(PAGE, only_moving=only_moving)}
 
 
 def _add_events(api: APIRouter, console: Console) -> None:

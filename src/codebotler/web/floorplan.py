@@ -1,56 +1,123 @@
-"""A map of the rooms and the robot (SVG)."""
+"""A map of the rooms, with the robot, its way so far, and what it has met (SVG)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from html import escape
 
 from codebotler.core.terminal import shortened
-from codebotler.core.world import Point, World, laid_out
+from codebotler.core.words import room_name
+from codebotler.core.world import Point, Room, World, laid_out
 
 MARGIN = 0.6
 MOST_ROOMS = 100
 WIDE = 0.62
 """The width of a letter, in heights of a letter."""
 
-SMALLEST, LARGEST = 0.2, 0.62
-MOST_LETTERS = 60
+SMALLEST, LARGEST, SMALL = 0.2, 0.62, 0.44
+MOST_LETTERS, MOST_FINDS = 60, 3
 
 
-def floorplan(world: World, at: Point | None = None, room: str = "") -> str:
-    """Draw a world as seen from above, with the robot's position if known, and its room or destination."""
+@dataclass(frozen=True)
+class MapState:
+    """What a map shows besides the rooms.
+
+    Args:
+        at: the robot's position in metres, if known.
+        room: where it is, or where it drives to.
+        is_driving: whether it drives there.
+        trail: the positions on its way so far.
+        finds: by room, what was seen and who was asked there.
+        held: what it holds.
+    """
+
+    at: Point | None = None
+    room: str = ""
+    is_driving: bool = False
+    trail: Sequence[Point] = ()
+    finds: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    held: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        where = f"{'drives to' if self.is_driving else 'is in'} {room_name(self.room)}" if self.room else ""
+        holds = f" and holds {self.held}" if self.held else ""
+        parts = [f"The robot {where}{holds}." if where else "The robot's position is unknown."]
+        parts += [f"Met in {room_name(room)}: {', '.join(names)}." for room, names in self.finds.items()]
+        return " ".join(parts)
+
+
+def floorplan(world: World, state: MapState) -> str:
+    """Draw a world as seen from above; nothing covers the name of a room."""
     rooms = laid_out(world).rooms[:MOST_ROOMS]
-    corners = [corner for one in rooms for corner in one.footprint or ()] + ([at] if at else [])
-    left, right = min(x for x, _ in corners) - MARGIN, max(x for x, _ in corners) + MARGIN
-    low, high = min(y for _, y in corners) - MARGIN, max(y for _, y in corners) + MARGIN
-    parts = []
+    points = [corner for one in rooms for corner in one.footprint or ()]
+    points += [*state.trail, *([state.at] if state.at else [])]
+    left, right = min(x for x, _ in points) - MARGIN, max(x for x, _ in points) + MARGIN
+    low, high = min(y for _, y in points) - MARGIN, max(y for _, y in points) + MARGIN
+
+    def on_map(point: Point) -> Point:
+        return point[0] - left, high - point[1]
+
+    names: list[str] = []
+    parts: list[str] = []
     for one in rooms:
         assert one.footprint is not None, "rooms are laid out"
-        here = " here" if one.name == room else ""
-        points = " ".join(f"{x - left:.2f},{high - y:.2f}" for x, y in one.footprint)
-        parts.append(f'<polygon class="room{here}" points="{points}"/>')
-        parts += _name(one.name, one.footprint, left, high)
-    if at is not None:
-        x, y = at[0] - left, high - at[1]
-        parts.append(f'<g class="robot"><circle class="halo" cx="{x:.2f}" cy="{y:.2f}" r=".62"/>')
-        parts.append(f'<circle class="body" cx="{x:.2f}" cy="{y:.2f}" r=".34"/></g>')
-    where = f"The robot is in {room}." if room else "The robot's position is unknown."
+        look = ("goal" if state.is_driving else "here") if one.name == state.room else ""
+        corners = [on_map(corner) for corner in one.footprint]
+        parts.append(f'<polygon class="room {look}" points="{_joined(corners)}"/>')
+        names += _labels(one, corners, on_map, state.finds.get(one.name, ()))
+    if len(state.trail) > 1:
+        parts.append(f'<polyline class="trail" points="{_joined(map(on_map, state.trail))}"/>')
+    if state.at is not None:
+        parts += _robot(*on_map(state.at), state.held)
+    about = escape(shortened(f"Map of {len(rooms)} rooms. {state.sentence}", 400))
     return (
         f'<svg class="floorplan" viewBox="0 0 {right - left:.2f} {high - low:.2f}" role="img" '
-        f'aria-label="{escape(shortened(f"Map of {len(rooms)} rooms. {where}", 200))}">{"".join(parts)}</svg>'
+        f'aria-label="{about}">{"".join([*parts, *names])}</svg>'
     )
 
 
-def _name(name: str, footprint: tuple[Point, ...], left: float, high: float) -> Iterator[str]:
-    """The name of a room, at its upper side, in up to two lines: the robot mostly stands in the middle."""
-    xs, ys = [x for x, _ in footprint], [y for _, y in footprint]
-    lines = _broken(shortened(name, MOST_LETTERS))
-    size = (max(xs) - min(xs)) * 0.92 / (WIDE * max(map(len, lines)) or 1)
-    size = max(SMALLEST, min(LARGEST, size))
-    x, y = (min(xs) + max(xs)) / 2 - left, high - max(ys)
+def _joined(points: Iterable[Point]) -> str:
+    return " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
+
+
+def _robot(x: float, y: float, held: str) -> Iterator[str]:
+    yield f'<g class="robot"><circle class="halo" cx="{x:.2f}" cy="{y:.2f}" r=".62"/>'
+    yield f'<circle class="body" cx="{x:.2f}" cy="{y:.2f}" r=".34"/></g>'
+    if held:
+        yield _text(x, y + 0.36 + SMALL, SMALL, f"holds {held}", "held")
+
+
+def _labels(
+    room: Room, corners: Sequence[Point], on_map: Callable[[Point], Point], finds: Sequence[str]
+) -> Iterator[str]:
+    """The name of a room at the side that is farther from where the robot stands, and finds at the other."""
+    top, bottom = min(y for _, y in corners), max(y for _, y in corners)
+    left, right = min(x for x, _ in corners), max(x for x, _ in corners)
+    middle, stands = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
+    lines = _broken(shortened(room_name(room.name), MOST_LETTERS))
+    size = _size(lines, right - left, LARGEST)
+    is_above = stands >= (top + bottom) / 2
+    start = top + 1.2 * size if is_above else bottom - size * (1.15 * (len(lines) - 1) + 0.5)
     for number, line in enumerate(lines):
-        down = y + size * (1.15 * number + 1.2)
-        yield f'<text x="{x:.2f}" y="{down:.2f}" font-size="{size:.2f}">{escape(line)}</text>'
+        yield _text(middle, start + 1.15 * size * number, size, line, "name")
+    met = [shortened(one, MOST_LETTERS) for one in finds[-MOST_FINDS:]]
+    small = _size(met or [""], right - left, SMALL)
+    for number, one in enumerate(met):
+        down = bottom - small * (1.15 * (len(met) - 1 - number) + 0.5)
+        up = top + small * (1.15 * number + 1.2)
+        yield _text(middle, down if is_above else up, small, one, "find")
+
+
+def _size(lines: Sequence[str], width: float, largest: float) -> float:
+    fits = width * 0.92 / (WIDE * max(1, *map(len, lines)))
+    return max(SMALLEST, min(largest, fits))
+
+
+def _text(x: float, y: float, size: float, text: str, kind: str) -> str:
+    return f'<text class="{kind}" x="{x:.2f}" y="{y:.2f}" font-size="{size:.2f}">{escape(text)}</text>'
 
 
 def _broken(name: str) -> list[str]:

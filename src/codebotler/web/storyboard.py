@@ -13,13 +13,14 @@ from codebotler.checking.problems import Check, Sample
 from codebotler.checking.storyboard import cut, steps_of
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
-from codebotler.core.words import brief, listed
+from codebotler.core.words import brief, listed, room_name
 from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Whereabouts
 from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
 VERBS = SKILLS.verbs
 SPOKEN = frozenset({*(kind for kind, one in SKILLS.recordings.items() if one.is_spoken), "answer"})
+LEFT_OUT = "…"  # instead of a room, where steps are left out
 PLAIN = re.compile(r"[\w' -]+")
 """Names of rooms that need no quotes; others could be read as part of the sentence."""
 
@@ -53,25 +54,43 @@ class Strip:
     ends_well: bool
 
 
-def draw_strips(check: Check) -> None:
-    """Draw what a robot would do, as far as a check found."""
+def draw_strips(check: Check, visited: Sequence[str] = ()) -> None:
+    """Draw what a robot would do, as far as a check found, and tick off the rooms that it has visited.
+
+    A strip in which it would have gone elsewhere fades.
+    """
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     for strip in shown:
-        with ui.element("article").classes("strip"):
+        reached = scenes_reached(strip, visited)
+        with ui.element("article").classes("strip" if reached is not None else "strip other"):
             if strip.world:
                 PlainText("p", f"{strip.world}:", "world")
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
-                for scene in strip.scenes:
-                    draw_scene(scene)
+                for number, scene in enumerate(strip.scenes):
+                    draw_scene(scene, is_reached=bool(visited) and number <= (reached or 0))
             PlainText("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
 
 
-def draw_scene(scene: Scene, wrong: Container[int] = frozenset()) -> None:
+def scenes_reached(strip: Strip, visited: Sequence[str]) -> int | None:
+    """How many drives of a strip the robot has made; None if it went elsewhere."""
+    for number, room in enumerate(visited, start=1):
+        scene = strip.scenes[number] if number < len(strip.scenes) else None
+        if scene is not None and scene.room == LEFT_OUT:
+            return number
+        if scene is None or scene.room != shortened(room, MOST_TEXT):
+            return None
+    return len(visited)
+
+
+def draw_scene(scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False) -> None:
     """Draw a stay in a room, and mark the steps whose numbers are wrong."""
-    kind = "scene" if scene.deeds or not scene.is_found else "scene passing"
-    with ui.element("li").classes(f"{kind} wrong" if scene.step in wrong else kind):
-        PlainText("b", scene.room, "room")
+    kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
+    kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
+    with ui.element("li").classes(" ".join(kinds)):
+        PlainText("b", room_name(scene.room), "room")
+        if is_reached:
+            PlainText("span", "✓", "tick").props('aria-label="reached"')
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:
@@ -111,7 +130,7 @@ def scenes(
     found: list[Scene] = [Scene(shortened(start, MOST_TEXT))]
     for is_shown, some in cut(steps, needed):
         if not is_shown:
-            found.append(Scene("…", (Deed("more", f"{len(some):,} more steps"),)))
+            found.append(Scene(LEFT_OUT, (Deed("more", f"{len(some):,} more steps"),)))
             continue
         for step in some:
             if step["kind"] == "goto":
@@ -170,6 +189,7 @@ def _rooms(known: Sequence[Whereabouts], *, is_there: bool) -> str:
 
 
 def _room(name: str) -> str:
+    name = room_name(name)
     return brief(name) if PLAIN.fullmatch(name) else _quoted(name)
 
 

@@ -13,7 +13,7 @@ from codebotler.checking.storyboard import step_text
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.core.world import World
-from codebotler.web.floorplan import floorplan
+from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.tasks import by_hand
@@ -165,7 +165,7 @@ def _draw_steps(steps: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _draw_rooms(world: World) -> None:
-    ui.html(floorplan(world, None, world.robot), sanitize=False).classes("map")
+    ui.html(floorplan(world, MapState(room=world.robot)), sanitize=False).classes("map")
     with ui.element("dl").classes("rooms"):
         for room in world.rooms:
             inside = ", ".join([*map(describe_person, room.people), *room.objects])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from typing import Any
 
@@ -9,10 +10,20 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
-from codebotler.missions.progress import MOST, Moment, Progress, line_of
+from codebotler.missions.progress import MOST, Find, Moment, Progress, line_of
 from codebotler.simulator.sampled_robot import Fact, GivenAnswer, Whereabouts
-from codebotler.web.floorplan import MOST_ROOMS, floorplan
-from codebotler.web.storyboard import MOST_STRIPS, Deed, strips, supposed
+from codebotler.web.floorplan import MOST_ROOMS, MapState, floorplan
+from codebotler.web.panes.past_missions import timeline
+from codebotler.web.storyboard import (
+    LEFT_OUT,
+    MOST_STRIPS,
+    Deed,
+    Scene,
+    Strip,
+    scenes_reached,
+    strips,
+    supposed,
+)
 
 PROGRAM = """def task_program():
     for room in get_all_rooms():
@@ -31,6 +42,10 @@ def line(event: str, clock: float = 1.0, **data: Any) -> dict[str, Any]:  # noqa
 
 def call(skill: str, **arguments: object) -> dict[str, Any]:
     return line("skill", number=1, skill=skill, arguments=arguments)
+
+
+def done(skill: str, result: object = None) -> dict[str, Any]:
+    return line("result", number=1, skill=skill, result=result)
 
 
 def after(*lines: dict[str, Any]) -> Progress:
@@ -78,6 +93,54 @@ def test_what_is_spoken_is_told_apart() -> None:
     )
 
 
+def test_where_the_robot_was_what_it_met_and_what_it_holds() -> None:
+    """In the words of the program, since only the robot knows what these mean."""
+    on_the_way = after(call("go_to", location="kitchen"), line("feedback", text="at (1.0, 2.0)"))
+    assert (on_the_way.visited, on_the_way.trail) == ((), ((1.0, 2.0),))
+    events = [
+        *(call("go_to", location="Kitchen"), line("feedback", text="at (1.0, 2.0)")),
+        *(line("feedback", text="at (1.01, 2.0)"), line("feedback", text="at (3.0, 2.0)"), done("go_to")),
+        *(call("is_in_room", entity="mug"), done("is_in_room", True)),
+        *(call("is_in_room", entity="cup"), done("is_in_room", False)),
+        *(call("is_in_room", entity="mug"), done("is_in_room", True)),
+        *(call("ask", person="ann", question="Tea?", options=["no"]), done("ask", "no")),
+        *(call("ask", person="", question="Tea?", options=["no"]), done("ask", "no")),
+        *(call("pick", obj="mug"), done("pick")),
+    ]
+    now = after(*events)
+    assert now.visited == ("Kitchen",)
+    assert now.trail == ((1.0, 2.0), (3.0, 2.0))
+    assert now.finds == (Find("Kitchen", "mug"), Find("Kitchen", "ann", is_person=True))
+    assert now.held == "mug"
+    assert after(*events, call("place", obj="mug"), done("place")).held == ""
+    failed = line("error", number=1, skill="go_to", kind="E", message="m")
+    assert after(call("go_to", location="attic"), failed).visited == ()
+
+
+def test_a_stop_is_one_event_with_what_it_interrupted() -> None:
+    drive, cancelled = call("go_to", location="supply room"), line("cancelled", number=1, skill="go_to")
+    for events in (
+        [drive, cancelled, line("stop", by="the page")],
+        [drive, line("stop", by="the page"), cancelled],
+    ):
+        assert [moment.text for moment in after(*events).moments] == [
+            'drives to "supply room"',
+            "stopped from the page while going to supply room",
+        ]
+        words = [text for _, text in timeline(events)]
+        assert words == ['Drives to "supply room"', "Stopped from the page while going to supply room"]
+    assert after(line("stop", by="Ctrl-C")).moments[-1].text == "stopped by Ctrl-C"
+    asked = [call("ask", person="ann", question="Tea?", options=["no"]), line("stop", by="Ctrl-C")]
+    assert after(*asked).moments[-1].text == 'stopped by Ctrl-C while asking "Tea?"'
+
+
+def test_the_line_is_the_one_that_the_program_says() -> None:
+    twice = "def task_program():\n    say('a')\n    say('a')\n"
+    spoken = call("say", message="a")
+    assert Progress().after(spoken, twice).line is None
+    assert Progress().after({**spoken, "line": 3}, twice).line == 3
+
+
 def test_only_the_last_moments_are_kept() -> None:
     assert len(after(*[call("say", message=str(n)) for n in range(MOST + 50)]).moments) == MOST
 
@@ -85,19 +148,38 @@ def test_only_the_last_moments_are_kept() -> None:
 def test_a_floorplan_is_well_formed_whatever_rooms_are_called() -> None:
     names = ("<script>", 'a "quoted" & <b>bold</b> room', "\x1b\u202e\ud800", "x" * 5_000)
     world = World(tuple(map(Room, names)), names[0])
-    drawn = floorplan(world, (1.0, 1.0), names[1])
+    met = {name: (name, "mug") for name in names}
+    drawn = floorplan(world, MapState((1.0, 1.0), names[1], is_driving=True, trail=((0, 0), (1, 1)), finds=met, held=names[0]))
     root = ET.fromstring(drawn.replace("<svg ", f'<svg xmlns="{SVG[1:-1]}" '))
     assert len(root.findall(f".//{SVG}polygon")) == 4
     assert {each.tag for each in root.iter()} == {
-        SVG + tag for tag in ("svg", "polygon", "text", "g", "circle")
+        SVG + tag for tag in ("svg", "polygon", "polyline", "text", "g", "circle")
     }
-    assert len(root.findall(f".//{SVG}polygon[@class='room here']")) == 1
+    assert len(root.findall(f".//{SVG}polygon[@class='room goal']")) == 1
+    kinds = [each.get("class") for each in root.iter(f"{SVG}text")]
+    assert kinds.count("find") == 8
+    assert "held" in kinds
     assert drawn.encode()
 
 
 def test_a_floorplan_of_a_huge_building_stays_small() -> None:
     world = World(tuple(Room(f"room {n}") for n in range(5_000)), "room 0")
-    assert floorplan(world).count("<polygon") == MOST_ROOMS
+    assert floorplan(world, MapState()).count("<polygon") == MOST_ROOMS
+
+
+def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
+    """The name stands at the side that is farther from where the robot stands, and above all else."""
+    for stands, side in (((1.0, 3.5), max), ((1.0, 0.5), min)):
+        room = Room("start_loc", footprint=((0, 0), (4, 0), (4, 4), (0, 4)), stand_at=stands)
+        drawn = floorplan(World((room,), "start_loc"), MapState(stands, "start_loc", trail=((0, 0), stands)))
+        (name,) = re.findall(r'<text class="name"[^>]* y="([\d.]+)"[^>]*>start<', drawn)
+        (robot,) = re.findall(r'class="body"[^>]* cy="([\d.]+)"', drawn)
+        assert side(float(name), float(robot)) == float(name)
+        assert abs(float(name) - float(robot)) > 0.62 + 0.34
+        assert drawn.index("<text") > max(drawn.index("polyline"), drawn.index('class="body"'))
+    assert "The robot is in start and holds mug. Met in start: ann." in floorplan(
+        World((room,), "start_loc"), MapState(room="start_loc", finds={"start_loc": ["ann"]}, held="mug")
+    )
 
 
 def test_strips_show_each_kind_of_world_once() -> None:
@@ -116,6 +198,24 @@ def test_strips_show_each_kind_of_world_once() -> None:
     }
     assert all([scene.room for scene in strip.scenes] == ["hall", "kitchen"] for strip in shown)
     assert all(strip.ends_well for strip in shown)
+
+
+@pytest.mark.parametrize(
+    ("visited", "reached"),
+    [
+        ((), 0),
+        (("kitchen",), 1),
+        (("kitchen", "hall"), 2),
+        (("kitchen", "hall", "attic", "attic"), 3),
+        (("attic",), None),
+        (("kitchen", "attic"), None),
+    ],
+)
+def test_rooms_are_ticked_off_as_they_are_reached(visited: tuple[str, ...], reached: int | None) -> None:
+    rooms = ("start_loc", "kitchen", "hall", LEFT_OUT, "study")
+    strip = Strip("", tuple(map(Scene, rooms)), "Done.", ends_well=True)
+    assert scenes_reached(strip, visited) == reached
+    assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), ("kitchen",)) is None
 
 
 def there(name: str, room: str, *, found: bool = True) -> Fact:

@@ -222,7 +222,8 @@ class ProgramRun:
         """Send one request, and wait for its reply."""
         if self.spent:
             raise LimitReachedError
-        send(f"[{request},{self.now!r}]")
+        where = f",{line_at_work()}" if self.is_live else ""
+        send(f"[{request},{self.now!r}{where}]")
         kind, value, self.now = receive()
         if self.is_live:
             self.refuel()
@@ -244,6 +245,14 @@ def options_text(options: list[Any]) -> str:
     texts = [(str(option), issubclass(type(option), str)) for option in options]
     parts = [f"[{quoted(text)},{'true' if is_text else 'false'}]" for text, is_text in texts]
     return f"[{','.join(parts)}]"
+
+
+def line_at_work() -> int:
+    """The line of the program that calls us; 0 where none does."""
+    frame: types.FrameType | None = getframe(1)
+    while frame is not None and frame.f_code.co_filename != PROGRAM:
+        frame = frame.f_back
+    return 0 if frame is None else frame.f_lineno or 0
 
 
 def last_line(error: BaseException) -> int | None:

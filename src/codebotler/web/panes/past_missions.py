@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 
 from nicegui import html, ui
@@ -11,15 +11,18 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
-from codebotler.missions.log import Line, State, Summary, events_of
+from codebotler.missions.log import SKILL_ENDS, Line, State, Summary, events_of
 from codebotler.missions.store import find, missions
-from codebotler.missions.wording import event_text
+from codebotler.missions.wording import activity, event_text, stop_text
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText
 
 MOST, MOST_EVENTS = 200, 1_000
 HEADLINES: Mapping[str, str] = {State.DRAFTING: "Program written", State.RUNNING: "Started"}
 """How the timeline names states of a mission, but for those that speak for themselves."""
+
+TOLD_BY_STOP = frozenset({State.STOPPING, State.STOPPED})
+"""States that are not shown where a stop is."""
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -53,6 +56,25 @@ def add(console: Console, frame: Frame) -> None:
             _show(summary, events)
 
 
+def timeline(events: Sequence[Line]) -> Iterator[tuple[Line, str]]:
+    """The events that are shown, in words; a stop and what it interrupted are one."""
+    doing, is_stopped = "", False
+    for number, line in enumerate(events):
+        event = line["event"]
+        if event == "skill":
+            doing = activity(line)
+        elif event in SKILL_ENDS and event != "cancelled":
+            doing = ""
+        if event == "stop":
+            is_stopped = True
+            yield line, _sentence(stop_text(line["by"], doing))
+            continue
+        is_told = event == "cancelled" or (is_stopped and line.get("state") in TOLD_BY_STOP)
+        words = "" if is_told else in_words(line, is_first=number == 0)
+        if words:
+            yield line, words
+
+
 def in_words(line: Line, *, is_first: bool) -> str:
     """An event in the timeline; empty if it is not shown."""
     event = line["event"]
@@ -63,8 +85,11 @@ def in_words(line: Line, *, is_first: bool) -> str:
             problems = len(line.get("problems", ()))
             step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"
         return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
-    text = "" if event == "feedback" else event_text(line)
-    return text[:1].upper() + text[1:]
+    return "" if event == "feedback" else _sentence(event_text(line))
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _read(console: Console, mission: str) -> tuple[Summary, list[Line]]:
@@ -95,13 +120,11 @@ def _show(summary: Summary, events: list[Line]) -> None:
         PlainText("p", shortened(problem), "trouble")
     PlainText("h2", "What happened")
     with ui.element("ol").classes("timeline"):
-        for number, line in enumerate(events[:MOST_EVENTS]):
-            words = in_words(line, is_first=number == 0)
-            if words:
-                with ui.element("li").classes(f"event event-{line['event']}"):
-                    PlainText("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
-                    PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")
-                    PlainText("span", words, "text")
+        for line, words in timeline(events[:MOST_EVENTS]):
+            with ui.element("li").classes(f"event event-{line['event']}"):
+                PlainText("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
+                PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")
+                PlainText("span", words, "text")
     if len(events) > MOST_EVENTS:
         PlainText("p", f"{len(events) - MOST_EVENTS:,} more events are in the files.", "quiet")
     PlainText("h2", "Program")

@@ -46,7 +46,7 @@ class ProgramPane:
             self._writer = PlainText("p", "", "quiet")
             # Its own properties stay as they are: each update of one would bring its text along, over what
             # is being typed. The script sets what changes.
-            self._editor = ui.codemirror("", language="Python", line_wrapping=True).classes("editor")
+            self._editor = ui.codemirror("", language="Python", line_wrapping=False).classes("editor")
             self._editor.on("update:value", js_handler="() => programEditor.typed()")
             self._verdict = PlainText("p", "", "verdict").props("role=status")
             self._problems = ui.element("ul").classes("problems")
@@ -71,16 +71,17 @@ class ProgramPane:
         self._writer.say(what if author and view.program else "")
         self._show_verdict(view)
         self._show_approval(view)
-        drawn = (view.check, view.problems, view.unknown_rooms, shown)
+        visited = visited_rooms(view)
+        drawn = (view.check, view.problems, view.unknown_rooms, shown, visited)
         if drawn != self._drawn:
             self._drawn = drawn
-            self._draw(view)
+            self._draw(view, visited)
 
     def _tell(self, view: SessionView, shown: str, *, anyway: bool = False) -> None:
         """Send the browser a program and its marks; it keeps what was typed there meanwhile."""
         told: dict[str, object] = {
             "program": shown,
-            "marks": [*_skills(shown), *_escapes(shown), *_marks(view.check, shown)],
+            "marks": [*_skills(shown), *_escapes(shown), *_marks(view.check, shown), *_at_work(view)],
             "editable": view.may_be_edited,
             "heard": self._heard,
             "anyway": anyway,
@@ -179,7 +180,7 @@ class ProgramPane:
 
     # --- what was found
 
-    def _draw(self, view: SessionView) -> None:
+    def _draw(self, view: SessionView, visited: tuple[str, ...]) -> None:
         self._problems.clear()
         with self._problems:
             for sentence in (*view.problems, *view.unknown_rooms)[:MOST_PROBLEMS]:
@@ -188,7 +189,15 @@ class ProgramPane:
         self._board.clear()
         if view.check is not None:
             with self._board:
-                draw_strips(view.check)
+                draw_strips(view.check, visited)
+
+
+def visited_rooms(view: SessionView) -> tuple[str, ...]:
+    """The rooms that the robot has reached, by the names that the check uses."""
+    named = view.room_map or (view.check and view.check.room_map)
+    if not named:
+        return ()
+    return tuple(named.room(words) or words for words in view.progress.visited)
 
 
 def _for_editor(program: str) -> str:
@@ -209,6 +218,14 @@ def _escapes(program: str) -> list[dict[str, Any]]:
         marks.append({"kind": "widget", "position": at, "text": visible(one), "class": "escape"})
         marks.append({"kind": "mark", "from": at, "to": at + 1, "class": "escaped"})
     return marks
+
+
+def _at_work(view: SessionView) -> list[dict[str, Any]]:
+    """The line that calls the skill under way, or in which the program failed."""
+    line = view.progress.line if view.is_running else view.line
+    kind = "running-line" if view.is_running else "failed-line"
+    is_there = line is not None and line <= view.program.count("\n") + 1
+    return [{"kind": "line", "line": line, "class": kind}] if is_there else []
 
 
 def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:

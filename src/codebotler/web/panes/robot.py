@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 
 from nicegui import ui
 
 from codebotler.core.skills import SKILLS
+from codebotler.core.terminal import shortened
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import State, Summary
 from codebotler.missions.progress import ANSWER, Moment
 from codebotler.missions.view import Phase, SessionView
 from codebotler.web.console import Console
-from codebotler.web.floorplan import floorplan
+from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import Button, PlainText
 from codebotler.web.panes.question import QuestionPane
 
@@ -25,6 +27,7 @@ HEADLINES: Mapping[Phase, str] = {
 }
 PAST_VERBS = {**{kind: verb.past for kind, verb in SKILLS.verbs.items()}, ANSWER: "heard"}
 MOST_MOMENTS = 60
+SCRIPT = '<script src="/static/moments.js"></script>'
 
 
 class RobotPane:
@@ -34,6 +37,7 @@ class RobotPane:
         self._console = console
         self._drawn: tuple[Moment, ...] = ()
         self._mapped: object = None
+        ui.add_head_html(SCRIPT)
         with ui.element("section").classes("pane status").props("aria-labelledby=h-status"):
             with ui.element("div").classes("head"):
                 PlainText("h2", "Status").props("id=h-status")
@@ -58,6 +62,7 @@ class RobotPane:
         doing = progress.doing
         self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
         where = [f"line {progress.line}"] if progress.line is not None else []
+        where += [f"holds {shortened(progress.held, 60)}"] if progress.held else []
         where += (
             [f"{progress.clock:.1f} s on the robot's clock"] if progress.moments and progress.clock else []
         )
@@ -69,23 +74,19 @@ class RobotPane:
         self._draw_moments(progress.moments)
 
     def _draw_map(self, view: SessionView) -> None:
-        progress, room_map = view.progress, view.room_map
-        world = self._console.world
+        room_map, world = view.room_map, self._console.world
         if world is None and room_map is not None:
             world = World(tuple(map(Room, room_map.rooms)), room_map.start)
         if world is None:
             return
-        room = (room_map.room(progress.room) if room_map and progress.room else None) or world.robot
-        at = progress.at
-        if at is None:
-            at = next((one.stand_at for one in laid_out(world).rooms if one.name == room), None)
-        what = (id(self._console.world), room_map, at, room)
+        state = map_state(view, world)
+        what = (id(self._console.world), room_map, state)
         if what != self._mapped:
             self._mapped = what
-            self._map.set_content(floorplan(world, at, room))
+            self._map.set_content(floorplan(world, state))
 
     def _draw_moments(self, moments: tuple[Moment, ...]) -> None:
-        """Put new moments on top; redraw all for another mission."""
+        """Add new moments below, and follow them; redraw all for another mission."""
         if moments == self._drawn:
             return
         known = len(self._drawn)
@@ -95,12 +96,12 @@ class RobotPane:
         self._drawn = moments
         with self._log:
             for moment in moments[known:]:
-                with ui.element("li").classes(f"moment moment-{moment.kind}") as row:
+                with ui.element("li").classes(f"moment moment-{moment.kind}"):
                     PlainText("time", f"{moment.clock:.1f} s")
                     if moment.kind in PAST_VERBS:
                         PlainText("small", PAST_VERBS[moment.kind])
                     PlainText("span", moment.text, "text")
-                row.move(target_index=0)
+        ui.run_javascript(f"moments.follow({self._log.id})")
 
     def _tell_interrupted(self, summaries: tuple[Summary, ...]) -> None:
         if summaries == self._told_interrupted:
@@ -112,3 +113,17 @@ class RobotPane:
             for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
             Button("Dismiss", self._console.dismiss, "plain")
+
+
+def map_state(view: SessionView, world: World) -> MapState:
+    """What the map shows of a view; rooms in the program's words become those of the world."""
+    progress = view.progress
+
+    def room_of(words: str) -> str:
+        return (view.room_map.room(words) if view.room_map and words else None) or world.robot
+
+    room, finds = room_of(progress.room), defaultdict[str, list[str]](list)
+    for find in progress.finds:
+        finds[room_of(find.room)].append(find.name)
+    at = progress.at or next((one.stand_at for one in laid_out(world).rooms if one.name == room), None)
+    return MapState(at, room, progress.is_driving, progress.trail, dict(finds), progress.held)

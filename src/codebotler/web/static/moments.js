@@ -1,0 +1,15 @@
+// What happened, the newest last: the list follows it, unless somebody has scrolled up to read.
+globalThis.moments = (() => {
+  const NEAR = 60; // pixels from the end that still count as being there
+  let shown = 0; // the height of the list before
+
+  const follow = (id) => {
+    const list = getElement(id)?.$el ?? document.querySelector(".moments");
+    if (!list) return;
+    const wasAtEnd = list.scrollTop + list.clientHeight >= shown - NEAR || list.scrollHeight < shown;
+    shown = list.scrollHeight;
+    if (wasAtEnd) list.scrollTop = list.scrollHeight;
+  };
+
+  return { follow };
+})();
