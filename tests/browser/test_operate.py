@@ -76,7 +76,7 @@ def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> Non
         page = opened(server)
         page.locator(".picks .pick").first.click()
         page.get_by_role("button", name="Write the program").click()
-        expect(page.get_by_text("Recorded program, written by a person.")).to_be_visible()
+        expect(page.get_by_text("Recorded program, no language model.")).to_be_visible()
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         assert page.locator(".strip .scene").count() > 3
         assert "def task_program" in text_of(page)

@@ -116,9 +116,10 @@ def _show_check(view: SessionView, request: Request) -> None:
 
 
 def _is_approved(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
-    if view.problems and not request.despite_problems:
+    if view.problems and not (request.despite_problems and view.can_run):
         session.reject(f"the check found {'a problem' if len(view.problems) == 1 else 'problems'}")
-        note("not run because of problems; --despite-problems runs it anyway")
+        anyway = "; --despite-problems runs it anyway" if view.can_run else ""
+        note(f"not run because of problems{anyway}")
         return False
     if not request.yes and not says_yes(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")

@@ -128,8 +128,9 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:
         head.append(f"\n{shortened(summary.instruction)}")
-    if summary.model:
-        head.append(f"\nwritten by {shortened(summary.model)}", "dim")
+    if summary.program:
+        author = f"written by {shortened(summary.model)}" if summary.model else "typed or changed by hand"
+        head.append(f"\n{author}", "dim")
     table = grid("left", "right", "left")
     before: Text | None = None
     for line in events:

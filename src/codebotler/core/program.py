@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import os
 import symtable
 import threading
 import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any
 
@@ -16,6 +18,7 @@ from codebotler.core.skills import SKILLS, Parameter, Skill, SkillTable
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
+ALIKE = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
 GIVEN = ("time", "sys")  # modules that every program finds imported
 FILE = "<program>"
 
@@ -241,7 +244,10 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
             message = f"the local variable {name} is used before it has a value"
             yield Flaw(line, "UnboundLocalError", message)
         else:
-            yield Flaw(line, "NameError", f"the name {name} is not defined")
+            known = sorted({*names_bound(tree), *skills, *GIVEN, *dir(builtins)} - {name})
+            alike = get_close_matches(name, known, n=1, cutoff=ALIKE)
+            hint = f"; did you mean {alike[0]}?" if alike else ""
+            yield Flaw(line, "NameError", f"the name {name} is not defined{hint}")
 
 
 def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:

@@ -108,20 +108,19 @@ class Progress:
     def with_result(self, result: object) -> Progress:
         """The progress when the skill under way has ended well."""
         recording = SKILLS[self.skill].recording if self.skill in SKILLS else None
-        if recording is None:
-            return self
-        if recording.is_drive:
-            return replace(self, visited=(*self.visited, self.subject))
-        match recording.kind:
+        now = self
+        match recording and recording.kind:
+            case "goto":
+                now = replace(self, visited=(*self.visited, self.subject))
             case "pick":
-                return replace(self, held=self.subject)
+                now = replace(self, held=self.subject)
             case "place":
-                return replace(self, held="")
+                now = replace(self, held="")
             case "check" if result is True:
-                return self._found(Find(self.room, self.subject))
+                now = self._found(Find(self.room, self.subject))
             case "ask" if self.subject:
-                return self._found(Find(self.room, self.subject, is_person=True))
-        return self
+                now = self._found(Find(self.room, self.subject, is_person=True))
+        return now
 
     def _found(self, find: Find) -> Progress:
         known = [one for one in self.finds if (one.room, one.name) != (find.room, find.name)]

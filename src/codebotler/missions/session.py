@@ -22,6 +22,7 @@ from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
 from codebotler.missions.view import CHECKING, Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
+from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
@@ -157,7 +158,8 @@ class MissionSession:
             self._through()
         except EXPECTED as error:
             self.error = error
-            self._show(trouble=_sentence(error))
+            known = error.closest if isinstance(error, UnknownInstructionError) else ()
+            self._show(trouble=_sentence(error), known=known)
         except Exception as error:
             self.error = error
             LOG.exception("a mission failed unexpectedly")

@@ -12,6 +12,9 @@ from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
 from codebotler.simulator.sampled_robot import RoomMap
 
+UNREADABLE = frozenset({"SyntaxError", "IndentationError", "TabError"})
+"""Problems with which a program never begins."""
+
 CHECKING = "checking"  # what a session is busy with
 
 Phase: TypeAlias = State | Literal["", "starting", "writing", "checking"]
@@ -51,6 +54,7 @@ class SessionView:
     line: int | None = None  # of the program, where it failed
     busy: str = ""  # what goes on before the robot moves, such as `checking`
     trouble: str = ""  # why it could not go on, in a sentence
+    known: tuple[str, ...] = ()  # instructions that can be carried out instead, where this one is unknown
     instruction: str = ""
     model: str = ""  # its name; empty where none may be asked
     program: str = ""  # while a model writes, as much as has arrived
@@ -69,6 +73,11 @@ class SessionView:
         """What speaks against running the program, in sentences."""
         found = () if self.check is None else self.check.problems
         return (*(problem.sentence for problem in found), *self.missing_skills)
+
+    @property
+    def can_run(self) -> bool:
+        """Whether the program, right or wrong, can run at all."""
+        return self.check is None or not any(one.kind in UNREADABLE for one in self.check.problems)
 
     @property
     def digest(self) -> str:

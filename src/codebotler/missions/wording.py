@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
+from codebotler.core.words import room_name
 from codebotler.missions.log import Line
 
 PAGE = "the page"  # as whoever presses STOP there is logged
@@ -24,7 +25,7 @@ def activity(line: Line) -> str:
         return f"executing {visible(line['skill'])}"
     if skill.recording is None:
         return skill.verb.ing
-    text = shortened(str(line["arguments"][skill.recording.text]), 100)
+    text = shortened(room_name(str(line["arguments"][skill.recording.text])), 100)
     return f'{skill.verb.ing} "{text}"' if skill.recording.is_spoken else f"{skill.verb.ing} {text}"
 
 
@@ -49,7 +50,8 @@ def _skill(line: Line) -> str:
         return shortened(call_text(line["skill"], list(arguments.values())))
     if skill.recording is None:
         return skill.verb.third
-    words = f'{skill.verb.third} "{shortened(str(arguments[skill.recording.text]))}"'
+    text = str(arguments[skill.recording.text])
+    words = f'{skill.verb.third} "{shortened(room_name(text) if skill.recording.is_drive else text)}"'
     options = arguments.get(skill.recording.options or "")
     return f"{words} [{shortened(' | '.join(options))}]" if options else words
 
@@ -62,9 +64,9 @@ def _result(line: Line) -> str:
             skill = SKILLS.get(line["skill"])
             return f"→ {skill.verb.results[result]}" if skill and skill.verb else f"→ {result}"
         case list(texts):
-            return f"→ {shortened(', '.join(map(str, texts)))}"
+            return f"→ {shortened(', '.join(room_name(str(text)) for text in texts))}"
         case result:
-            return f"→ {shortened(str(result))}"
+            return f"→ {shortened(room_name(str(result)))}"
 
 
 EVENTS: Mapping[str, Callable[[Line], str]] = {

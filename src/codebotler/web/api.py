@@ -52,7 +52,9 @@ class NewProgram(_Form):
 class Approval(_Form):
     """A person's approval of a program."""
 
-    program: str = Field(description="The digest of the program that the person saw.")
+    program: str = Field(
+        description="The digest of the program that the person saw.", examples=["3f5a8b0c9d21e467"]
+    )
     despite_problems: bool = False
 
 

@@ -126,8 +126,10 @@ class Console:
         session = self._session
         if session is None or session.view.is_over:
             before = self.view
-            author = before.author if program == before.program else ""
-            return self.begin(Order(before.instruction, before.model, program, author))
+            if program == before.program:
+                return self.begin(Order(before.instruction, before.model, program, before.author))
+            kept = before.instruction if is_version_of(before.program, program) else ""
+            return self.begin(Order(kept, before.model if kept else "", program))
         session.edit(program)
         return session
 
@@ -205,6 +207,13 @@ class Notifier:
                     if holds():
                         return True
         return holds()
+
+
+def is_version_of(program: str, changed: str) -> bool:
+    """Whether a program, changed by hand, is still for the same instruction: it keeps half of the lines."""
+    lines = [line for line in map(str.strip, program.splitlines()) if line]
+    kept = set(map(str.strip, changed.splitlines()))
+    return bool(lines) and 2 * sum(line in kept for line in lines) >= len(lines)
 
 
 def _check_length(text: str) -> None:

@@ -9,13 +9,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from fastapi import APIRouter, HTTPException, WebSocket, WebSocketDisconnect
-from fastapi.responses import FileResponse
+from fastapi import APIRouter, HTTPException, Request, WebSocket, WebSocketDisconnect
+from fastapi.responses import HTMLResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.terminal import shortened, visible_lines
 from codebotler.missions.mission import UNCONFIRMED
 from codebotler.robots.face import AnswerError, Face, Question
+from codebotler.web.access import Role
 from codebotler.web.console import Console
 
 PAGE = Path(__file__).with_name("static") / "face.html"
@@ -26,6 +27,8 @@ POLICY = (
 """Stricter than that of other pages, since there is no NiceGUI: no script can turn a text into markup."""
 
 STOPS = "a person at the face"
+BACK = '<a id="back" href="/">Operate the robot</a>'
+PLACE_OF_BACK = "<!-- back -->"  # for those who may operate
 MOST_TEXT, MOST_OPTION, MOST_OPTIONS = 2_000, 300, 50
 """Characters and options that people can read on a screen."""
 
@@ -43,9 +46,11 @@ def router(console: Console, face: Face) -> APIRouter:
     here = APIRouter(tags=["face"])
 
     @here.get("/face", include_in_schema=False)
-    def page() -> FileResponse:
+    def page(request: Request) -> HTMLResponse:
         headers = {"content-security-policy": POLICY, "cache-control": "no-store"}
-        return FileResponse(PAGE, media_type="text/html", headers=headers)
+        may_operate = getattr(request.state, "role", None) is Role.OPERATOR
+        shown = PAGE.read_text(encoding="utf-8").replace(PLACE_OF_BACK, BACK if may_operate else "")
+        return HTMLResponse(shown, headers=headers)
 
     @here.get("/api/face")
     async def show(*, once_over: bool = False) -> dict[str, Any]:

@@ -121,7 +121,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
     for pages in further:
         pages.add(Site(app, frame, runs))
     app.add_exception_handler(RequestValidationError, api.refused)
-    api_page.add(app)
+    api_page.add(app, frame)
     app.mount("/static", StaticFiles(directory=STATIC))
     core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard allows ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]

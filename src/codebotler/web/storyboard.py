@@ -90,7 +90,7 @@ def draw_scene(scene: Scene, wrong: Container[int] = frozenset(), *, is_reached:
     with ui.element("li").classes(" ".join(kinds)):
         PlainText("b", room_name(scene.room), "room")
         if is_reached:
-            PlainText("span", "✓", "tick").props('aria-label="reached"')
+            PlainText("span", "✓", "tick").props('role=img aria-label="reached"')
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:

@@ -159,6 +159,13 @@ def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) ->
     assert (mission["instruction"], mission["model"]) == (instruction, "recorded:careful")
 
 
+def test_what_does_not_parse_is_not_run_whatever_is_said(folder: Path) -> None:
+    (folder / "odd.py").write_text("def task_program(:\n")
+    status, _, err = run(folder, "odd.py", "--yes", "--despite-problems")
+    assert (status, err) == (1, "not run because of problems\n")
+    assert "running" not in states(folder)
+
+
 def test_program_on_standard_input(folder: Path) -> None:
     status, out, _ = run(folder, "-", "--yes", given=GOOD)
     assert (status, "done" in shown(out)) == (0, True)

@@ -105,6 +105,20 @@ def test_problems_stand_in_the_order_of_lines() -> None:
     assert [p.line for p in Program(text).problems()] == [None, 2, 3, 4, 5]
 
 
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        (["answer = 1", "say(anser)"], "the name anser is not defined; did you mean answer?"),
+        (["is_in_rom('mug')"], "the name is_in_rom is not defined; did you mean is_in_room?"),
+        (["goto('kitchen')"], "the name goto is not defined; did you mean go_to?"),
+        (["pritn(1)"], "the name pritn is not defined; did you mean print?"),
+        (["say(unheard_of)"], "the name unheard_of is not defined"),
+    ],
+)
+def test_a_misspelt_name_is_told_with_the_one_that_may_be_meant(lines: list[str], told: str) -> None:
+    assert [flaw.message for flaw in Program(in_task(*lines)).problems()] == [told]
+
+
 def test_a_ninth_skill_is_known() -> None:
     skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), "None", "Wave."))
     waves = Program(in_task("wave()"))

@@ -15,6 +15,7 @@ from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, PAPER
+from codebotler.simulator.sandbox import PROGRAM
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 
@@ -29,6 +30,8 @@ class Machine:
         self.is_live, self.now = True, 0.0
         self.done: list[str] = []
         self.does = does
+        self.line: int | None = None
+        self.lines: list[int | None] = []
 
     @property
     def trace(self) -> Trace:
@@ -36,6 +39,7 @@ class Machine:
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         self.now += 2.0
+        self.lines.append(self.line)
         text = str(arguments[0]) if arguments else skill
         result = self.does(text)
         self.done.append(text)
@@ -70,6 +74,28 @@ def test_clock_is_the_robots_and_sleeping_is_asked_of_it(worker: Worker) -> None
     happened, outcome = done(worker, program)
     assert happened == ["Hello", "2.0", "sleeps 30 s", "12:00:34"]
     assert outcome == Outcome(Status.FINISHED, tuple(Event("say", text) for text in happened))
+
+
+def test_a_live_program_says_where_it_is(worker: Worker) -> None:
+    program = """def greet(name):
+    say("hello " + name)
+
+def task_program():
+    for room in ["a", "b"]:
+        greet(room)
+        [go_to(room) for room in [room]]
+    sorted([2, 1], key=lambda n: say(str(n)) or n)
+    exec("say('exec')")
+"""
+    machine = Machine()
+    assert worker.run_live(program, machine).status is Status.FINISHED
+    assert machine.lines == [2, 7, 2, 7, 8, 8, 9]
+    lies = f"""def task_program():
+    exec(compile("\\n" * 1_000_000 + "say('far')", {PROGRAM!r}, "exec"))
+"""
+    machine = Machine()
+    worker.run_live(lies, machine)
+    assert machine.lines == [None]
 
 
 def test_fuel_is_counted_anew_after_each_skill_and_sleep(worker: Worker) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import html
 import http.client
 import json
 import os
 import re
+import shlex
 import signal
 import socket
 import subprocess
@@ -292,6 +294,25 @@ def test_the_api_is_described(server: PageServer) -> None:
     assert {"/api/missions", "/api/missions/{mission}/stop", "/api/check"} <= described.keys()
     page = server.call("GET", "/api").text
     assert all(path in page for path in described)
+    assert 'id="stop"' in page
+    assert '<a href="/missions">Missions</a>' in page
+
+
+def test_each_command_of_the_page_about_the_api_is_one_that_works(server: PageServer) -> None:
+    """But for those that need what an example cannot know."""
+    begun(server, HELLO)
+    page = server.call("GET", "/api").text
+    commands = [html.unescape(text) for text in re.findall(r"<pre[^>]*>(.*?)</pre>", page)]
+    assert len(commands) == page.count("<section>")
+    for text in commands:
+        words = shlex.split(text.replace("$TOKEN", server.token))
+        if words[-1].endswith(("/events", "/stop", "/approve", ".mcap")) or "{" in words[-1]:
+            continue  # endless, or of a mission that runs
+        given = dict(zip(words[3:-1:2], words[4:-1:2], strict=True))
+        path = words[-1].removeprefix(f"http://localhost:{server.port}")
+        answer = server.call(given.get("-X", "GET"), path, json.loads(given.get("-d", "null")))
+        assert words[:3] == ["curl", "-H", f"Authorization: Bearer {server.token}"]
+        assert answer.status in {200, 201, 202, 409}, (text, answer.text)
 
 
 def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(tmp_path: Path) -> None:

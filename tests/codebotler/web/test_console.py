@@ -175,6 +175,23 @@ def test_only_the_program_that_was_seen_can_be_approved(console: Console) -> Non
     assert console.view.state is State.CHECKED
 
 
+def test_a_program_typed_by_hand_has_the_instruction_only_if_it_is_still_that_ones(console: Console) -> None:
+    written = "def task_program():\n    go_to('kitchen')\n    say('hello')\n    say('bye')\n"
+    for program, instruction in (
+        (written.replace("bye", "later"), "Greet the kitchen."),
+        ("def task_program():\n    pick('mug')\n    place('mug')\n", ""),
+    ):
+        console.begin(Order("Greet the kitchen.", program=written, author="some:model"))
+        until(console, lambda view: view.check is not None)
+        console.stop("a test")
+        until(console, lambda view: view.is_over)
+        console.edit(program)
+        view = until(console, lambda view: view.check is not None)
+        assert (view.instruction, view.author) == (instruction, "")
+        filed = Summary.read(console.home / "missions" / view.id)
+        assert (filed.instruction, filed.model) == (instruction, "")
+
+
 def test_an_edited_program_is_checked_again_and_the_last_one_counts(console: Console) -> None:
     checked(console)
     for number in range(5):

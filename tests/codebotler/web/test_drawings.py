@@ -44,7 +44,7 @@ def call(skill: str, **arguments: object) -> dict[str, Any]:
     return line("skill", number=1, skill=skill, arguments=arguments)
 
 
-def done(skill: str, result: object = None) -> dict[str, Any]:
+def done(skill: str, *, result: object = None) -> dict[str, Any]:
     return line("result", number=1, skill=skill, result=result)
 
 
@@ -100,11 +100,11 @@ def test_where_the_robot_was_what_it_met_and_what_it_holds() -> None:
     events = [
         *(call("go_to", location="Kitchen"), line("feedback", text="at (1.0, 2.0)")),
         *(line("feedback", text="at (1.01, 2.0)"), line("feedback", text="at (3.0, 2.0)"), done("go_to")),
-        *(call("is_in_room", entity="mug"), done("is_in_room", True)),
-        *(call("is_in_room", entity="cup"), done("is_in_room", False)),
-        *(call("is_in_room", entity="mug"), done("is_in_room", True)),
-        *(call("ask", person="ann", question="Tea?", options=["no"]), done("ask", "no")),
-        *(call("ask", person="", question="Tea?", options=["no"]), done("ask", "no")),
+        *(call("is_in_room", entity="mug"), done("is_in_room", result=True)),
+        *(call("is_in_room", entity="cup"), done("is_in_room", result=False)),
+        *(call("is_in_room", entity="mug"), done("is_in_room", result=True)),
+        *(call("ask", person="ann", question="Tea?", options=["no"]), done("ask", result="no")),
+        *(call("ask", person="", question="Tea?", options=["no"]), done("ask", result="no")),
         *(call("pick", obj="mug"), done("pick")),
     ]
     now = after(*events)
@@ -149,7 +149,10 @@ def test_a_floorplan_is_well_formed_whatever_rooms_are_called() -> None:
     names = ("<script>", 'a "quoted" & <b>bold</b> room', "\x1b\u202e\ud800", "x" * 5_000)
     world = World(tuple(map(Room, names)), names[0])
     met = {name: (name, "mug") for name in names}
-    drawn = floorplan(world, MapState((1.0, 1.0), names[1], is_driving=True, trail=((0, 0), (1, 1)), finds=met, held=names[0]))
+    drawn = floorplan(
+        world,
+        MapState((1.0, 1.0), names[1], is_driving=True, trail=((0, 0), (1, 1)), finds=met, held=names[0]),
+    )
     root = ET.fromstring(drawn.replace("<svg ", f'<svg xmlns="{SVG[1:-1]}" '))
     assert len(root.findall(f".//{SVG}polygon")) == 4
     assert {each.tag for each in root.iter()} == {
@@ -177,9 +180,9 @@ def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
         assert side(float(name), float(robot)) == float(name)
         assert abs(float(name) - float(robot)) > 0.62 + 0.34
         assert drawn.index("<text") > max(drawn.index("polyline"), drawn.index('class="body"'))
-    assert "The robot is in start and holds mug. Met in start: ann." in floorplan(
-        World((room,), "start_loc"), MapState(room="start_loc", finds={"start_loc": ["ann"]}, held="mug")
-    )
+    state = MapState(room="start_loc", finds={"start_loc": ["ann"]}, held="mug")
+    told = "The robot is in start and holds mug. Met in start: ann."
+    assert told in floorplan(World((Room("start_loc"),), "start_loc"), state)
 
 
 def test_strips_show_each_kind_of_world_once() -> None:

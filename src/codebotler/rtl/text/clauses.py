@@ -30,7 +30,8 @@ _PROPOSES = re.compile(
     re.IGNORECASE,
 )
 _ASIDE = re.compile(
-    r",\s{1,3}(?:which|who|(?:I am|I['\u2019]m) (?:afraid|sorry)|unfortunately|sadly|luckily)\b[^,;:\d]{0,60},",
+    r",\s{1,3}(?:which|who|(?:I am|I['\u2019]m) (?:afraid|sorry)|unfortunately|sadly|luckily)\b"
+    r"[^,;:\d]{0,60},",
     re.IGNORECASE,
 )
 _THERE = re.compile(r"\s*(?:there|it)\b", re.IGNORECASE)

@@ -20,6 +20,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
 
+UNKNOWN = "No recorded program is for this instruction. Choose one below, or another model."
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 ABOUT_RECORDED = (
     "These programs were written by people and recorded, so that you can try everything without an API key. "
@@ -34,6 +35,7 @@ class InstructionPane:
         self._console = console
         self._number = -1
         self._asked = ""
+        self._suggested: tuple[str, ...] = ()
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
             PlainText("h2", "Instruct").props("id=h-instruct")
             self._text = (
@@ -50,6 +52,7 @@ class InstructionPane:
             self._about = PlainText("p", ABOUT_RECORDED, "quiet")
             self._write = Button("Write the program", self._ask, "primary")
             self._trouble = PlainText("p", "", "trouble").props("role=alert")
+            self._alike = ui.element("div").classes("picks")
             self._examples = ui.element("div").classes("picks")
             self._before = ui.element("div").classes("picks")
         self._about_model()
@@ -75,7 +78,8 @@ class InstructionPane:
             self._asked = visible_lines(view.instruction)
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
-        self._trouble.say(view.trouble)
+        self._trouble.say(UNKNOWN if view.known else view.trouble)
+        self._suggest(view.known)
 
     def _ask(self) -> None:
         try:
@@ -87,6 +91,16 @@ class InstructionPane:
 
     def _about_model(self) -> None:
         self._about.set_visibility(is_recorded(str(self._model.value)))
+
+    def _suggest(self, known: tuple[str, ...]) -> None:
+        """Offer known instructions that are alike, and fit the rooms that are there."""
+        if known == self._suggested:
+            return
+        self._suggested = known
+        self._alike.clear()
+        fitting = [text for text in known if _fits(text, self._console)]
+        if fitting:
+            self._fill(self._alike, "Known instructions that are alike", [(text, "") for text in fitting])
 
     def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
         where.clear()
@@ -105,15 +119,21 @@ class InstructionPane:
 
 def _examples(console: Console) -> list[str]:
     """Short instructions that the recorded model knows, of different kinds, for rooms that are there."""
-    plan = None if console.world is None else RoomMap.of(console.world)
     found: dict[frozenset[str], str] = {}
     for instruction, replies in sorted(
         recorded_model("recorded:careful").replies.items(), key=lambda known: len(known[0])
     ):
-        program = replies[0].program
-        if plan is None or (named_rooms(tree_of(program)) and not unknown_rooms(program, plan)):
-            found.setdefault(frozenset(called_skills(tree_of(program))), instruction)
+        if _fits(instruction, console):
+            found.setdefault(frozenset(called_skills(tree_of(replies[0].program))), instruction)
     return list(found.values())[:MOST_EXAMPLES]
+
+
+def _fits(instruction: str, console: Console) -> bool:
+    """Whether the rooms of a recorded program are there."""
+    program = recorded_model("recorded:careful").replies[instruction][0].program
+    if console.world is None:
+        return True
+    return bool(named_rooms(tree_of(program))) and not unknown_rooms(program, RoomMap.of(console.world))
 
 
 def _before(console: Console) -> list[Summary]:

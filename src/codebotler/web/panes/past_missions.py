@@ -109,7 +109,8 @@ def _show(summary: Summary, events: list[Line]) -> None:
     PlainText("h1", shortened(summary.instruction, 300) or "A program without an instruction")
     with ui.element("p").classes("facts"):
         PlainText("small", summary.state, f"state state-{summary.state}")
-        by = f" · program by {summary.model}" if summary.model else ""
+        by_hand = " · program typed or changed by hand" if summary.program else ""
+        by = f" · program by {summary.model}" if summary.model else by_hand
         PlainText("span", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}")
     if summary.reason:
         PlainText("p", shortened(summary.reason), "reason")

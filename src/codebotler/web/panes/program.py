@@ -52,6 +52,7 @@ class ProgramPane:
             self._problems = ui.element("ul").classes("problems")
             self._approval = ui.element("div").classes("word")
             with self._approval:
+                self._instruction = PlainText("p", "", "instruction")
                 self._despite = ui.checkbox("Run it despite the problems", on_change=self._ticked)
                 self._run = Button("Run it on the robot", self._approve, "go")
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
@@ -66,9 +67,7 @@ class ProgramPane:
         shown = _for_editor(view.program)
         self._tell(view, shown)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
-        author = view.author
-        what = "Recorded program, written by a person." if is_recorded(author) else f"Written by {author}."
-        self._writer.say(what if author and view.program else "")
+        self._writer.say(_written_by(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
         self._show_approval(view)
         visited = visited_rooms(view)
@@ -126,7 +125,8 @@ class ProgramPane:
         open_ = view.state is not None and view.state.is_open and not view.is_over and bool(view.program)
         may_again = view.may_be_asked_again
         self._approval.set_visibility(open_ or self._may_rerun(view))
-        self._despite.set_visibility(open_ and bool(view.problems))
+        self._despite.set_visibility(open_ and bool(view.problems) and view.can_run)
+        self._instruction.say(f"Instruction: {shortened(view.instruction, 400)}" if view.instruction else "")
         if not view.problems:
             self._despite.value = False
         self._repair.set_visibility(may_again and bool(view.problems))
@@ -139,7 +139,7 @@ class ProgramPane:
 
     def _ticked(self) -> None:
         view = self._console.view
-        accepted = not view.problems or bool(self._despite.value)
+        accepted = not view.problems or (bool(self._despite.value) and view.can_run)
         self._run.allow(self._may_rerun(view) or (view.may_be_approved and accepted))
         self._run.classes(add="risky" if view.problems else "", remove="" if view.problems else "risky")
 
@@ -198,6 +198,14 @@ def visited_rooms(view: SessionView) -> tuple[str, ...]:
     if not named:
         return ()
     return tuple(named.room(words) or words for words in view.progress.visited)
+
+
+def _written_by(view: SessionView) -> str:
+    if not view.author:
+        return "Typed or changed by hand."
+    if is_recorded(view.author):
+        return "Recorded program, no language model."
+    return f"Written by {view.author}."
 
 
 def _for_editor(program: str) -> str:

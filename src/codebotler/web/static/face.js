@@ -41,6 +41,7 @@ function show(told) {
   const before = now;
   now = told;
   document.body.dataset.doing = told.doing;
+  document.body.dataset.ended = (told.is_over && told.state) || "";
   put("doing", doingWords(told));
   showSaid(told.said);
   if (told.question?.number !== before?.question?.number) ask(told.question);
@@ -204,6 +205,7 @@ function connect() {
   socket.addEventListener("message", ({ data }) => show(JSON.parse(data)));
   socket.addEventListener("close", () => {
     document.body.dataset.doing = "lost";
+    document.body.dataset.ended = "";
     put("doing", LOST);
     ask(null);
     now = null; // another tool may answer, which counts from 1 again
