@@ -84,7 +84,7 @@ test-browser: $(VENV)/tested
 
 pictures: $(VENV)/tested
 	@shots=$$(mktemp -d) && \
-	$(BIN)/python -m pytest --no-skips --shots "$$shots" -k "desk-light or tablet-light" tests/browser && \
+	$(BIN)/python -m pytest --no-skips --shots "$$shots" -k "desk-light or tablet-light or (looks and desk-dark)" tests/browser && \
 	for model in hasty careful; do $(BIN)/roboeval run --model recorded:$$model --num-completions 4 --no-report \
 		--out "$$shots/$$model" || exit 1; done && \
 	$(BIN)/roboeval report "$$shots/hasty" "$$shots/careful" --no-check --out "$$shots/report" && \

@@ -10,6 +10,8 @@ from PIL import Image
 
 CHOSEN = {
     "checked-desk-light": "checked-desk-light.png",
+    "running-desk-light": "running-desk-light.png",
+    "running-desk-dark": "running-desk-dark.png",
     "operator-asked-desk-light": "operator-asked-desk-light.png",
     "face-asks-tablet-light": "face-asks-tablet-light.png",
     "face-moves-tablet-light": "face-moves-tablet-light.png",

@@ -56,6 +56,7 @@ class Progress:
     at: Point | None = None  # the position in metres, if known
     is_driving: bool = False  # to `room`
     visited: tuple[str, ...] = ()  # the destinations that were reached, in the program's words
+    looks: tuple[tuple[str, bool], ...] = ()  # what was looked for, and whether it was found
     trail: tuple[Point, ...] = ()  # the last 200 positions
     finds: tuple[Find, ...] = ()  # what was seen, and who was asked, by room; each once
     held: str = ""  # what the robot holds
@@ -116,8 +117,9 @@ class Progress:
                 now = replace(self, held=self.subject)
             case "place":
                 now = replace(self, held="")
-            case "check" if result is True:
-                now = self._found(Find(self.room, self.subject))
+            case "check":
+                now = self._found(Find(self.room, self.subject)) if result is True else self
+                now = replace(now, looks=(*self.looks, (self.subject, result is True)))
             case "ask" if self.subject:
                 now = self._found(Find(self.room, self.subject, is_person=True))
         return now

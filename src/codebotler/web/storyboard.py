@@ -54,33 +54,49 @@ class Strip:
     ends_well: bool
 
 
-def draw_strips(check: Check, visited: Sequence[str] = ()) -> None:
+@dataclass(frozen=True)
+class Reached:
+    """How far a robot has come: the rooms that it has visited, and what it looked for and found or not."""
+
+    visited: tuple[str, ...] = ()
+    looks: tuple[tuple[str, bool], ...] = ()
+
+
+NOWHERE = Reached()
+
+
+def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
     """Draw what a robot would do, as far as a check found, and tick off the rooms that it has visited.
 
-    A strip in which it would have gone elsewhere fades.
+    A strip that is no longer possible is folded.
     """
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     for strip in shown:
-        reached = scenes_reached(strip, visited)
-        with ui.element("article").classes("strip" if reached is not None else "strip other"):
+        number_reached = scenes_reached(strip, reached)
+        with ui.element("article").classes("strip" if number_reached is not None else "strip other"):
             if strip.world:
                 PlainText("p", f"{strip.world}:", "world")
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for number, scene in enumerate(strip.scenes):
-                    draw_scene(scene, is_reached=bool(visited) and number <= (reached or 0))
+                    is_reached = bool(reached.visited) and number <= (number_reached or 0)
+                    draw_scene(scene, is_reached=is_reached)
             PlainText("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
 
 
-def scenes_reached(strip: Strip, visited: Sequence[str]) -> int | None:
-    """How many drives of a strip the robot has made; None if it went elsewhere."""
-    for number, room in enumerate(visited, start=1):
+def scenes_reached(strip: Strip, reached: Reached) -> int | None:
+    """How many drives of a strip the robot has made; None if it went or found something else."""
+    seen = [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind == "check"]
+    is_whole = all(scene.room != LEFT_OUT for scene in strip.scenes)
+    if is_whole and seen[: len(reached.looks)] != [look_text(*look) for look in reached.looks]:
+        return None
+    for number, room in enumerate(reached.visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
         if scene is not None and scene.room == LEFT_OUT:
             return number
         if scene is None or scene.room != shortened(room, MOST_TEXT):
             return None
-    return len(visited)
+    return len(reached.visited)
 
 
 def draw_scene(scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False) -> None:
@@ -150,8 +166,15 @@ def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
         return (Deed(kind, text, number), Deed("answer", heard))
     if kind in SPOKEN:
         return (Deed(kind, text, number),)
+    if kind == "check" and "found" in step:
+        return (Deed(kind, look_text(step["text"], step["found"]), number),)
     result = f": {VERBS[kind].results[step['found']]}" if kind in VERBS and "found" in step else ""
     return (Deed(kind, f"{verb} {text}{result}", number),)
+
+
+def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
+    """A look and its result in words."""
+    return f"{VERBS['check'].third} {shortened(what, MOST_TEXT)}: {VERBS['check'].results[is_found]}"
 
 
 # --- what a world is like

@@ -18,6 +18,7 @@ from codebotler.web.storyboard import (
     LEFT_OUT,
     MOST_STRIPS,
     Deed,
+    Reached,
     Scene,
     Strip,
     scenes_reached,
@@ -217,8 +218,19 @@ def test_strips_show_each_kind_of_world_once() -> None:
 def test_rooms_are_ticked_off_as_they_are_reached(visited: tuple[str, ...], reached: int | None) -> None:
     rooms = ("start_loc", "kitchen", "hall", LEFT_OUT, "study")
     strip = Strip("", tuple(map(Scene, rooms)), "Done.", ends_well=True)
-    assert scenes_reached(strip, visited) == reached
-    assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), ("kitchen",)) is None
+    assert scenes_reached(strip, Reached(visited)) == reached
+    assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), Reached(("kitchen",))) is None
+
+
+def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> None:
+    program = "def task_program():\n    go_to('kitchen')\n    say('yes' if is_in_room('mug') else 'no')\n"
+    shown = strips(check(program, rooms=["hall", "kitchen"]))
+    assert len(shown) == 2
+    said = {}
+    for found in (True, False):
+        possible = [one for one in shown if scenes_reached(one, Reached(("kitchen",), (("mug", found),)))]
+        said[found] = [one.scenes[-1].deeds[-1].text for one in possible]
+    assert said == {True: ["yes"], False: ["no"]}
 
 
 def there(name: str, room: str, *, found: bool = True) -> Fact:

@@ -21,7 +21,7 @@ from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
-from codebotler.web.storyboard import draw_strips
+from codebotler.web.storyboard import Reached, draw_strips
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
 MOST_MARKS, MOST_ESCAPES = 400, 2_000
@@ -70,11 +70,11 @@ class ProgramPane:
         self._writer.say(_written_by(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
         self._show_approval(view)
-        visited = visited_rooms(view)
-        drawn = (view.check, view.problems, view.unknown_rooms, shown, visited)
+        reached = reached_in(view)
+        drawn = (view.check, view.problems, view.unknown_rooms, shown, reached)
         if drawn != self._drawn:
             self._drawn = drawn
-            self._draw(view, visited)
+            self._draw(view, reached)
 
     def _tell(self, view: SessionView, shown: str, *, anyway: bool = False) -> None:
         """Send the browser a program and its marks; it keeps what was typed there meanwhile."""
@@ -180,7 +180,7 @@ class ProgramPane:
 
     # --- what was found
 
-    def _draw(self, view: SessionView, visited: tuple[str, ...]) -> None:
+    def _draw(self, view: SessionView, reached: Reached) -> None:
         self._problems.clear()
         with self._problems:
             for sentence in (*view.problems, *view.unknown_rooms)[:MOST_PROBLEMS]:
@@ -189,15 +189,16 @@ class ProgramPane:
         self._board.clear()
         if view.check is not None:
             with self._board:
-                draw_strips(view.check, visited)
+                draw_strips(view.check, reached)
 
 
-def visited_rooms(view: SessionView) -> tuple[str, ...]:
-    """The rooms that the robot has reached, by the names that the check uses."""
+def reached_in(view: SessionView) -> Reached:
+    """How far the robot has come, with the names of rooms that the check uses."""
     named = view.room_map or (view.check and view.check.room_map)
     if not named:
-        return ()
-    return tuple(named.room(words) or words for words in view.progress.visited)
+        return Reached()
+    visited = tuple(named.room(words) or words for words in view.progress.visited)
+    return Reached(visited, view.progress.looks)
 
 
 def _written_by(view: SessionView) -> str:
