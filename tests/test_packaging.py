@@ -21,6 +21,7 @@ PACKAGING = ROOT / "packaging"
 ON_TOP = {
     *(
         "CHANGELOG.md",
+        "CITATION.cff",
         "LICENSE",
         "Makefile",
         "PKG-INFO",

@@ -4,15 +4,16 @@ The folder is named by CODEBOTLER_CORPUS; without it these tests are skipped and
 """
 
 import json
-from collections import Counter
+from collections import Counter, defaultdict
 from pathlib import Path
+from statistics import fmean as mean
 from typing import Any
 
 import pytest
 
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion, read_completions
-from roboeval.suites.load import Suite
+from roboeval.suites.load import Suite, load_suite
 
 KINDS_OF_TRACE = {
     "goto": "GoTo",
@@ -168,6 +169,38 @@ def test_published_results(corpus: Path, paper: Suite, file: str, model: str) ->
     theirs = {cell: published["pass_at_1"][cell[0]][cell[1]][column] for cell in count}
     assert len(ours) == 20
     assert ours == pytest.approx(theirs)
+
+
+def test_the_table_in_the_readme(corpus: Path) -> None:
+    published = json.loads((corpus / "reference" / "published_results.json").read_text())
+    read_me = (Path(__file__).parents[3] / "README.md").read_text()
+    rows = [
+        list(map(str.strip, line.split("|")[1:-1])) for line in read_me.splitlines() if line.startswith("| ")
+    ]
+    table = {row[0]: row[1:] for row in rows if len(row) == 8}
+    assert len(table) == 16 + 2
+    columns = [
+        published["models"].index(name) for name in ("GPT-4", "PaLM2", "GPT-3.5", "CodeLlama", "StarCoder")
+    ]
+    means = {}
+    for task, prompts in published["pass_at_1"].items():
+        means[task] = [mean(prompt[column] for prompt in prompts) for column in columns]
+    means["**all 16**"] = [mean(column) for column in zip(*means.values(), strict=True)]
+    for task, shares in means.items():
+        told = [table[task][at] for at in (0, 2, 4, 5, 6)]
+        assert told == [f"{share:.3f}" for share in shares], task
+    for file, at in (("gpt-4", 1), ("palm-2", 3)):
+        completions = list(read_completions(corpus / "corpus" / "completions" / f"{file}.jsonl"))
+        ours: dict[str, list[str]] = defaultdict(list)
+        for suite in ("paper", "plus"):
+            passed: dict[str, dict[int, list[bool]]] = defaultdict(lambda: defaultdict(list))
+            for row in evaluate(completions, load_suite(suite), workers=2):
+                passed[row["task"]][row["prompt"]].append(row["passed"])
+            for task, prompts in passed.items():
+                ours[task].append(f"{mean(mean(one) for one in prompts.values()):.3f}")
+        assert {task: row[at] for task, row in table.items() if row[at][:1].isdigit()} == {
+            task: ", ".join(shares) for task, shares in ours.items()
+        }
 
 
 @pytest.mark.parametrize("file", ["gpt-4", "palm-2"])
