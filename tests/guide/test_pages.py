@@ -399,7 +399,11 @@ def test_pictures_are_made_and_shown_and_quickly_loaded() -> None:
     pages = [path.read_text() for path in PAGES.values()]
     for name, path in pictures.items():
         assert path.stat().st_size < 150_000, name
-        assert any(re.search(rf"!\[[^]]{{20,}}\]\(pictures/{name}\.png\)", page) for page in pages), name
+        in_markdown, in_html = (
+            rf"!\[[^]]{{20,}}\]\(pictures/{name}\.png\)",
+            rf'src(?:set)?="docs/pictures/{name}\.png"',
+        )
+        assert any(re.search(f"{in_markdown}|{in_html}", page) for page in pages), name
 
 
 def test_links_lead_somewhere() -> None:
