@@ -393,6 +393,25 @@ def visible(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+def test_nothing_runs_in_a_report_that_comes_with_a_run(
+    served: PageServer, real: Path, opened: OpenPage
+) -> None:
+    report = real / "hasty" / "report"
+    page = opened(served)
+    page.goto(f"http://localhost:{served.port}/runs/hasty")
+    expect(page.locator(".completions-view a").first).to_be_visible()
+    assert page.get_by_text("The report of this run").count() == 0
+    report.mkdir()
+    html = "<p style='color: red'>all is well</p><img src='data:,' onerror='owned=1'><script>owned=1</script>"
+    (report / "index.html").write_text(html)
+    page.reload()
+    page.get_by_text("The report of this run").click()
+    expect(page.get_by_text("all is well")).to_be_visible()
+    page.wait_for_timeout(300)
+    assert page.evaluate("typeof owned") == "undefined"
+    shutil.rmtree(report)
+
+
 # --- looks
 
 
@@ -410,10 +429,13 @@ def test_pages(served: PageServer, opened: OpenPage, shoot: Shoot, screen: Scree
 
     expect(page.locator(".runs tbody tr")).to_have_count(2)
     look("runs")
+    assert page.locator(".sideways").first.evaluate("e => e.scrollWidth <= e.clientWidth")
     for box in page.get_by_role("checkbox").all():
         box.check()
     page.get_by_role("button", name="Show side by side").click()
     expect(page.locator(".heat").nth(1).locator("td").first).to_be_visible()
+    page.locator(".differences summary").first.click()
+    expect(page.locator(".differences li a").first).to_be_visible()
     look("side-by-side")
     page.locator(".beside-list a", has_text="hasty").click()
     expect(page.locator(".completions-view a").first).to_be_visible()

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Annotated, TypeAlias
 
 from fastapi import APIRouter, Depends, HTTPException, Query
-from fastapi.responses import Response
+from fastapi.responses import HTMLResponse, Response
 
 from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.completions import name_of
@@ -18,6 +18,11 @@ from roboeval.web.snapshot import Filter
 
 MOST = 1_000
 """Completions in one answer."""
+
+REPORT_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'none'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
 
 Chosen: TypeAlias = Annotated[Filter, Depends()]
 Evaluation: TypeAlias = Annotated[
@@ -41,6 +46,17 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         """One run with every prompt and every kind of failure."""
         with _refusing():
             return _json(run_details(store.open(run, evaluation)))
+
+    @api.get("/{run}/report")
+    def show_report(run: str) -> Response:
+        """The report of a run, as `roboeval run` or `roboeval report` has written it there."""
+        with _refusing():
+            text = store.report(run)
+        if text is None:
+            raise HTTPException(404, "this run has no report")
+        # A folder from elsewhere may hold any page in place of a report: nothing in it may run.
+        headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+        return HTMLResponse(text, headers=headers)
 
     @api.get("/{run}/completions")
     def list_completions(

@@ -11,6 +11,7 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText
+from roboeval.web.difference import draw_difference
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
@@ -18,7 +19,7 @@ from roboeval.web.snapshot import Filter, Snapshot
 from roboeval.web.widgets import EVERY, HeatMap, count_text, score_text, show_state
 
 MOST = 12  # runs side by side; more are no comparison
-MOST_NAME = 60
+MOST_NAME, PAIR = 60, 2
 NOT_ALIKE = "These runs were judged by different suites or versions of a suite. Compare with care."
 
 
@@ -44,6 +45,7 @@ class _Comparison:
         self._versions: list[Hashable] = []
         self._troubles = ui.element("div").props("role=status")
         self._list = ui.element("ul").classes("beside-list")
+        self._difference = ui.element("section").classes("pane").props('aria-label="Which is better"')
         with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
             PlainText("h2", "Where they pass").props("id=h-heat")
             self._tasks = HeatMap("Tasks by prompts, run by run", "Task")
@@ -91,6 +93,12 @@ class _Comparison:
         ]
         self._tasks.show(groups=groups, rows=rows)
         judged = [run for run in runs if run.judged]
+        self._difference.clear()
+        self._difference.set_visibility(len(judged) == PAIR)
+        if len(judged) == PAIR:
+            with self._difference:
+                PlainText("h2", "Which is better")
+                draw_difference(judged)
         columns = [_head(run) for run in judged]
         self._kinds.show(groups=[{"name": "", "columns": columns}], rows=failure_rows(judged))
 

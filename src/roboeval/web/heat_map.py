@@ -11,7 +11,7 @@ from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import mean_of
 from roboeval.analysis.summary import Failures
 from roboeval.analysis.tasks import by_hand
-from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.failures import label_of, plural_of
 from roboeval.web.snapshot import Filter, Snapshot
 
 STEPS = 10
@@ -73,8 +73,8 @@ class TaskCells:
     @property
     def columns(self) -> list[dict[str, Any]]:
         """The mean over the prompts, and a column for each prompt."""
-        numbers = [{"name": str(n), "title": f"prompt {n}"} for n in range(self._prompts)]
-        return [{"name": "all", "title": "mean over the prompts"}, *numbers]
+        numbers = [{"name": f"prompt {n}", "title": f"prompt {n} of each task"} for n in range(self._prompts)]
+        return [{"name": "mean", "title": "mean over the prompts"}, *numbers]
 
     def row(self, task: str) -> list[dict[str, Any]]:
         """The cells of a task."""
@@ -111,23 +111,32 @@ class TaskCells:
 
 
 def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
-    """Kinds of failures by run, of which something was judged; the most frequent first."""
+    """Failures by run, of which something was judged: each class with its kinds, the most frequent first."""
     found = [{(of.name, kind.name): kind for of in run.failures for kind in of.kinds} for run in runs]
     most: dict[tuple[str, str], float] = {}
     for kinds in found:
         most |= {key: max(kind.share, most.get(key, 0.0)) for key, kind in kinds.items()}
-    return [
-        {
-            "name": f"{shortened(label_of(failure), MOST_NAME)}: {shortened(kind, MOST_NAME)}",
-            "cells": [
-                _failure_cell(
-                    run, Filter(failure_class=failure, failure_kind=kind), kinds.get((failure, kind))
-                )
-                for run, kinds in zip(runs, found, strict=True)
-            ],
-        }
-        for failure, kind in sorted(most, key=lambda key: -most[key])
-    ]
+    classes = [{of.name: of for of in run.failures} for run in runs]
+    largest: dict[str, float] = {}
+    for known in classes:
+        largest |= {name: max(of.share, largest.get(name, 0.0)) for name, of in known.items()}
+    rows = []
+    for name in sorted(largest, key=lambda name: -largest[name]):
+        totals = [known.get(name) for known in classes]
+        rows.append(_failure_row(plural_of(name), runs, Filter(failure_class=name), totals, "of-all"))
+        for kind in sorted((k for of, k in most if of == name), key=lambda kind: -most[name, kind]):
+            chosen = Filter(failure_class=name, failure_kind=kind)
+            rows.append(
+                _failure_row(kind, runs, chosen, [kinds.get((name, kind)) for kinds in found], "of-class")
+            )
+    return rows
+
+
+def _failure_row(
+    name: str, runs: Sequence[Snapshot], chosen: Filter, failures: Sequence[Failures | None], look: str
+) -> dict[str, Any]:
+    cells = [_failure_cell(run, chosen, one) for run, one in zip(runs, failures, strict=True)]
+    return {"name": shortened(name, MOST_NAME), "look": look, "cells": cells}
 
 
 def _failure_cell(run: Snapshot, chosen: Filter, kind: Failures | None) -> dict[str, Any]:

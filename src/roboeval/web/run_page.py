@@ -19,6 +19,7 @@ from roboeval.web.snapshot import Filter, Snapshot
 from roboeval.web.widgets import EVERY, CompletionList, HeatMap, count_text, score_text, show_state
 
 MOST_NAME = 80
+SCROLL = "document.getElementById('completions').scrollIntoView()"
 GONE = "This run was deleted or renamed. What you see was read before that."
 
 
@@ -72,6 +73,7 @@ class _RunPage:
 
     def _choose_cell(self, task: str, prompt: int | None) -> None:
         self._choose(replace(self._chosen, task=task, prompt=prompt))
+        ui.run_javascript(SCROLL)
 
     def _choose_kind(self, kind: Filter) -> None:
         self._choose(replace(kind, task=self._chosen.task, prompt=self._chosen.prompt))
@@ -149,6 +151,8 @@ def _draw_head(run: Snapshot) -> None:
         for sentence in data["notes"]:
             PlainText("li", sentence, "unsure")
     with ui.element("p").classes("facts"):
+        if (run.results.run.path / "report" / "index.html").is_file():
+            html.a("The report of this run", href=f"/api/runs/{quote(run.name, safe='')}/report")
         for other in run.evaluations if len(run.evaluations) > 1 else ():
             link = html.a(shortened(other, MOST_NAME), href=address(run.name) + Filter().query(other))
             if other == key:

@@ -20,6 +20,7 @@ from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
 from roboeval.web.snapshot import Snapshot
 
 MOST_HELD = 16  # evaluations that stay in memory
+MOST_REPORT = 100_000_000  # bytes of its page
 REST = 10  # a run is not read again before this many times as long as reading it took
 OUTSIDE = "leads outside the folder of runs, so it is not read"
 
@@ -49,6 +50,14 @@ class RunStore:
     def version(self, name: str) -> Hashable:
         """The version that a run would have if it was opened now; it is not read."""
         return self._reader(name, None).version()
+
+    def report(self, name: str) -> bytes | None:
+        """The page of the report in a run's folder; None if there is none."""
+        path = self._reader(name, None).folder / "report" / "index.html"
+        if _stamp(path, self.folder.resolve()) is None:
+            return None
+        with path.open("rb") as file:
+            return file.read(MOST_REPORT)
 
     def suite(self, name: str) -> Suite | None:
         """A suite that ships, is installed or was named; None if it is not at hand."""
@@ -99,6 +108,11 @@ class _Reader:
         self._stamps: Stamps = ()
         self._rests_until = 0.0
         self._snapshot: Snapshot | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Where the run is."""
+        return self._run.path
 
     def read(self) -> Snapshot:
         with self._lock:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page
 
-DESK, TABLET, PHONE = (1440, 900), (820, 1180), (390, 844)
+DESK, TABLET, PHONE = (1440, 900), (768, 1024), (390, 844)
 """Width and height of screens, in pixels."""
 
 OpenPage: TypeAlias = Callable[..., Page]

@@ -75,6 +75,22 @@ def test_one_run_has_the_numbers_of_show(server: PageServer, folder: Path) -> No
     assert {(each["class"], each["kind"]): each["count"] for each in run["failures"]} == failed
 
 
+def test_the_report_of_a_run_opens(server: PageServer, folder: Path) -> None:
+    assert server.call("GET", "/api/runs/hasty/report").status == 200
+    report = folder / "hasty" / "report"
+    shutil.rmtree(report)
+    assert server.call("GET", "/api/runs/hasty/report").status == 404
+    report.mkdir()
+    (report / "index.html").write_text("<p>all is well</p>")
+    answer = server.call("GET", "/api/runs/hasty/report")
+    assert (answer.status, "all is well" in answer.text) == (200, True)
+    assert server.ask("GET", "/api/runs/hasty/report").status == 401
+    (report / "index.html").unlink()
+    (report / "index.html").symlink_to("/etc/hostname")
+    refused = server.call("GET", "/api/runs/hasty/report")
+    assert (refused.status, "outside" in refused.text) == (422, True)
+
+
 def test_completions_come_in_parts(server: PageServer) -> None:
     path = "/api/runs/hasty/completions"
     whole = told(server, f"{path}?limit=1000")
@@ -290,6 +306,7 @@ def test_the_api_is_described(server: PageServer) -> None:
         "/api/runs",
         "/api/runs/{run}",
         "/api/runs/{run}/completions",
+        "/api/runs/{run}/report",
         "/api/runs/{run}/completions/{task}/{prompt}/{index}",
     }
     page = server.call("GET", "/api").text

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.folder import Run
 from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, percent, shade
 from roboeval.web.run_store import RunStore
@@ -35,7 +36,7 @@ def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) 
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:30]))
     run = RunStore(runs).open("hasty")
     cells = TaskCells(run, chosen, "paper")
-    assert [each["name"] for each in cells.columns] == ["all", *"01234"]
+    assert [each["name"] for each in cells.columns] == ["mean", *(f"prompt {n}" for n in range(5))]
     completions = run.completions.to_dicts()
     for task in cells.tasks:
         mean, *prompts = cells.row(task)
@@ -60,13 +61,13 @@ def test_what_a_filter_counts_is_said_in_words() -> None:
     assert failure_text(Filter(failure_class="PythonError", failure_kind="NameError")) == "NameError"
 
 
-def test_kinds_of_failures_by_run(runs: Path) -> None:
+def test_failures_by_run_each_class_with_its_kinds(runs: Path) -> None:
     run = RunStore(runs).open("hasty")
-    kinds = {kind.name: kind for of in run.failures for kind in of.kinds}
+    expected = []
+    for of in sorted(run.failures, key=lambda of: -of.share):
+        expected.append(("of-all", plural_of(of.name), percent(of.share)))
+        expected += [("of-class", kind.name, percent(kind.share)) for kind in of.kinds]
     rows = failure_rows([run, run])
-    assert len(rows) == len(kinds)
-    shares = [kinds[row["name"].partition(": ")[2]].share for row in rows]
-    assert shares == sorted(shares, reverse=True)
-    for row, share in zip(rows, shares, strict=True):
-        assert [cell["text"] for cell in row["cells"]] == [percent(share)] * 2
+    assert [(row["look"], row["name"], row["cells"][0]["text"]) for row in rows] == expected
+    assert all(row["cells"][0] == row["cells"][1] for row in rows)
     assert failure_rows([]) == []

@@ -25,8 +25,8 @@ export default {
         </thead>
         <tbody>
           <tr v-for="row in rows" :key="row.name">
-            <th scope="row" class="name" dir="auto"><template v-for="piece in pieces(row.name)">{{ piece }}<wbr></template></th>
-            <td v-for="cell in row.cells" :class="cell.shade">
+            <th scope="row" :class="['name', row.look]" dir="auto"><template v-for="piece in pieces(row.name)">{{ piece }}<wbr></template></th>
+            <td v-for="cell in row.cells" :class="[cell.shade, row.look]">
               <a v-if="cell.href" :href="cell.href" :title="cell.title" :aria-label="cell.title"
                 :aria-current="cell.here ? 'true' : null" @click="choose($event, cell)">{{ cell.text }}</a>
               <span v-else>{{ cell.text }}</span>

@@ -1,0 +1,45 @@
+"""Two runs task by task: the differences that `roboeval compare` has, and the completions behind them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from command_line import roboeval
+from roboeval.web.difference import task_rows
+from roboeval.web.run_store import RunStore
+
+
+def test_differences_are_those_of_compare_the_largest_first(tmp_path: Path) -> None:
+    for name in ("hasty", "careful"):
+        words = (
+            "evaluate",
+            f"recorded:{name}",
+            "--out",
+            tmp_path / name,
+            "--tasks",
+            "LunchTime,SayGoodDay,GetDrink",
+        )
+        assert roboeval(*words).status == 0
+    store = RunStore(tmp_path)
+    first, second = store.open("hasty"), store.open("careful")
+    rows = task_rows(first, second)
+    told = json.loads(roboeval("compare", tmp_path / "hasty", tmp_path / "careful", "--json").out)
+    theirs = {one["task"]: one["second"] - one["first"] for one in told["tasks"]}
+    assert {row.task: row.difference.mean for row in rows} == pytest.approx(theirs)
+    assert [abs(row.difference.mean) for row in rows] == pytest.approx(
+        sorted(map(abs, theirs.values()), reverse=True)
+    )
+    for row in rows:
+        assert row.shares[1] - row.shares[0] == pytest.approx(row.difference.mean)
+        assert row.difference.low <= row.difference.mean <= row.difference.high
+        passed = [
+            {r[:3]: r[3] for r in run.completions.select("task", "prompt", "index", "passed").iter_rows()}
+            for run in (first, second)
+        ]
+        both = [key for key in passed[0] if key[0] == row.task and key in passed[1]]
+        expected = {key: passed[1][key] for key in both if passed[0][key] != passed[1][key]}
+        assert dict(row.differing) == expected
+        assert expected
