@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from roboeval.analysis.cluster import Cluster, clusters, groups
 from roboeval.analysis.summary import ALL, Causes, causes
 from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences, verdict_changes
+from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun
@@ -35,6 +36,15 @@ def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple
         if with_published and (model := paper.model_of(run)) is not None:
             found.append((f"{run.name}, published", paper.causes(model)))
     return found
+
+
+def most_frequent(run: JudgedRun) -> str:
+    """The most frequent kind of failure with its share of all completions, in words; empty if none fails."""
+    counts = {key: count for key, count in causes(run.table).counts.items() if key[1] != ALL}
+    if not counts:
+        return ""
+    (of, kind), count = max(counts.items(), key=lambda one: one[1])
+    return f"{kind} ({plural_of(of)}), {count / run.completions.height:.0%} of all completions"
 
 
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:

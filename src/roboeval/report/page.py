@@ -13,6 +13,8 @@ from roboeval.analysis.cluster import Cluster
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report.sheets import (
+    Card,
+    Cards,
     Cell,
     Code,
     Column,
@@ -53,9 +55,16 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Ma
         f"<title>{_text(title)}</title>\n<style>\n{STYLE.read_text()}</style>\n</head>\n<body>\n"
         f'<a class="skip" href="#main">To the results</a>\n'
         f"<header><h1>{_text(title)}</h1>{paragraphs}</header>\n"
-        f'<nav aria-label="Sections"><ol>{links}</ol></nav>\n'
+        f'<nav aria-label="Sections"><ol>{links}</ol></nav>\n{_files(sections)}'
         f'<main id="main">\n{body}</main>\n<script>{script}</script>\n</body>\n</html>\n'
     )
+
+
+def _files(sections: Sequence[Section]) -> str:
+    """Links to the tables as files, which lie beside the page."""
+    names = [part.name for section in sections for part in section.parts if isinstance(part, Sheet)]
+    links = ", ".join(f'<a href="tables/{_text(name)}.csv">{_text(name)}</a>' for name in names)
+    return f'<p class="files">Tables as CSV: {links}</p>\n' if names else ""
 
 
 def _text(words: str) -> str:
@@ -83,8 +92,24 @@ def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
             return "".join(f"<p>{_text(words)}</p>\n" for words in paragraphs)
         case Code(text):
             return f"<pre>{_text(text)}</pre>\n"
+        case Cards(cards):
+            return f'<div class="cards">{"".join(map(_card, cards))}</div>\n'
         case Groups(shown):
             return f'<div class="clusters">{"".join(_cluster(*one) for one in shown)}</div>\n'
+
+
+def _card(card: Card) -> str:
+    estimate = card.passed
+    low, high = (100 * end for end in (estimate.low, estimate.high))
+    bar = f'<i style="width: {100 * estimate.mean:.1f}%"></i>'
+    bar += f'<u style="left: {low:.1f}%; width: {high - low:.1f}%"></u>'
+    failure = f"Most frequent failure: {_text(card.failure)}." if card.failure else "Every program passes."
+    cost = f"<p>{_text(card.cost)}</p>" if card.cost else ""
+    return (
+        f'<article class="card"><h3>{_text(card.name)}</h3><p><b>{estimate.mean:.3f}</b> pass@1</p>'
+        f'<div class="bar" aria-hidden="true">{bar}</div>'
+        f"<p>95 % interval {estimate.low:.3f} to {estimate.high:.3f}</p><p>{failure}</p>{cost}</article>"
+    )
 
 
 # --- figures

@@ -111,6 +111,17 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     return section("differences", Prose(said), sheet("differences", rows, notes=notes))
 
 
+def leader(runs: Sequence[JudgedRun]) -> list[str]:
+    """Who is ahead of the next, and how sure that is, in a sentence; nothing for one run."""
+    if len(runs) == 1:
+        return []
+    best, second, *_ = sorted(runs, key=lambda run: -run.mean)
+    try:
+        return [verdict(compared(second.by_prompt, best.by_prompt), (second.name, best.name))]
+    except UserError:  # no prompt in common
+        return []
+
+
 def _pairs(runs: Sequence[JudgedRun]) -> list[tuple[JudgedRun, JudgedRun]]:
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MOST_PAIRS:

@@ -14,10 +14,12 @@ from matplotlib.figure import Figure
 
 from codebotler.core.yaml_files import Loader
 from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.metrics import Estimate
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.table import storable, write_table
 
-Kind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number"]
+Kind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number", "p"]
+SMALLEST_P = 0.001
 Cell: TypeAlias = str | int | float | None
 
 
@@ -88,7 +90,22 @@ class Groups(NamedTuple):
     shown: Sequence[tuple[str, Cluster]]
 
 
-Part: TypeAlias = Sheet | Picture | Prose | Code | Groups
+class Card(NamedTuple):
+    """A run at a glance."""
+
+    name: str
+    passed: Estimate  # pass@1
+    failure: str  # the most frequent one, in words; empty where none failed
+    cost: str  # in words; empty where it is not known
+
+
+class Cards(NamedTuple):
+    """Runs at a glance."""
+
+    cards: Sequence[Card]
+
+
+Part: TypeAlias = Sheet | Picture | Prose | Code | Groups | Cards
 
 
 class Section(NamedTuple):
@@ -105,7 +122,7 @@ def section(name: str, *parts: Part) -> Section:
 
 def _is_empty(part: Part) -> bool:
     match part:
-        case Sheet(rows=content) | Prose(content) | Groups(content):
+        case Sheet(rows=content) | Prose(content) | Groups(content) | Cards(content):
             return not content
     return False
 
@@ -136,10 +153,8 @@ def _heads(columns: Sequence[Column]) -> list[str]:
 
 def told(cell: Cell, kind: Kind) -> str:
     """A cell as text for people."""
-    if cell is None:
-        return "-"
-    if isinstance(cell, str):
-        return label_of(cell) if kind == "class" else cell
+    if cell is None or isinstance(cell, str):
+        return "-" if cell is None else label_of(cell) if kind == "class" else cell
     match kind:
         case "share":
             return f"{cell:.3f}"
@@ -147,4 +162,6 @@ def told(cell: Cell, kind: Kind) -> str:
             return f"{cell:+.3f}" if round(cell, 3) else "0.000"
         case "count":
             return f"{cell:,}"
+        case "p":
+            return "< 0.001" if cell < SMALLEST_P else f"{cell:.3f}"
     return f"{cell:,.4g}"

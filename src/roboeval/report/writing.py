@@ -9,6 +9,7 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
+from roboeval.analysis.metrics import overall
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.table import Price
 from roboeval.report import breakdown, cost, failures, scores
@@ -16,6 +17,8 @@ from roboeval.report.drawing import darkened, styled, written
 from roboeval.report.page import GENERATOR, Drawn, page
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import (
+    Card,
+    Cards,
     Cell,
     Code,
     Picture,
@@ -55,6 +58,7 @@ def sections(
 ) -> list[Section]:
     """All sections of a report about runs that the same suite judged."""
     found = [
+        glance(runs, prices),
         scores.results(runs),
         scores.differences(runs),
         failures.beside(runs),
@@ -69,6 +73,15 @@ def sections(
         origin(runs, command),
     ]
     return [section for section in found if section.parts]
+
+
+def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
+    """Each run in a few lines, who is ahead, and how sure that is."""
+    cards = [
+        Card(run.name, overall(run.scores, 1), failures.most_frequent(run), cost.in_words(run, prices))
+        for run in runs
+    ]
+    return section("glance", Cards(cards), Prose(scores.leader(runs)))
 
 
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:

@@ -10,7 +10,7 @@ import pytest
 from made_up_runs import HOSTILE, UNCHECKED, cases, made_up
 from roboeval.report.page import page
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Picture, Section
+from roboeval.report.sheets import Picture, Section, told
 from roboeval.report.writing import expect_no_others, pieces, sections, write_report
 
 
@@ -70,11 +70,34 @@ def test_a_page_is_one_whole_file(case: str, usual: Path) -> None:
     tags = Tags(text)
     assert tags.tags.count("script") == 1
     addresses = [value for name, value in tags.attributes if name in {"src", "href", "srcset"}]
-    assert all(value and value.startswith(("#", "data:image/svg+xml;base64,")) for value in addresses)
+    files = {value for value in addresses if value and re.fullmatch(r"tables/[\w-]+\.csv", value)}
+    inside = ("#", "data:image/svg+xml;base64,")
+    assert all(value in files or (value and value.startswith(inside)) for value in addresses)
     assert not re.search(r"https?://(?!www\.w3\.org)", text)
     targets = {value for name, value in tags.attributes if name == "id"}
     assert {value[1:] for value in addresses if value and value.startswith("#")} <= targets
     assert [name for name, _ in tags.attributes if name.startswith("on")] == []
+
+
+def test_the_first_screen_says_who_is_ahead_and_what_fails_most() -> None:
+    runs = [
+        made_up("weak", {"Visit": (3, 3), "Wait": (3, 3)}),
+        made_up("strong", {"Visit": (10, 10), "Wait": (10, 10)}),
+    ]
+    glance = sections(runs)[0]
+    assert glance.name == "glance"
+    text = shown(runs)
+    first = text[text.index('<section id="glance"') : text.index('<section id="results"')]
+    assert first.count('<article class="card">') == 2
+    assert "<b>0.300</b> pass@1" in first
+    assert re.search(r"Most frequent failure: \w+ \([\w ]+\), \d+% of all completions\.", first)
+    assert "Every program passes." in first
+    assert re.search(r"<p>strong (is better|passes more often) than weak by 70\.0 points", first)
+    assert '<a href="tables/overall.csv">overall</a>' in text
+
+
+def test_a_p_that_is_nothing_is_said_to_be_small() -> None:
+    assert [told(p, "p") for p in (0.00002, 0.001, 0.25, None)] == ["< 0.001", "0.001", "0.250", "-"]
 
 
 def test_names_of_models_are_text() -> None:
