@@ -106,7 +106,8 @@ def _drive(step: Mapping[str, Any], request: str) -> Text:
     if step["to"] is None:
         return Text.assemble((f"{start}{request}", "bold"), ("  failed: there is no such room", "red"))
     drive = Text(start + visible(step["to"]), "bold")
-    return drive if step["to"] == step["text"] else drive.append(f"  (asked for {request})", "not bold")
+    is_same = step["to"].lower() == step["text"].lower()
+    return drive if is_same else drive.append(f"  (asked for {request})", "not bold")
 
 
 def _options(options: Sequence[str | Mapping[str, str]]) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache, partial
+import ast
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache, lru_cache, partial
 from typing import Any
 
 from codebotler.checking.storyboard import steps_of
+from codebotler.core.program import parsed
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event, Trace, trace_from
 from codebotler.core.words import counted
@@ -21,6 +24,8 @@ CHANGED = "the suite has changed since this was judged"
 CUT = "the trace was too long to keep, so this cannot be explained"
 TOO_LONG = "the traces of this program are too long to explain this as well"
 
+LOWERED = "The suite lowers a program's texts before it runs; here they have the program's capitals."
+MOST_TEXTS = 200  # of a program, whose capitals are shown
 MOST_LINES = 1_000  # of a program that is shown
 MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
 EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one
@@ -46,6 +51,7 @@ def completion_data(
     return {
         **{key: row[key] for key in (*KEY, "passed", "failure")},
         **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
+        "lowered": suite is not None and suite.rules.literals == "lowercase",
         "worlds": [
             _world_data(verdict, _scenario(suite, row, number, ablated=ablated), patience)
             for number, verdict in enumerate(row["verdicts"])
@@ -119,6 +125,45 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
     """The line and the message of the error by which a run ended; either may be unknown."""
     where = "" if verdict["line"] is None else f"line {verdict['line']}"
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
+
+
+def as_written(steps: Sequence[Mapping[str, Any]], program: str | None) -> list[dict[str, Any]]:
+    """The steps of a program whose texts were lowered, with the capitals it has, where they are clear."""
+    spellings = _spellings(program or "")
+    if not spellings:
+        return [dict(step) for step in steps]
+    pattern = re.compile("|".join(map(_whole, spellings)))
+
+    def spelled(value: object) -> object:
+        if isinstance(value, list):
+            return [spelled(one) for one in value]
+        return pattern.sub(lambda match: spellings[match[0]], value) if isinstance(value, str) else value
+
+    texts = ("text", "options", "answer")
+    return [
+        {name: spelled(value) if name in texts else value for name, value in step.items()} for step in steps
+    ]
+
+
+def _whole(text: str) -> str:
+    start, end = (r"\b" if edge.isalnum() else "" for edge in (text[0], text[-1]))
+    return f"{start}{re.escape(text)}{end}"
+
+
+@lru_cache(maxsize=64)
+def _spellings(program: str) -> dict[str, str]:
+    """The texts in a program that have capitals, by how they are lowered, the longest first."""
+    tree = parsed(program)
+    if not isinstance(tree, ast.Module):
+        return {}
+    written: dict[str, set[str]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.strip():
+            text = node.value.strip()
+            written.setdefault(text.lower(), set()).add(text)
+    sure = {low: texts.pop() for low, texts in written.items() if len(texts) == 1}
+    known = sorted((low for low, text in sure.items() if low != text), key=len, reverse=True)
+    return {low: sure[low] for low in known[:MOST_TEXTS]}
 
 
 def shown_lines(program: str) -> tuple[str, int]:

@@ -17,7 +17,7 @@ from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.tasks import by_hand
-from roboeval.evaluation.explanation import NOT_RECORDED, cut_told, error_sentence
+from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, as_written, cut_told, error_sentence
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import Key, name_of
 from roboeval.suites.task import describe_person
@@ -39,7 +39,7 @@ async def draw_completion(
     _draw_head(snapshot, data, chosen, chosen.query(evaluation))
     with ui.element("div").classes("one-program"):
         _draw_program(data)
-        _draw_worlds(data["worlds"], _worlds(snapshot, data["task"]))
+        _draw_worlds(data, _worlds(snapshot, data["task"]))
 
 
 def _read(store: RunStore, run: str, name: str, evaluation: str | None) -> tuple[Snapshot, dict[str, Any]]:
@@ -97,8 +97,14 @@ def _draw_program(data: Mapping[str, Any]) -> None:
             PlainText("p", f"{view.left_out:,} more lines; all are in completions.jsonl.", "quiet")
 
 
-def _draw_worlds(judged: Sequence[Mapping[str, Any]], worlds: Mapping[str, World]) -> None:
+def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> None:
+    judged = completion["worlds"]
     with ui.element("div").classes("worlds-of"):
+        if completion["lowered"]:
+            program = completion["program"]
+            judged = [{**world, "steps": as_written(world["steps"], program)} for world in judged]
+        if judged != completion["worlds"]:
+            PlainText("p", LOWERED, "quiet")
         if not judged:
             PlainText("p", "It has not been judged yet.", "quiet")
         for number, data in enumerate(judged, 1):

@@ -21,7 +21,7 @@ from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
-from roboeval.evaluation.explanation import completion_data
+from roboeval.evaluation.explanation import LOWERED, as_written, completion_data
 from roboeval.evaluation.judge import judge, judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
@@ -346,3 +346,31 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
     assert "never said" in why[0]
     assert "too long" in why[-1]
     assert 0 < sum(compared) <= 100_000
+
+
+@pytest.mark.parametrize(
+    ("program", "text", "shown"),
+    [
+        ("say('Good Day')", "good day", "Good Day"),
+        ("say('Good Day, ' + name + '!')\nname = 'Amy'", "good day, amy!", "Good Day, Amy!"),
+        ("say('NO'); say('no')", "no", "no"),  # either may be meant
+        ("say('Bo')", "bottle", "bottle"),
+        ("say(f'Hello {name}.')", "hello ann.", "Hello ann."),
+        ("not a program (", "good day", "good day"),
+    ],
+)
+def test_texts_have_the_capitals_of_the_program_where_they_are_clear(
+    program: str, text: str, shown: str
+) -> None:
+    (step,) = as_written([{"step": 1, "kind": "say", "text": text}], program)
+    assert step == {"step": 1, "kind": "say", "text": shown}
+
+
+def test_a_program_whose_texts_were_lowered_is_shown_with_its_capitals() -> None:
+    said = Outcome(Status.FINISHED, (GOTO, Event("say", "good day")))
+    for literals, told in (("lowercase", '"Good Day"'), ("as-written", '"good day"')):
+        suite = replace(SUITE, rules=replace(SUITE.rules, literals=literals))
+        written = replace(completion(), program="def task_program():\n    say('Good Day')\n")
+        text = printed(completion_view(row(written, said), written, suite), 120)
+        assert f"said {told}" in text
+        assert (LOWERED in text) is (literals == "lowercase")

@@ -14,7 +14,15 @@ from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible
 from roboeval.analysis.tasks import by_hand
 from roboeval.cli.views.results import kind_view, prompt_lines
-from roboeval.evaluation.explanation import GONE, NOT_RECORDED, cut_told, error_sentence, shown_lines
+from roboeval.evaluation.explanation import (
+    GONE,
+    LOWERED,
+    NOT_RECORDED,
+    as_written,
+    cut_told,
+    error_sentence,
+    shown_lines,
+)
 from roboeval.evaluation.runs.completions import name_of
 
 EXPLANATION = 2_000
@@ -51,8 +59,13 @@ def completion_view(data: Mapping[str, Any]) -> RenderableType:
     parts: list[RenderableType] = [_completion_head(data)]
     if data["program"] is not None:
         parts += [Text(), *_program(data["program"], lines)]
-    for number, world in enumerate(data["worlds"], 1):
-        parts += [Text(), *_world(world, f"World {number} of {len(data['worlds'])}: ")]
+    worlds = data["worlds"]
+    if data["lowered"]:
+        worlds = [{**world, "steps": as_written(world["steps"], data["program"])} for world in worlds]
+    if worlds != data["worlds"]:
+        parts += [Text(), Text(LOWERED, "dim")]
+    for number, world in enumerate(worlds, 1):
+        parts += [Text(), *_world(world, f"World {number} of {len(worlds)}: ")]
     return Group(*parts)
 
 
