@@ -22,7 +22,7 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
     steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
     parts = (
-        Picture("rejection-sampling", lambda: figures.limits(points)),
+        Picture("rejection-sampling", lambda: figures.limits(points, figures.most_completions(runs))),
         retries_sheet(checked),
         Picture("accepted", lambda: figures.accepted(shares)),
         curves_sheet(points),

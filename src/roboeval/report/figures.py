@@ -15,8 +15,8 @@ from matplotlib.patches import Patch
 
 from roboeval.analysis.metrics import TaskScore, threshold_curve
 from roboeval.analysis.resample import LIMITS
-from roboeval.analysis.summary import PASSED, Causes, kinds_in_order
-from roboeval.evaluation.failures import CLASSES, label_of
+from roboeval.analysis.summary import ALL, PASSED, Causes, kinds_in_order
+from roboeval.evaluation.failures import CLASSES, plural_of
 from roboeval.report.drawing import (
     COLOURS,
     DASHES,
@@ -36,7 +36,18 @@ from roboeval.report.drawing import (
 from roboeval.report.runs import JudgedRun, tasks_of
 
 MOST_COLOURS = len(COLOURS)
-LOWEST = 1e-3  # where the paper ends its axis
+POWERS = (0.1, 0.01, 0.001)  # that an axis of thresholds marks
+APART = 1.6  # ratio of two marks on it that can be told apart
+HATCHES = (
+    "",
+    "////",
+    "....",
+    "\\\\\\\\",
+    "xxxx",
+    "----",
+    "",
+    "++++",
+)  # of bars, for those who see no colours
 A_ROW = 8  # tasks beside each other
 FEWEST = 4  # tasks to leave room for, lest a single bar fill a page
 SHORT_NAME = 16  # letters up to which two names fit beside each other below a narrow figure
@@ -74,7 +85,10 @@ def bars(runs: Sequence[JudgedRun]) -> Figure:
             axes.set_ylabel("" if column else "pass@1")
             axes.set_title(title if ablated and not row else "", loc="left")
     names = [short_name(run.name) for run in runs]
-    handles = [Patch(color=colour, label=name) for colour, name in zip(COLOURS, names, strict=False)]
+    handles = [
+        Patch(facecolor=colour, hatch=hatch, edgecolor=PAPER, label=name)
+        for colour, hatch, name in zip(COLOURS, HATCHES, names, strict=False)
+    ]
     columns = min(len(runs), 5 if max(map(len, names)) <= SHORT_NAME else 3)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, handlelength=1.0)
     return figure
@@ -94,7 +108,8 @@ def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[
         means = [score.pass_at(1).mean for _, score in there]
         below = [max(0.0, mean - score.lowest(1)) for mean, (_, score) in zip(means, there, strict=True)]
         above = [max(0.0, score.highest(1) - mean) for mean, (_, score) in zip(means, there, strict=True)]
-        axes.bar(places, means, width * 0.92, color=COLOURS[number], yerr=[below, above], error_kw=line)
+        look: dict[str, Any] = {"color": COLOURS[number], "hatch": HATCHES[number], "edgecolor": PAPER}
+        axes.bar(places, means, width * 0.92, linewidth=0, yerr=[below, above], error_kw=line, **look)
         zeros = [place for place, mean in zip(places, means, strict=True) if mean == 0]
         if zeros:
             axes.plot(zeros, [0] * len(zeros), "o", color=COLOURS[number], markersize=2.2, clip_on=False)
@@ -137,13 +152,19 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 
 
 def thresholds(runs: Sequence[JudgedRun]) -> Figure:
-    """The share of prompts by threshold of pass@1, one line a model, on the paper's axis."""
-    lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()])) for run in runs}
+    """The share of prompts by threshold of pass@1, one line a model, down to one completion of a prompt."""
+    most = most_completions(runs)
+    lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
     means = [run.mean for run in runs]
     figure = _line_a_model(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
-    _threshold_axes(figure.axes[0])
-    _threshold_labels(figure.axes[0])
+    _threshold_axes(figure.axes[0], most)
+    _threshold_labels(figure.axes[0], most)
     return figure
+
+
+def most_completions(runs: Sequence[JudgedRun]) -> int:
+    """The most completions that a prompt has; at least 2, since an axis needs two ends."""
+    return max(2, *(prompt.n for run in runs for score in run.scores for prompt in score.prompts))
 
 
 def accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
@@ -193,23 +214,26 @@ def _line_a_model(
     return figure
 
 
-def _steps(points: Points) -> Points:
-    """The part of a curve that is on the axis."""
-    shown = [(threshold, share) for threshold, share in points if threshold >= LOWEST]
-    return [*shown, (LOWEST, shown[-1][1])]
+def _steps(points: Points, most: int) -> Points:
+    """The part of a curve that is on the axis, which ends at one of so many completions."""
+    end = 1 / most
+    shown = [(threshold, share) for threshold, share in points if threshold >= end]
+    return [*shown, (end, shown[-1][1])]
 
 
-def _threshold_axes(axes: Axes) -> None:
+def _threshold_axes(axes: Axes, most: int) -> None:
     """Set what shared axes have in common: once for one of them, since it is slow and sets all."""
     axes.set_xscale("log")
-    axes.set_xlim(1, LOWEST)
-    axes.set_xticks([1, 0.1, 0.01, LOWEST], ["1", "0.1", "0.01", "0.001"])
+    axes.set_xlim(1, 1 / most)
+    marked = [power for power in POWERS if power * most >= APART]
+    axes.set_xticks([1, *marked, 1 / most], ["1", *(f"{power:g}" for power in marked), f"1/{most}"])
     share_axis(axes)
 
 
-def _threshold_labels(axes: Axes) -> None:
+def _threshold_labels(axes: Axes, most: int) -> None:
     axes.minorticks_off()  # which matplotlib would draw one by one
-    between = [digit * power for power in (0.1, 0.01, LOWEST) for digit in range(2, 10)]
+    marks = (digit * power for power in POWERS for digit in range(2, 10))
+    between = [mark for mark in marks if mark > 1 / most]
     small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
     axes.plot(between, [0] * len(between), color=INK, clip_on=False, linestyle="none", **small)
     axes.grid(visible=True, axis="y")
@@ -217,19 +241,19 @@ def _threshold_labels(axes: Axes) -> None:
     axes.set_ylabel("prompts that reach it")
 
 
-def limits(curves: Mapping[str, Mapping[int, Points]]) -> Figure:
+def limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
     """For each model and limit of retries, the share of prompts by threshold."""
     columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MOST_COLOURS else 5)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(WIDE if columns > 1 else NARROW, 1.75 * rows + 0.55)
     all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    _threshold_axes(all_axes[0, 0])
+    _threshold_axes(all_axes[0, 0], most)
     for axes in all_axes.flat[len(curves) :]:
         axes.set_visible(False)
     for axes, (name, of_limits) in zip(all_axes.flat, curves.items(), strict=False):
         for at, (limit, points) in enumerate(of_limits.items()):
             axes.plot(
-                *zip(*_steps(points), strict=True),
+                *zip(*_steps(points, most), strict=True),
                 color=COLOURS[at - 1] if at else INK,
                 linestyle=DASHES[at % len(DASHES)],
                 linewidth=1.3 if at else 1.0,
@@ -237,7 +261,7 @@ def limits(curves: Mapping[str, Mapping[int, Points]]) -> Figure:
                 drawstyle="steps-post",
                 clip_on=False,
             )
-        _threshold_labels(axes)
+        _threshold_labels(axes, most)
         axes.set_title(short_name(name), loc="left")
         axes.label_outer()
     handles, labels = all_axes[0, 0].get_legend_handles_labels()
@@ -303,7 +327,8 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
     for name, colour, hatch in zip((PASSED, *CLASSES), colours, hatches, strict=False):
         shares = np.array([one.classes.get(name, 0.0) for _, one in found])
         style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.4}
-        axes.barh(places, shares, 0.72, left=left, label=label_of(name), **style)
+        label = name if name == PASSED else plural_of(name)
+        axes.barh(places, shares, 0.72, left=left, label=label, **style)
         left = left + shares
     axes.set_yticks(places, [short_name(name, 34) for name, _ in found])
     axes.set_ylim(len(found) - 0.5, -0.5)
@@ -311,11 +336,17 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
     share_axis(axes, along="x")
 
 
+def _with_count(name: str, count: int | None) -> str:
+    return name if count is None else f"{name} (n = {count:,})"
+
+
 def _kinds(
     axes: Axes, found: Sequence[tuple[str, Causes]], of: str, kinds: Sequence[str], *, many: bool
 ) -> None:
     there = [
-        (short_name(name, 18), one.kinds.get(of, {})) for name, one in found if many or one.kinds.get(of)
+        (_with_count(short_name(name, 18), one.counts.get((of, ALL))), one.kinds.get(of, {}))
+        for name, one in found
+        if many or one.kinds.get(of)
     ]
     if not kinds:
         axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)

@@ -33,7 +33,7 @@ from roboeval.report.drawing import (
     written,
 )
 from roboeval.report.failures import all_causes
-from roboeval.report.figures import LOWEST, accepted, bars, causes, heat, limits, thresholds
+from roboeval.report.figures import accepted, bars, causes, heat, limits, most_completions, thresholds
 from roboeval.report.runs import JudgedRun
 
 PICTURES = Path(__file__).with_name("pictures")
@@ -41,7 +41,9 @@ DRAWINGS: dict[str, Callable[[list[JudgedRun]], Figure]] = {
     "tasks": bars,
     "thresholds": thresholds,
     "causes": lambda runs: causes(all_causes(runs, with_published=True)),
-    "rejection-sampling": lambda runs: limits({run.name: curves(run.trials) for run in runs}),
+    "rejection-sampling": lambda runs: limits(
+        {run.name: curves(run.trials) for run in runs}, most_completions(runs)
+    ),
     "accepted": lambda runs: accepted({run.name: accepted_after(run.trials, LIMITS[-1]) for run in runs}),
 }
 KEPT: list[Any] = [*(("usual", name) for name in DRAWINGS)]
@@ -130,18 +132,20 @@ def test_long_names_fit_into_legends(name: str) -> None:
 
 
 def test_lines_end_where_the_axis_ends() -> None:
-    run = made_up("a", {"Visit": (1,)}, of=5_000)  # whose pass@1 lies below the axis
+    run = made_up("a", {"Visit": (1,), "Wait": (0,)}, of=50)
     other = made_up("b", {"Visit": (5,)}, accepted=~pl.col("passed"))  # after 100 retries nearly none passes
     with styled():
-        drawn = [thresholds([run]), limits({"b": curves(other.trials)})]
-    for figure in drawn:
+        drawn = {1 / 50: thresholds([run]), 1 / 10: limits({"b": curves(other.trials)}, 10)}
+    for end, figure in drawn.items():
+        ticks = [text.get_text() for text in figure.axes[0].get_xticklabels()]
+        assert (ticks[0], ticks[-1]) == ("1", f"1/{1 / end:.0f}")
         lines = [
             np.asarray(line.get_xdata())
             for axes in figure.axes
             for line in axes.lines
             if line.get_linestyle() != "None"
         ]
-        assert {float(xs.min()) for xs in lines} == {float(xs[-1]) for xs in lines} == {LOWEST}
+        assert {float(xs.min()) for xs in lines} == {float(xs[-1]) for xs in lines} == {end}
 
 
 def test_numbers_stand_out_from_their_shades() -> None:
