@@ -302,9 +302,8 @@ def serve(
         world = OFFICE
         note("the robot works in an example office; --world FILE names another world")
     known = None if world is None else World.read(world)
-    chosen = chosen_model(model[0] if model else None, base_url)
-    models = tuple(model or dict.fromkeys((chosen.name, "recorded:careful", "recorded:hasty")))
-    opened = _opener(models, chosen.base_url)
+    models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
+    opened = _opener(models, base_url)
     settings = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
     body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
@@ -319,6 +318,7 @@ def serve(
 def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:
     """What opens models by their names; names that make no sense are refused at once."""
     from codebotler.models.base import SamplingSettings
+    from codebotler.models.chosen import chosen_model
     from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
 
     for each in models:
@@ -326,7 +326,8 @@ def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Mode
     if base_url is not None:
         expect_server(*models)
     return lambda name: open_model(
-        name, SamplingSettings(base_url=base_url if runs_on_server(name) else None)
+        name,
+        SamplingSettings(base_url=chosen_model(name, base_url).base_url if runs_on_server(name) else None),
     )
 
 

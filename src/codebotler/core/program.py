@@ -12,12 +12,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
+from itertools import islice
 from typing import Any
 
 from codebotler.core.skills import SKILLS, Parameter, Skill, SkillTable
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
+MOST_NAMES, LONGEST_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
 ALIKE = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
 GIVEN = ("time", "sys")  # modules that every program finds imported
 FILE = "<program>"
@@ -239,15 +241,28 @@ def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
 
 
 def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
-    for line, name, is_local in undefined_names(tree, skills):
+    undefined = undefined_names(tree, skills)
+    hints = _meant(tree, dict.fromkeys(name for _, name, is_local in undefined if not is_local), skills)
+    for line, name, is_local in undefined:
         if is_local:
             message = f"the local variable {name} is used before it has a value"
             yield Flaw(line, "UnboundLocalError", message)
         else:
-            known = sorted({*names_bound(tree), *skills, *GIVEN, *dir(builtins)} - {name})
-            alike = get_close_matches(name, known, n=1, cutoff=ALIKE)
-            hint = f"; did you mean {alike[0]}?" if alike else ""
+            hint = f"; did you mean {hints[name]}?" if name in hints else ""
             yield Flaw(line, "NameError", f"the name {name} is not defined{hint}")
+
+
+def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
+    """The names that may be meant by undefined ones, as far as that is quickly found."""
+    known = sorted({*names_bound(tree), *skills, *GIVEN, *dir(builtins)})
+    found: dict[str, str] = {}
+    if len(known) > MOST_NAMES:
+        return found
+    for name in islice((one for one in undefined if len(one) <= LONGEST_NAME), MOST_HINTS):
+        alike = get_close_matches(name, (other for other in known if other != name), n=1, cutoff=ALIKE)
+        if alike:
+            found[name] = alike[0]
+    return found
 
 
 def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:

@@ -17,8 +17,8 @@ from codebotler.core.world import Point
 from codebotler.missions.log import SKILL_ENDS, Line
 from codebotler.missions.wording import activity, event_text, stop_text
 
-AT = re.compile(r"at \((-?\d+(?:\.\d+)?), (-?\d+(?:\.\d+)?)\)")
-MOST = 200
+AT = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
+MOST, MOST_STEPS = 200, 60  # moments, and drives, looks and finds, that are kept
 NEAR = 0.05  # metres; a robot that moves less stays where it is
 UNTOLD = frozenset({"state", "cancelled"})  # events that other events or the page tell
 ANSWER = "answer"  # the kind of moment at which the robot hears something
@@ -39,7 +39,6 @@ class Find:
 
     room: str  # in the program's words; empty for where the robot began
     name: str
-    is_person: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,7 @@ class Progress:
             skill=name,
             line=line.get("line") or line_of(program, name, arguments),
             is_driving=drives,
-            subject=str(next(iter(arguments), "")),
+            subject=str(next(iter(arguments), "")).strip(),
             activity=activity(line),
         )
         return replace(now, room=now.subject) if drives else now
@@ -112,21 +111,21 @@ class Progress:
         now = self
         match recording and recording.kind:
             case "goto":
-                now = replace(self, visited=(*self.visited, self.subject))
+                now = replace(self, visited=(*self.visited, self.subject)[:MOST_STEPS])
             case "pick":
                 now = replace(self, held=self.subject)
             case "place":
                 now = replace(self, held="")
             case "check":
                 now = self._found(Find(self.room, self.subject)) if result is True else self
-                now = replace(now, looks=(*self.looks, (self.subject, result is True)))
+                now = replace(now, looks=(*self.looks, (self.subject, result is True))[:MOST_STEPS])
             case "ask" if self.subject:
-                now = self._found(Find(self.room, self.subject, is_person=True))
+                now = self._found(Find(self.room, self.subject))
         return now
 
     def _found(self, find: Find) -> Progress:
         known = [one for one in self.finds if (one.room, one.name) != (find.room, find.name)]
-        return replace(self, finds=(*known, find))
+        return replace(self, finds=(*known, find)[-MOST_STEPS:])
 
 
 def _moment(line: Line, words: str) -> Moment:

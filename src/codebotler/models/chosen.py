@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
+from codebotler.models.recorded import is_recorded
 
 VARIABLE = "CODEBOTLER_MODEL"
 RECORDED = "recorded:careful"
@@ -40,6 +41,8 @@ def chosen_model(name: str | None = None, base_url: str | None = None) -> Chosen
     Raises:
         UserError: config.yaml is wrong.
     """
+    if name is not None and (base_url is not None or is_recorded(name)):
+        return ChosenModel(name, base_url)
     file = config_file()
     config = ConfigFile(model=RECORDED)
     if file is not None and file.is_file():

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPException
 
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.models.keys import key_in
 from codebotler.models.recorded import NAMES, is_recorded
@@ -55,9 +56,12 @@ class UsableModel:
 
 def usable_models(servers: Mapping[str, int] = SERVERS) -> list[UsableModel]:
     """The models of servers on this machine, then an example for each key, then the recorded ones."""
-    with ThreadPoolExecutor(len(servers) or 1) as pool:
-        served = [one for models in pool.map(_served, servers, servers.values()) for one in models]
-    keyed = [UsableModel(name, f"{key} is set") for key, name in KEYS.items() if key_in(key)]
+    pool = ThreadPoolExecutor(len(servers) or 1)
+    asked = [pool.submit(_served, server, port) for server, port in servers.items()]
+    done, _ = wait(asked, timeout=2 * PATIENCE_S)
+    pool.shutdown(wait=False)
+    served = [model for one in asked if one in done for model in one.result()]
+    keyed = [UsableModel(name, f"{key} is set") for key, name in KEYS.items() if _is_set(key)]
     recorded = [UsableModel(f"recorded:{name}", "written by hand, for known instructions") for name in NAMES]
     return [*served, *keyed, *recorded]
 
@@ -68,6 +72,13 @@ def how_to_use_a_model(servers: Mapping[str, int] = SERVERS) -> str:
     return SETUP if first.is_recorded else f"add {first.options}"
 
 
+def _is_set(key: str) -> bool:
+    try:
+        return key_in(key) is not None
+    except UserError:  # no header can hold it
+        return False
+
+
 def _served(server: str, port: int) -> list[UsableModel]:
     """What a server lists; nothing where none answers, or where it is something else."""
     connection = HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
@@ -75,9 +86,13 @@ def _served(server: str, port: int) -> list[UsableModel]:
         connection.request("GET", "/v1/models", headers={"Accept": "application/json"})
         listed = json.loads(connection.getresponse().read(LONGEST_LIST))
         names = [str(one["id"]) for one in listed["data"]]
-    except (OSError, HTTPException, ValueError, LookupError, TypeError):
+    except (OSError, HTTPException, ValueError, LookupError, TypeError, RecursionError):
         return []
     finally:
         connection.close()
     url = f"http://127.0.0.1:{port}/v1"
-    return [UsableModel(f"openai-chat:{name}", f"{server} answers on this machine", url) for name in names]
+    return [
+        UsableModel(f"openai-chat:{name}", f"{server} answers on this machine", url)
+        for name in names
+        if "embed" not in name
+    ]

@@ -68,7 +68,7 @@ class SkillProtocol:
                 case _:
                     raise ProtocolError("a request is malformed")
             if self.robot.is_live:
-                self.robot.line = line if 0 < line <= LAST_LINE else None
+                self.robot.line = line if type(line) is int and 0 < line <= LAST_LINE else None
             self.child.send((*self._answer(name, values, now), self.robot.now))
             overrun += self.ledger.limit is not None
             if overrun > OVERRUN:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from collections.abc import Iterator
 from html import escape
@@ -29,6 +30,9 @@ EXAMPLES: dict[str, object] = {
     "program": 'def task_program():\n    say("Hello")\n',
 }
 """What a field may hold, where its description has no example."""
+
+PLACE, PLACES = re.compile(r"\{(\w+)\}"), {"mission": "current", "prompt": "0", "index": "0"}
+"""What an address has in braces, and what may stand there; for the rest, its name in capitals."""
 
 NEEDLESS = frozenset({"model", "despite_problems"})
 """Fields that an example leaves out."""
@@ -67,7 +71,9 @@ def command(method: str, address: str, form: dict[str, Any] | None) -> str:
         ][:1]
         body = {name: _example(name, fields[name]) for name in chosen}
         parts += ["-H", "content-type:application/json", "-d", shlex.quote(json.dumps(body))]
-    return " ".join([*parts, shlex.quote(address.replace("{mission}", "current"))])
+    return " ".join(
+        [*parts, shlex.quote(PLACE.sub(lambda place: PLACES.get(place[1], place[1].upper()), address))]
+    )
 
 
 def _example(name: str, field: dict[str, Any]) -> object:

@@ -87,7 +87,7 @@ def _robot(x: float, y: float, held: str) -> Iterator[str]:
     yield f'<g class="robot"><circle class="halo" cx="{x:.2f}" cy="{y:.2f}" r=".62"/>'
     yield f'<circle class="body" cx="{x:.2f}" cy="{y:.2f}" r=".34"/></g>'
     if held:
-        yield _text(x, y + 0.36 + SMALL, SMALL, f"holds {held}", "held")
+        yield _text(x, y + 0.36 + SMALL, SMALL, f"holds {shortened(held, MOST_LETTERS)}", "held")
 
 
 def _labels(

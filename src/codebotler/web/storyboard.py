@@ -72,14 +72,16 @@ def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
     """
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
-    for strip in shown:
-        number_reached = scenes_reached(strip, reached)
-        with ui.element("article").classes("strip" if number_reached is not None else "strip other"):
+    numbers = [scenes_reached(strip, reached) for strip in shown]
+    is_among_them = any(number is not None for number in numbers)  # these are but some worlds
+    for strip, number_reached in zip(shown, numbers, strict=True):
+        is_folded = is_among_them and number_reached is None
+        with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:
                 PlainText("p", f"{strip.world}:", "world")
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for number, scene in enumerate(strip.scenes):
-                    is_reached = bool(reached.visited) and number <= (number_reached or 0)
+                    is_reached = bool(reached.visited and number_reached) and number <= (number_reached or 0)
                     draw_scene(scene, is_reached=is_reached)
             PlainText("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
 

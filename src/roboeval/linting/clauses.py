@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from roboeval.suites.load import Task
 
 FEW = 4  # words; what is shorter belongs to the clause before or after it, if there is one in its sentence
-_SENTENCE = re.compile(r"(?<!\W\w)[.!?][\"”)]*\s+")  # no end: "e.g. a cup", "5 p.m. sharp"
+_SENTENCE = re.compile(r"(?:[!?]|(?<!\w\.\w)\.)[\"”)]*\s+")  # no end: "e.g. a cup", "5 p.m. sharp"
 _JOINT = re.compile(r"[,;:]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
 _WORD = re.compile(r"\w+")
 _SKIP = re.compile(r"(?<!\\)\.\*\??|\[\^[^\]]+\]\*\??")  # the part of a regex that finds any words

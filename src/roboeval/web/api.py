@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, TypeAlias
@@ -20,9 +21,11 @@ MOST = 1_000
 """Completions in one answer."""
 
 REPORT_POLICY = (
-    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'none'; base-uri 'none'; "
-    "form-action 'none'; frame-ancestors 'none'"
+    "sandbox allow-downloads; default-src 'none'; style-src 'unsafe-inline'; img-src data:; "
+    "script-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+
+TABLE = re.compile(r"[\w-]{1,100}")  # names of tables, which lead nowhere else
 
 Chosen: TypeAlias = Annotated[Filter, Depends()]
 Evaluation: TypeAlias = Annotated[
@@ -57,6 +60,15 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         # A folder from elsewhere may hold any page in place of a report: nothing in it may run.
         headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
         return HTMLResponse(text, headers=headers)
+
+    @api.get("/{run}/tables/{table}.csv")
+    def show_table(run: str, table: str) -> Response:
+        """A table of the report of a run, as CSV."""
+        with _refusing():
+            text = store.report(run, f"tables/{table}.csv") if TABLE.fullmatch(table) else None
+        if text is None:
+            raise HTTPException(404, "this run has no such table")
+        return Response(text, media_type="text/csv")
 
     @api.get("/{run}/completions")
     def list_completions(

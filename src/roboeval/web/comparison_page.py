@@ -11,7 +11,7 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText
-from roboeval.web.difference import draw_difference
+from roboeval.web.difference import Difference, difference_of, draw_difference
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
@@ -62,7 +62,9 @@ class _Comparison:
         versions: list[Hashable] = [*((run.name, run.version) for run in runs), *troubles]
         if versions != self._versions:
             self._versions = versions
-            self._show(runs, troubles)
+            judged = [run for run in runs if run.judged]
+            difference = await asyncio.to_thread(difference_of, *judged) if len(judged) == PAIR else None
+            self._show(runs, troubles, difference)
 
     def _read(self) -> tuple[list[Snapshot], list[str]]:
         runs, troubles = [], []
@@ -75,7 +77,7 @@ class _Comparison:
         judged_by = {tuple(str(head.get(part)) for part in ("suite", "digest", "ablation")) for head in heads}
         return runs, [*troubles, *[NOT_ALIKE] * (len(judged_by) > 1)]
 
-    def _show(self, runs: Sequence[Snapshot], troubles: Sequence[str]) -> None:
+    def _show(self, runs: Sequence[Snapshot], troubles: Sequence[str], difference: Difference | None) -> None:
         self._troubles.clear()
         with self._troubles:
             for sentence in troubles:
@@ -94,11 +96,11 @@ class _Comparison:
         self._tasks.show(groups=groups, rows=rows)
         judged = [run for run in runs if run.judged]
         self._difference.clear()
-        self._difference.set_visibility(len(judged) == PAIR)
-        if len(judged) == PAIR:
+        self._difference.set_visibility(difference is not None)
+        if difference is not None:
             with self._difference:
                 PlainText("h2", "Which is better")
-                draw_difference(judged)
+                draw_difference(difference)
         columns = [_head(run) for run in judged]
         self._kinds.show(groups=[{"name": "", "columns": columns}], rows=failure_rows(judged))
 

@@ -17,7 +17,7 @@ from roboeval.evaluation.runs.completions import KEY, Key, name_of
 from roboeval.web.heat_map import address
 from roboeval.web.snapshot import Snapshot
 
-MOST_NAME, MOST_KEYS = 60, 100
+MOST_NAME, MOST_TASKS, MOST_KEYS = 60, 100, 30
 HEADS = ("Task", "difference", "95% interval", "completions that differ")
 
 
@@ -62,15 +62,32 @@ def _differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[Key, b
     return found
 
 
-def draw_difference(runs: Sequence[Snapshot]) -> None:
-    """Draw how two judged runs differ."""
-    first, second = runs
+@dataclass(frozen=True)
+class Difference:
+    """How two judged runs differ."""
+
+    runs: tuple[Snapshot, Snapshot]
+    rows: tuple[TaskRow, ...]
+    told: str  # which is better, and how sure that is
+
+
+def difference_of(first: Snapshot, second: Snapshot) -> Difference:
+    """Compare two judged runs, which may take seconds for large ones."""
     rows = task_rows(first, second)
-    names = shortened(first.name, MOST_NAME), shortened(second.name, MOST_NAME)
+    told = "They have no prompt in common."
+    if rows:
+        names = shortened(first.name, MOST_NAME), shortened(second.name, MOST_NAME)
+        told = verdict(compared(pass_at_1(first.scores), pass_at_1(second.scores)), names)
+    return Difference((first, second), tuple(rows[:MOST_TASKS]), told)
+
+
+def draw_difference(difference: Difference) -> None:
+    """Draw how two judged runs differ."""
+    runs, rows = difference.runs, difference.rows
+    names = [shortened(run.name, MOST_NAME) for run in runs]
+    PlainText("p", difference.told)
     if not rows:
-        PlainText("p", "They have no prompt in common.", "quiet")
         return
-    PlainText("p", verdict(compared(*(pass_at_1(run.scores) for run in runs)), names))
     region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
     with region, html.table().classes("differences"):
         with html.thead(), html.tr():

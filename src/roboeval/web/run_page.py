@@ -86,7 +86,7 @@ class _RunPage:
     def _show(self) -> None:
         self._head.clear()
         with self._head:
-            _draw_head(self._run)
+            _draw_head(self._run, has_report=self._store.has_report(self._run.name))
         self._show_chosen()
 
     def _show_chosen(self) -> None:
@@ -138,7 +138,7 @@ class _Kind:
         self._share.say(f"{percent(count / of)} %" if of else NONE)
 
 
-def _draw_head(run: Snapshot) -> None:
+def _draw_head(run: Snapshot, *, has_report: bool) -> None:
     data, key = run_data(run), run.results.key
     with ui.element("p").classes("facts"):
         state = PlainText("small")
@@ -151,7 +151,7 @@ def _draw_head(run: Snapshot) -> None:
         for sentence in data["notes"]:
             PlainText("li", sentence, "unsure")
     with ui.element("p").classes("facts"):
-        if (run.results.run.path / "report" / "index.html").is_file():
+        if has_report:
             html.a("The report of this run", href=f"/api/runs/{quote(run.name, safe='')}/report")
         for other in run.evaluations if len(run.evaluations) > 1 else ():
             link = html.a(shortened(other, MOST_NAME), href=address(run.name) + Filter().query(other))

@@ -20,7 +20,7 @@ from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
 from roboeval.web.snapshot import Snapshot
 
 MOST_HELD = 16  # evaluations that stay in memory
-MOST_REPORT = 100_000_000  # bytes of its page
+REPORT, MOST_REPORT = "index.html", 20_000_000  # the page of a report, and its bytes
 REST = 10  # a run is not read again before this many times as long as reading it took
 OUTSIDE = "leads outside the folder of runs, so it is not read"
 
@@ -51,13 +51,25 @@ class RunStore:
         """The version that a run would have if it was opened now; it is not read."""
         return self._reader(name, None).version()
 
-    def report(self, name: str) -> bytes | None:
-        """The page of the report in a run's folder; None if there is none."""
-        path = self._reader(name, None).folder / "report" / "index.html"
+    def report(self, name: str, part: str = REPORT) -> bytes | None:
+        """The page of the report in a run's folder, or another part of it; None if it cannot be read."""
+        path = self._reader(name, None).folder / "report" / part
         if _stamp(path, self.folder.resolve()) is None:
             return None
-        with path.open("rb") as file:
-            return file.read(MOST_REPORT)
+        try:
+            size = path.stat().st_size
+            if size > MOST_REPORT:
+                raise UserError(f"is too large to be shown here: {size:,} bytes", file=path.name)
+            return path.read_bytes()
+        except OSError:
+            return None
+
+    def has_report(self, name: str) -> bool:
+        """Whether there is a report in a run's folder."""
+        try:
+            return self.report(name) is not None
+        except UserError:
+            return False
 
     def suite(self, name: str) -> Suite | None:
         """A suite that ships, is installed or was named; None if it is not at hand."""

@@ -119,6 +119,14 @@ def test_a_misspelt_name_is_told_with_the_one_that_may_be_meant(lines: list[str]
     assert [flaw.message for flaw in Program(in_task(*lines)).problems()] == [told]
 
 
+def test_many_undefined_names_are_quickly_told() -> None:
+    bound = "".join(f"    name_{n}_bound = 1\n" for n in range(600))
+    used = "".join(f"    say(name_{n}_bond)\n" for n in range(600))
+    found = Program(f"def task_program():\n{bound}{used}").problems()
+    assert len(found) == 600
+    assert 0 < sum("did you mean" in flaw.message for flaw in found) <= 10
+
+
 def test_a_ninth_skill_is_known() -> None:
     skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), "None", "Wave."))
     waves = Program(in_task("wave()"))

@@ -56,3 +56,4 @@ def test_a_wrong_file_is_told_with_its_line(text: str, told: str, config: Path) 
     config.write_text(text)
     with pytest.raises(UserError, match=told):
         chosen_model()
+    assert chosen_model("recorded:hasty").name == "recorded:hasty", "which needs no file"

@@ -1,5 +1,7 @@
 import json
+import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -38,7 +40,9 @@ def server(body: bytes, status: int = 200) -> Iterator[int]:
 
 
 def test_the_models_of_a_server_on_this_machine_come_first() -> None:
-    body = json.dumps({"object": "list", "data": [{"id": "qwen3:8b"}, {"id": "llama 3"}]})
+    body = json.dumps(
+        {"object": "list", "data": [{"id": "qwen3:8b"}, {"id": "llama 3"}, {"id": "nomic-embed-text"}]}
+    )
     with server(body.encode()) as port:
         found = usable_models({"Ollama": port, "vLLM": 1})
     url = f"http://127.0.0.1:{port}/v1"
@@ -52,6 +56,7 @@ def test_the_models_of_a_server_on_this_machine_come_first() -> None:
     ("body", "status"),
     [
         (b"<html>", 200),
+        (b"[" * 100_000, 200),
         (b"[]", 200),
         (b'{"data": [1]}', 200),
         (b'{"data": {}}', 200),
@@ -63,10 +68,19 @@ def test_what_is_no_server_of_models_is_passed_over(body: bytes, status: int) ->
         assert [one.name for one in usable_models({"vLLM": port})] == RECORDED
 
 
+def test_a_server_that_says_nothing_is_not_waited_for() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        port = listening.getsockname()[1]
+        began = time.monotonic()
+        assert [one.name for one in usable_models({"vLLM": port})] == RECORDED
+        assert time.monotonic() - began < 10
+
+
 def test_a_key_in_the_environment_opens_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "OPENAI_API_KEY" in how_to_use_a_model({})
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-secret-of-mine")
     monkeypatch.setenv("OPENAI_API_KEY", " ")
+    monkeypatch.setenv("GOOGLE_API_KEY", "no\nheader")
     (first, *rest) = usable_models({})
     assert (first.why, first.base_url) == ("ANTHROPIC_API_KEY is set", None)
     assert [one.name for one in rest] == RECORDED

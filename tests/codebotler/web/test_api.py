@@ -306,8 +306,8 @@ def test_each_command_of_the_page_about_the_api_is_one_that_works(server: PageSe
     assert len(commands) == page.count("<section>")
     for text in commands:
         words = shlex.split(text.replace("$TOKEN", server.token))
-        if words[-1].endswith(("/events", "/stop", "/approve", ".mcap")) or "{" in words[-1]:
-            continue  # endless, or of a mission that runs
+        if words[-1].endswith(("/events", "/stop", "/approve", ".mcap")) or "/RUN" in words[-1]:
+            continue  # endless, or of a mission that runs, or of a run to be named
         given = dict(zip(words[3:-1:2], words[4:-1:2], strict=True))
         path = words[-1].removeprefix(f"http://localhost:{server.port}")
         answer = server.call(given.get("-X", "GET"), path, json.loads(given.get("-d", "null")))

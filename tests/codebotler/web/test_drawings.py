@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
-from codebotler.missions.progress import MOST, Find, Moment, Progress, line_of
+from codebotler.missions.progress import MOST, MOST_STEPS, Find, Moment, Progress, line_of
 from codebotler.simulator.sampled_robot import Fact, GivenAnswer, Whereabouts
 from codebotler.web.floorplan import MOST_ROOMS, MapState, floorplan
 from codebotler.web.panes.past_missions import timeline
@@ -111,7 +111,7 @@ def test_where_the_robot_was_what_it_met_and_what_it_holds() -> None:
     now = after(*events)
     assert now.visited == ("Kitchen",)
     assert now.trail == ((1.0, 2.0), (3.0, 2.0))
-    assert now.finds == (Find("Kitchen", "mug"), Find("Kitchen", "ann", is_person=True))
+    assert now.finds == (Find("Kitchen", "mug"), Find("Kitchen", "ann"))
     assert now.held == "mug"
     assert after(*events, call("place", obj="mug"), done("place")).held == ""
     failed = line("error", number=1, skill="go_to", kind="E", message="m")
@@ -140,6 +140,13 @@ def test_the_line_is_the_one_that_the_program_says() -> None:
     spoken = call("say", message="a")
     assert Progress().after(spoken, twice).line is None
     assert Progress().after({**spoken, "line": 3}, twice).line == 3
+
+
+def test_a_robot_that_looks_for_ever_fills_no_memory() -> None:
+    looks = [call("is_in_room", entity=" mug "), done("is_in_room", result=True)] * 200
+    now = after(*looks, call("go_to", location="hall"), line("feedback", text=f"at ({'9' * 400}, 1)"))
+    assert now.looks == (("mug", True),) * MOST_STEPS
+    assert now.at is None
 
 
 def test_only_the_last_moments_are_kept() -> None:

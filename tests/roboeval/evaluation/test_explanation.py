@@ -368,9 +368,9 @@ def test_texts_have_the_capitals_of_the_program_where_they_are_clear(
 
 def test_a_program_whose_texts_were_lowered_is_shown_with_its_capitals() -> None:
     said = Outcome(Status.FINISHED, (GOTO, Event("say", "good day")))
-    for literals, told in (("lowercase", '"Good Day"'), ("as-written", '"good day"')):
-        suite = replace(SUITE, rules=replace(SUITE.rules, literals=literals))
+    for rules, told in ((Rules(), '"Good Day"'), (Rules(literals="as-written"), '"good day"')):
+        suite = replace(SUITE, rules=rules)
         written = replace(completion(), program="def task_program():\n    say('Good Day')\n")
         text = printed(completion_view(row(written, said), written, suite), 120)
         assert f"said {told}" in text
-        assert (LOWERED in text) is (literals == "lowercase")
+        assert (LOWERED in text) is (rules == Rules())

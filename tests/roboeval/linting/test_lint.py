@@ -179,6 +179,7 @@ def test_a_clause_ends_with_its_sentence(linted: Lint) -> None:
             'Say "hello" in the kitchen! Then, when you are done, come back.',
             "Then, when you are done, come back.",
         ),
+        ("Say hello in kitchen 2. Once it is done, come back.", "Once it is done, come back."),
     ):
         prompt = ("[Say hello in the kitchen.]", f"['{said}']")
         found = linted({"speaks": SPEAKS}, ["speaks"], edited=(facts, prompt))

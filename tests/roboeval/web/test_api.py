@@ -77,6 +77,10 @@ def test_one_run_has_the_numbers_of_show(server: PageServer, folder: Path) -> No
 
 def test_the_report_of_a_run_opens(server: PageServer, folder: Path) -> None:
     assert server.call("GET", "/api/runs/hasty/report").status == 200
+    table = server.call("GET", "/api/runs/hasty/tables/overall.csv")
+    assert (table.status, table.text.startswith("model,")) == (200, True)
+    assert server.call("GET", "/api/runs/hasty/tables/no.csv").status == 404
+    assert server.call("GET", "/api/runs/hasty/tables/..%2F..%2Frun.csv").status == 404
     report = folder / "hasty" / "report"
     shutil.rmtree(report)
     assert server.call("GET", "/api/runs/hasty/report").status == 404
@@ -307,6 +311,7 @@ def test_the_api_is_described(server: PageServer) -> None:
         "/api/runs/{run}",
         "/api/runs/{run}/completions",
         "/api/runs/{run}/report",
+        "/api/runs/{run}/tables/{table}.csv",
         "/api/runs/{run}/completions/{task}/{prompt}/{index}",
     }
     page = server.call("GET", "/api").text

@@ -48,11 +48,13 @@ _INVERTED = re.compile(
 _IN_VAIN = re.compile(r"\bwould\s+(?:like|love|have\s+(?:liked|loved))\s+to(?=\W{1,3}but\b)", re.IGNORECASE)
 # A list ends where what is missing begins, which has no subject of its own.
 _LIST = re.compile(
-    r"(?:(?:,| and| or)\s+(?!(?:no|not|but|and|or)\b)\w[\w']*(?: \w[\w']*)?){1,9}"
-    r"(?=,?\s+(?:but|and)\s+(?:no|not|lacks?|(?:does|do|did|has|have|is|are)(?: not|n['\u2019]t))\b)",
+    r"(?:(?:,| and| or)\s{1,3}(?!(?:no|not|but|and|or)\b)\w[\w']*"
+    r"(?: (?!(?:is|are|was|were|do|does|did|has|have|had|will|would|can|could|wants?|joins?|comes?)"
+    r"\b)\w[\w']*)?){1,9}"
+    r"(?=,?\s{1,3}(?:but|and)\s{1,3}(?:no|not|lacks?|(?:does|do|did|has|have|is|are)(?: not|n['\u2019]t))\b)",
     re.IGNORECASE,
 )
-_LISTED = re.compile(r",?\s+(?:and|or)\s+|,\s+", re.IGNORECASE)
+_LISTED = re.compile(r",?\s{1,3}(?:and|or)\s{1,3}|,\s{1,3}", re.IGNORECASE)
 _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 

@@ -20,7 +20,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
 
-UNKNOWN = "No recorded program is for this instruction. Choose one below, or another model."
+UNKNOWN = "There is no recorded program for this instruction. Choose an instruction below, or another model."
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 ABOUT_RECORDED = (
     "These programs were written by people and recorded, so that you can try everything without an API key. "
@@ -100,7 +100,7 @@ class InstructionPane:
         self._alike.clear()
         fitting = [text for text in known if _fits(text, self._console)]
         if fitting:
-            self._fill(self._alike, "Known instructions that are alike", [(text, "") for text in fitting])
+            self._fill(self._alike, "Similar instructions", [(text, "") for text in fitting])
 
     def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
         where.clear()

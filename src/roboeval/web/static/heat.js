@@ -24,7 +24,7 @@ export default {
           </tr>
         </thead>
         <tbody>
-          <tr v-for="row in rows" :key="row.name">
+          <tr v-for="(row, at) in rows" :key="at">
             <th scope="row" :class="['name', row.look]" dir="auto"><template v-for="piece in pieces(row.name)">{{ piece }}<wbr></template></th>
             <td v-for="cell in row.cells" :class="[cell.shade, row.look]">
               <a v-if="cell.href" :href="cell.href" :title="cell.title" :aria-label="cell.title"

@@ -241,6 +241,8 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("You will not be alone: Alice comes", "alice", ""),
         ("We have a pen, Alice and Carol but not Bob", "alice", "bob"),
         ("They met Carol, Alice and lack Bob", "alice", "bob"),
+        ("Alice is not joining, Bob is but not Carol", "bob", "alice"),
+        ("Alice has no mail, Bob has but not Carol", "bob", "alice"),
         ("We can count on Carol and Alice and no Bob", "alice", "bob"),
         ("You need not go: Alice, Bob", "", "alice bob"),
         ("As for Alice, it is there, and Bob, I am afraid, is not", "alice", "bob"),
