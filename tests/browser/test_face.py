@@ -52,7 +52,7 @@ def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, opened: Op
         ) as server,
     ):
         operator, face = opened(server), face_of(server, opened)
-        expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do just now.")
+        expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do right now.")
         operator.locator("textarea").fill(instruction)
         operator.get_by_role("button", name="Write the program").click()
         expect(operator.get_by_text("Checked: no problems.")).to_be_visible()
@@ -239,13 +239,13 @@ def test_a_tool_that_is_gone_is_said_and_found_again(tmp_path: Path, opened: Ope
             script=SPEAKING,
             expecting="WebSocket connection",
         )
-        expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do just now.")
+        expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do right now.")
         face.locator("h1, body").first.click(position={"x": 5, "y": 5})
         server.run("def task_program():\n    for number in range(4):\n        say(str(number))\n")
         until(face, "window.spoken.includes('3')")
     expect(face.locator("#doing")).to_have_text("The robot cannot be reached. Trying again …")
     with PageServer(tmp_path, "--face", *tokens, "--port", str(port)) as server:
-        expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do just now.")
+        expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do right now.")
         server.run("def task_program():\n    say('here again')\n")
         until(face, "window.spoken.includes('here again')")
         face.context.close()

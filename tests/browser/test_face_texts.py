@@ -100,7 +100,7 @@ def test_answers_that_are_hard_to_tell_apart_can_be_chosen(server: PageServer, o
     expect(face.locator("#more")).to_have_text("14 more answers are not shown.")
     expect(face.locator("#person")).to_be_hidden()
     expect(face.locator("#question")).to_have_text("?")
-    expect(face.locator("#options span").nth(1)).to_have_text("(without words)")
+    expect(face.locator("#options span").nth(1)).to_have_text("(blank)")
     face.locator("#options button").nth(1).click()
     expect(face.locator("#said p")).to_have_text("[ ]", use_inner_text=False)
 

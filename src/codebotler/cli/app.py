@@ -89,17 +89,23 @@ def generate(
 def check(
     program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
     world: options.WorldOption = None,
-    samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
+    samples: Annotated[
+        int, typer.Option(min=1, max=10_000, help="How many imagined worlds to run it in.")
+    ] = 5,
     seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Also vary what the program takes for granted.")
+        bool,
+        typer.Option(
+            "--strict",
+            help="Do not assume that people and objects are there unless the program has looked for them.",
+        ),
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,
 ) -> None:
-    """Look for problems in a program before it is run.
+    """Look for problems in a program before a robot runs it.
 
-    It reads the text and runs it in imagined worlds; the status is 1 if there are problems.
+    It reads the program and runs it in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
     from codebotler.cli.check import check_view, read_program
@@ -206,9 +212,9 @@ def missions(
 def models(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """List the models that can be asked here and now.
+    """List the models that you can use here.
 
-    It finds keys in the environment, and servers of models on this machine.
+    It looks for keys in the environment, and for model servers on this machine.
     """
     from dataclasses import asdict
 
@@ -341,7 +347,7 @@ def virtual_robot(
         ),
     ] = None,
     speed: Annotated[
-        float, typer.Option(help="How fast the robot's clock runs, such as 20 times real time.")
+        float, typer.Option(help="The speed of the robot's clock as a multiple of real time, such as 20.")
     ] = 1.0,
     ros_python: Annotated[
         Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")

@@ -20,7 +20,10 @@ ModelOption = Annotated[
 ]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file with the rooms.")]
 TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
-TopPOption = Annotated[float, typer.Option(help="The share of likely tokens to sample from (top-p).")]
+TopPOption = Annotated[
+    float,
+    typer.Option(help="Sample only from the likeliest tokens whose probabilities add up to this (top-p)."),
+]
 MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
 SeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
 TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
@@ -31,7 +34,9 @@ RosPythonOption = Annotated[Path, typer.Option(help="The Python of the robot's R
 ROS_PYTHON = Path("/usr/bin/python3")
 SpeedOption = Annotated[
     float,
-    typer.Option(min=0, help="How fast the robot's clock runs, such as 20 times real time; 0: no delays."),
+    typer.Option(
+        min=0, help="The speed of the robot's clock as a multiple of real time, such as 20; 0 for no delays."
+    ),
 ]
 AddressOption = Annotated[str, typer.Option(help="The robot's address, if not the default.")]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]

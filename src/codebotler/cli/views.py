@@ -157,7 +157,7 @@ def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
     table = grid("left", "left")
     for model in models:
         table.add_row(Text(model.options, "bold"), Text(model.why, "dim"))
-    lines = [f"asked by default: {visible(chosen.name)}"]
+    lines = [f"default model: {visible(chosen.name)}"]
     if all(model.is_recorded for model in models):
         lines.append(f"for other instructions, {SETUP}")
     return Group(table, Text(), *map(Text, lines))

@@ -48,7 +48,7 @@ class Progress:
     doing: str = ""  # now, in words
     skill: str = ""  # the skill under way
     subject: str = ""  # its first argument
-    activity: str = ""  # the skill in words, such as `going to supply room`, also once it is cancelled
+    activity: str = ""  # the skill in words, such as `driving to supply room`, also once it is cancelled
     line: int | None = None  # of the program, where only one call can be meant
     clock: float = 0.0  # seconds by the robot's clock since the program began
     room: str = ""  # the last destination, in the program's words

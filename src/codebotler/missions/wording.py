@@ -19,18 +19,20 @@ def event_text(line: Line) -> str:
 
 
 def activity(line: Line) -> str:
-    """What a robot is at while a skill is under way, such as `going to supply room`."""
+    """What a robot is at while a skill is under way, such as `driving to supply room`."""
     skill = SKILLS.get(line["skill"])
     if skill is None or skill.verb is None:
         return f"executing {visible(line['skill'])}"
     if skill.recording is None:
         return skill.verb.ing
     text = shortened(room_name(str(line["arguments"][skill.recording.text])), 100)
+    if skill.recording.is_drive:
+        return f"driving to {text}"
     return f'{skill.verb.ing} "{text}"' if skill.recording.is_spoken else f"{skill.verb.ing} {text}"
 
 
 def stop_text(by: str, doing: str) -> str:
-    """A stop in words, and what it interrupted, such as `going to supply room`, if anything."""
+    """A stop in words, and what it interrupted, such as `driving to supply room`, if anything."""
     during = f" while {doing}" if doing else ""
     return f"stopped {'from' if by == PAGE else 'by'} {visible(by)}{during}"
 

@@ -23,7 +23,7 @@ FOLDER = Path(__file__).with_name("recorded")
 NAMES = ("careful", "hasty")
 CLOSEST, SHOWN = 3, 100  # how many instructions are suggested, and how much of each, in characters
 LONG = re.compile(r"[^\W\d_]{4,}")  # shorter words are in every instruction
-NOTICE = "recorded program, no language model; use --model, and see `codebotler models`"
+NOTICE = "recorded programs, no language model; choose one with --model (`codebotler models` lists them)"
 
 
 class Solution(BaseModel):

@@ -25,7 +25,7 @@ KEYS: Mapping[str, str] = {
 """Variables that hold a key, each with a model that it opens."""
 
 PATIENCE_S, LONGEST_LIST = 0.5, 1_000_000  # bytes that a server may list
-SETUP = "set OPENAI_API_KEY or another provider's key, or start a server of models such as Ollama"
+SETUP = "set OPENAI_API_KEY or another provider's key, or start a model server such as Ollama"
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,10 @@ PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 <header class="{bar}"><a class="brand" href="/">{brand}</a>
 <nav class="pages" aria-label="Pages">{links}</nav></header>
 <main class="api"><h1>The API</h1>
-<p>Everything that the page does. Each request sends the token: set <code>TOKEN</code> to what stands behind
-<code>token=</code> in the link to this page, and paste the commands below into a terminal. For machines there
-is <a href="/api/openapi.json">openapi.json</a>.</p>
+<p>The API does everything that the page does. Each request must send the token: set <code>TOKEN</code> to
+the text after <code>token=</code> in the link that was printed when the server started, and paste the
+commands below into a terminal. The machine-readable description is
+<a href="/api/openapi.json">openapi.json</a>.</p>
 {calls}</main>{stop}</body></html>"""
 
 EXAMPLES: dict[str, object] = {

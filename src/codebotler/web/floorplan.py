@@ -42,10 +42,12 @@ class MapState:
     @property
     def sentence(self) -> str:
         """The same in words."""
-        where = f"{'drives to' if self.is_driving else 'is in'} {room_name(self.room)}" if self.room else ""
-        holds = f" and holds {self.held}" if self.held else ""
+        where = (
+            f"{'is driving to' if self.is_driving else 'is in'} {room_name(self.room)}" if self.room else ""
+        )
+        holds = f" and is holding {self.held}" if self.held else ""
         parts = [f"The robot {where}{holds}." if where else "The robot's position is unknown."]
-        parts += [f"Met in {room_name(room)}: {', '.join(names)}." for room, names in self.finds.items()]
+        parts += [f"Found in {room_name(room)}: {', '.join(names)}." for room, names in self.finds.items()]
         return " ".join(parts)
 
 
@@ -87,7 +89,7 @@ def _robot(x: float, y: float, held: str) -> Iterator[str]:
     yield f'<g class="robot"><circle class="halo" cx="{x:.2f}" cy="{y:.2f}" r=".62"/>'
     yield f'<circle class="body" cx="{x:.2f}" cy="{y:.2f}" r=".34"/></g>'
     if held:
-        yield _text(x, y + 0.36 + SMALL, SMALL, f"holds {shortened(held, MOST_LETTERS)}", "held")
+        yield _text(x, y + 0.36 + SMALL, SMALL, f"holding {shortened(held, MOST_LETTERS)}", "held")
 
 
 def _labels(

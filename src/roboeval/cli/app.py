@@ -14,7 +14,7 @@ from roboeval.cli.report import report
 from roboeval.cli.show import export, serve, show
 from roboeval.cli.tasks import tasks
 
-app = command_line("roboeval", "How good are language models at writing programs for service robots?")
+app = command_line("roboeval", "Measure how well language models write programs for service robots.")
 commands = generate, evaluate, run, show, find, tasks, resample, report, compare, mutate, serve, export
 for command in commands:
     app.command()(command)

@@ -126,9 +126,10 @@ def resample(
     one_process_per_run: ProcessOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Compute what checking programs before a run would have gained.
+    """Compute how often programs would pass with rejection sampling.
 
-    It computes from a judged run what asking again for rejected programs would have given.
+    It checks the programs of a judged run, and computes the result for each limit of retries; no model is
+    asked.
     """
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view

@@ -42,12 +42,15 @@ def evaluate(
         str, typer.Argument(help="A run, a .jsonl, a folder or zip of .py completions, or recorded:NAME.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Keep completions and verdicts in this run.", parser=named("a run"))
+        Path | None,
+        typer.Option(help="Keep completions and verdicts in this run folder.", parser=named("a run")),
     ] = None,
     suite: SuiteOption = "paper",
     tasks: TasksOption = None,
     ablation: AblationOption = False,
-    redo: Annotated[bool, typer.Option("--redo", help="Start over.")] = False,
+    redo: Annotated[
+        bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
+    ] = False,
     workers: WorkersOption = None,
     worlds: WorldsOption = None,
     seed: SeedOption = None,
@@ -112,7 +115,7 @@ def _name_next_command(run: Run, table: DataFrame, *, suite: str, ablated: bool)
 
     failed = table.filter(~table["passed"]).select(KEY).head(1)
     again = command("show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablated)
-    does = "says why that program fails" if failed.height else "prints these tables again"
+    does = "explains the first failure" if failed.height else "prints these tables again"
     note(f"verdicts are in {run.path}; `{again}` {does}")
 
 
@@ -161,7 +164,7 @@ def _judged(
 
 def import_(
     path: Annotated[str, typer.Argument(help="A .jsonl, or a folder or zip of .py completions.")],
-    out: Annotated[Path, typer.Option(help="The run to make.", parser=named("a run"))],
+    out: Annotated[Path, typer.Option(help="The run folder to create.", parser=named("a run"))],
     suite: SuiteOption = "paper",
 ) -> None:
     """Make a run from completions written elsewhere."""

@@ -48,7 +48,8 @@ def find(
 ) -> None:
     """Find completions by what they did, and group the failures.
 
-    It takes the completions that did something in some world, and groups those that fail by reason.
+    It finds the completions whose trace satisfies the formula in some world, and groups those
+    that failed by reason.
     """
     from codebotler.simulator.pool import cores
     from roboeval.analysis.cluster import cluster_data, clusters, groups

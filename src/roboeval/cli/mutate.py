@@ -62,7 +62,7 @@ def mutate(
 ) -> None:
     """Measure which wrong programs survive a suite's checks.
 
-    It runs and judges mutants: right programs with mistakes that models make.
+    It runs and judges mutants: right programs changed by mistakes that models make.
     """
     from codebotler.simulator.pool import WorkerPool, cores
     from roboeval.mutation.report import keep

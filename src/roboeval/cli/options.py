@@ -67,7 +67,7 @@ def named(what: str) -> Callable[[str], Path]:
     return path
 
 
-RunArgument = Annotated[Path, typer.Argument(help="A run.", parser=named("a run"))]
+RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=named("a run"))]
 SuiteOption = Annotated[
     str,
     typer.Option(
@@ -79,7 +79,7 @@ TasksOption = Annotated[
     str | None,
     typer.Option(help="Only these tasks, separated by commas.", autocompletion=listed_task_names),
 ]
-AblationOption = Annotated[bool, typer.Option("--ablation", help="Require only common sense.")]
+AblationOption = Annotated[bool, typer.Option("--ablation", help="Judge only the common-sense requirements.")]
 EngineOption = Annotated[
     str,
     typer.Option(
@@ -106,7 +106,7 @@ SeedOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
-    Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
+    Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=named("a run"))
 ]
 NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
 ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]

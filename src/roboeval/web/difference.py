@@ -18,7 +18,7 @@ from roboeval.web.heat_map import address
 from roboeval.web.snapshot import Snapshot
 
 MOST_NAME, MOST_TASKS, MOST_KEYS = 60, 100, 30
-HEADS = ("Task", "difference", "95% interval", "completions that differ")
+HEADS = ("Task", "Difference", "95% interval", "Different verdicts")
 
 
 @dataclass(frozen=True)

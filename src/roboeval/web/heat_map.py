@@ -64,7 +64,7 @@ class TaskCells:
         counted = Filter(passed=True) if chosen.verdict == Filter() else chosen
         self._bad = not counted.passed
         by = failure_text(counted)
-        self._verb = "passed" if counted.passed else "failed" if by is None else f"failed with {by}"
+        self._verb = "passed" if counted.passed else "failed" if by is None else f"ended in {by}"
         self.tasks: dict[str, dict[int, dict[str, Any]]] = {}
         for prompt in run.prompts(counted):
             self.tasks.setdefault(prompt["task"], {})[prompt["prompt"]] = prompt
@@ -145,6 +145,6 @@ def _failure_cell(run: Snapshot, chosen: Filter, kind: Failures | None) -> dict[
     return {
         "text": text,
         "shade": shade(share, bad=True),
-        "title": f"{shortened(run.name, MOST_NAME)}: {text} % failed with {failure_text(chosen)}, {count:,}",
+        "title": f"{shortened(run.name, MOST_NAME)}: {text} % ended in {failure_text(chosen)}, {count:,}",
         "href": f"{address(run.name)}{chosen.query(None)}#completions" if count else None,
     }

@@ -159,10 +159,11 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
                 link.props('aria-current="true"')
 
 
-def _verb(chosen: Filter) -> str:
+def _verb(chosen: Filter, *, past: bool = False) -> str:
     if (by := failure_text(chosen)) is not None:
-        return f"fail with {by}"
-    return "fail" if chosen.passed is False else "pass"
+        return f"{'ended' if past else 'end'} in {by}"
+    verb = "fail" if chosen.passed is False else "pass"
+    return f"{verb}ed" if past else verb
 
 
 def _heading(chosen: Filter) -> str:
@@ -173,5 +174,5 @@ def _heading(chosen: Filter) -> str:
     if chosen.prompt is not None:
         parts.append(f"prompt {chosen.prompt}")
     if chosen.verdict != Filter():
-        parts.append(f"that {'passed' if chosen.passed else _verb(chosen).replace('fail', 'failed', 1)}")
+        parts.append(f"that {_verb(chosen, past=True)}")
     return f"Completions {', '.join(parts)}".rstrip()

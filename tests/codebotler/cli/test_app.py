@@ -210,7 +210,7 @@ def test_models_that_can_be_asked_here(tmp_path: Path) -> None:
     status, out, err = command("codebotler", "models", environment={**environment, "COLUMNS": "100"})
     assert (status, err) == (0, "")
     assert re.search(r"^--model anthropic:\S+ +ANTHROPIC_API_KEY is set$", out, re.MULTILINE)
-    assert out.rstrip().endswith("asked by default: recorded:careful")
+    assert out.rstrip().endswith("default model: recorded:careful")
     assert "none-of-yours" not in out
     (tmp_path / "config.yaml").write_text("model: anthropic:claude-sonnet-4-5\n")
     listed = json.loads(command("codebotler", "models", "--json", environment=environment)[1])

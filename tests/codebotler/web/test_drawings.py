@@ -126,10 +126,10 @@ def test_a_stop_is_one_event_with_what_it_interrupted() -> None:
     ):
         assert [moment.text for moment in after(*events).moments] == [
             'drives to "supply room"',
-            "stopped from the page while going to supply room",
+            "stopped from the page while driving to supply room",
         ]
         words = [text for _, text in timeline(events)]
-        assert words == ['Drives to "supply room"', "Stopped from the page while going to supply room"]
+        assert words == ['Drives to "supply room"', "Stopped from the page while driving to supply room"]
     assert after(line("stop", by="Ctrl-C")).moments[-1].text == "stopped by Ctrl-C"
     asked = [call("ask", person="ann", question="Tea?", options=["no"]), line("stop", by="Ctrl-C")]
     assert after(*asked).moments[-1].text == 'stopped by Ctrl-C while asking "Tea?"'
@@ -189,7 +189,7 @@ def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
         assert abs(float(name) - float(robot)) > 0.62 + 0.34
         assert drawn.index("<text") > max(drawn.index("polyline"), drawn.index('class="body"'))
     state = MapState(room="start_loc", finds={"start_loc": ["ann"]}, held="mug")
-    told = "The robot is in start and holds mug. Met in start: ann."
+    told = "The robot is in start and is holding mug. Found in start: ann."
     assert told in floorplan(World((Room("start_loc"),), "start_loc"), state)
 
 

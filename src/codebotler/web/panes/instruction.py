@@ -23,8 +23,8 @@ from codebotler.web.frame import Button, PlainText, scroll_up, warn
 UNKNOWN = "There is no recorded program for this instruction. Choose an instruction below, or another model."
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 ABOUT_RECORDED = (
-    "These programs were written by people and recorded, so that you can try everything without an API key. "
-    "They cover known instructions only, such as the examples below."
+    "This is not a language model: its programs were written by people, so you can try everything without an "
+    "API key. It knows only a few instructions, such as the examples below."
 )
 
 

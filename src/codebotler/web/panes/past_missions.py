@@ -127,6 +127,6 @@ def _show(summary: Summary, events: list[Line]) -> None:
                 PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")
                 PlainText("span", words, "text")
     if len(events) > MOST_EVENTS:
-        PlainText("p", f"{len(events) - MOST_EVENTS:,} more events are in the files.", "quiet")
+        PlainText("p", f"{len(events) - MOST_EVENTS:,} more events are in the downloads above.", "quiet")
     PlainText("h2", "Program")
     PlainText("pre", summary.program, "source").props("tabindex=0")

@@ -94,7 +94,9 @@ class ProgramPane:
         typed, self._heard = event.args["text"], int(event.args["number"])
         current = _for_editor(self._console.view.program)
         if typed is None:
-            self._restore(f"A program has at most {MOST_PROGRAM:,} characters.")
+            self._restore(
+                f"A program can have at most {MOST_PROGRAM:,} characters; your last edit was discarded."
+            )
         elif event.args["base"] != current:
             self._restore("Someone else changed the program; your last edit was discarded.")
         elif typed != current:

@@ -62,7 +62,7 @@ class RobotPane:
         doing = progress.doing
         self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
         where = [f"line {progress.line}"] if progress.line is not None else []
-        where += [f"holds {shortened(progress.held, 60)}"] if progress.held else []
+        where += [f"holding {shortened(progress.held, 60)}"] if progress.held else []
         where += (
             [f"{progress.clock:.1f} s on the robot's clock"] if progress.moments and progress.clock else []
         )

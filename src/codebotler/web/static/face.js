@@ -3,7 +3,7 @@ import { Speaker } from "./speaker.js";
 import { Listener } from "./listener.js";
 
 const $ = (id) => document.getElementById(id);
-const WELCOME = "Hello. I have nothing to do just now.";
+const WELCOME = "Hello. I have nothing to do right now.";
 const LOST = "The robot cannot be reached. Trying again …";
 const SETTLE = 400; // ms in which a new question takes no touch, which may have been meant for the one before
 const AGAIN = 1000; // ms
@@ -34,7 +34,7 @@ const sized = (element, text) => {
 const ENDS = { done: "I have finished.", stopped: "I was stopped.", failed: "Something went wrong, and I gave up." };
 const doingWords = ({ doing, to, state, reason }) => {
   const rests = reason || ENDS[state] || WELCOME;
-  return { idle: rests, moving: to ? `On my way: ${to}` : "On my way", working: "At work …", asking: "" }[doing];
+  return { idle: rests, moving: to ? `On my way: ${to}` : "On my way", working: "Working …", asking: "" }[doing];
 };
 
 function show(told) {
@@ -94,7 +94,7 @@ function option(question, text, position) {
   button.disabled = true;
   setTimeout(() => (button.disabled = false), SETTLE);
   key.textContent = position < 9 ? position + 1 : "";
-  words.textContent = text.trim() ? text : "(without words)";
+  words.textContent = text.trim() ? text : "(blank)";
   words.dir = "auto";
   sized(button, text);
   button.append(key, words);
