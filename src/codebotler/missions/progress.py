@@ -49,7 +49,7 @@ class Progress:
     skill: str = ""  # the skill under way
     subject: str = ""  # its first argument
     activity: str = ""  # the skill in words, such as `driving to supply room`, also once it is cancelled
-    line: int | None = None  # of the program, where only one call can be meant
+    line: int | None = None  # of the program, which calls the skill under way; None if that is not known
     clock: float = 0.0  # seconds by the robot's clock since the program began
     room: str = ""  # the last destination, in the program's words
     at: Point | None = None  # the position in metres, if known

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPException
+from threading import Thread
+from time import monotonic
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
@@ -56,11 +57,18 @@ class UsableModel:
 
 def usable_models(servers: Mapping[str, int] = SERVERS) -> list[UsableModel]:
     """The models of servers on this machine, then an example for each key, then the recorded ones."""
-    pool = ThreadPoolExecutor(len(servers) or 1)
-    asked = [pool.submit(_served, server, port) for server, port in servers.items()]
-    done, _ = wait(asked, timeout=2 * PATIENCE_S)
-    pool.shutdown(wait=False)
-    served = [model for one in asked if one in done for model in one.result()]
+    listed: dict[str, list[UsableModel]] = {}
+
+    def ask(server: str) -> None:
+        listed[server] = _served(server, servers[server])
+
+    asking = [Thread(target=ask, args=(server,), daemon=True) for server in servers]
+    for thread in asking:
+        thread.start()
+    until = monotonic() + 2 * PATIENCE_S  # some servers trickle
+    for thread in asking:
+        thread.join(max(0.0, until - monotonic()))
+    served = [model for server in servers for model in listed.get(server, ())]
     keyed = [UsableModel(name, f"{key} is set") for key, name in KEYS.items() if _is_set(key)]
     recorded = [UsableModel(f"recorded:{name}", "written by hand, for known instructions") for name in NAMES]
     return [*served, *keyed, *recorded]
