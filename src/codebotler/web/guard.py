@@ -48,6 +48,7 @@ HOST = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
 MOST_PORT = 65_535
 CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 SCRIPT = re.compile(rb"<script(?=[\s>])")
+NO_SCRIPT = "script-src 'none'"  # in a page's own policy: no script in it is marked as ours
 
 NO_CONTROL = "there is no such page: addresses here have no control characters"
 NO_PAGE = "there is no such page"
@@ -243,7 +244,8 @@ class _LimitedBody:
                 await answer(self._scope, self._receive, self._send)
                 return
             headers = MutableHeaders(raw=list(message["headers"]))
-            self._is_page = headers.get("content-type", "").startswith("text/html")
+            own = headers.get("content-security-policy", "")
+            self._is_page = headers.get("content-type", "").startswith("text/html") and NO_SCRIPT not in own
             if self._is_page:
                 del headers["content-length"]
             for name, value in HEADERS.items():

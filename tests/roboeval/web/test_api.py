@@ -85,9 +85,10 @@ def test_the_report_of_a_run_opens(server: PageServer, folder: Path) -> None:
     shutil.rmtree(report)
     assert server.call("GET", "/api/runs/hasty/report").status == 404
     report.mkdir()
-    (report / "index.html").write_text("<p>all is well</p>")
+    (report / "index.html").write_text("<p>all is well</p><script>window.owned=1</script>")
     answer = server.call("GET", "/api/runs/hasty/report")
     assert (answer.status, "all is well" in answer.text) == (200, True)
+    assert "<script>" in answer.text, "which is not marked as ours"
     assert server.ask("GET", "/api/runs/hasty/report").status == 401
     (report / "index.html").unlink()
     (report / "index.html").symlink_to("/etc/hostname")
