@@ -397,7 +397,7 @@ def test_nothing_runs_in_a_report_that_comes_with_a_run(
     served: PageServer, real: Path, opened: OpenPage
 ) -> None:
     report = real / "hasty" / "report"
-    page = opened(served, expecting="Content Security Policy")
+    page = opened(served, expecting="Blocked script execution")
     page.goto(f"http://localhost:{served.port}/runs/hasty")
     expect(page.locator(".completions-view a").first).to_be_visible()
     assert page.get_by_text("The report of this run").count() == 0
