@@ -25,7 +25,7 @@ PROBLEMS = """def task_program():
 
 @pytest.fixture(scope="module")
 def office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
-    with PageServer(tmp_path_factory.mktemp("office"), "--speed", "10", world=OFFICE) as server:
+    with PageServer(tmp_path_factory.mktemp("office"), "--speed", "3", world=OFFICE) as server:
         yield server
 
 

@@ -275,7 +275,7 @@ def test_a_program_that_is_too_long_is_refused_in_a_sentence(server: PageServer,
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text("# " + "x" * 200_000)
-    expect(page.get_by_text("A program has at most 200,000 characters")).to_be_visible()
+    expect(page.get_by_text("A program can have at most 200,000 characters")).to_be_visible()
     expect(page.locator(".cm-content")).to_contain_text("Tea for ann, please")
 
 
