@@ -69,11 +69,10 @@ def mutation_score(
     programs = originals(task, further)
     ran = pool.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
     before = dict(zip(programs, watched(ran, f"running {task.name}", len(programs)), strict=True))
-    prompts = range(len(task.prompts))
-    asked = [tuple(one.asked_by(prompt) for one in scenarios) for prompt in prompts]
+    asked = [tuple(one.asked_by(prompt) for one in scenarios) for prompt in range(len(task.prompts))]
     faults = {original: [fault_in(before[original], one) for one in asked] for original in programs}
     judges = {
-        original: tuple(one.asked_by(*(n for n in prompts if found[n] is None)) for one in scenarios)
+        original: _asked_by_those_it_fits(scenarios, found)
         for original, found in faults.items()
         if None in found
     }
@@ -91,6 +90,14 @@ def mutation_score(
         ),
         mutants=tuple(map(TriedMutant, made, results)),
     )
+
+
+def _asked_by_those_it_fits(
+    scenarios: Sequence[Scenario], faults: Sequence[Result | None]
+) -> tuple[Scenario, ...]:
+    """The scenarios with what those prompts ask for by which an original has no fault."""
+    fitting = [prompt for prompt, fault in enumerate(faults) if fault is None]
+    return tuple(one.asked_by(*fitting) for one in scenarios)
 
 
 def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:

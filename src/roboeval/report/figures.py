@@ -37,6 +37,7 @@ from roboeval.report.runs import JudgedRun, tasks_of
 
 MOST_COLOURS = len(COLOURS)
 POWERS = (0.1, 0.01, 0.001)  # that an axis of thresholds marks
+SHORT_AXIS, BETWEEN = 20, (0.5, 0.2)  # completions up to which it has room for these, too
 APART = 1.6  # ratio of two marks on it that can be told apart
 HATCHES = (
     "",
@@ -225,7 +226,8 @@ def _threshold_axes(axes: Axes, most: int) -> None:
     """Set what shared axes have in common: once for one of them, since it is slow and sets all."""
     axes.set_xscale("log")
     axes.set_xlim(1, 1 / most)
-    marked = [power for power in POWERS if power * most >= APART]
+    shown = (*(BETWEEN if most <= SHORT_AXIS else ()), *POWERS)
+    marked = [mark for mark in shown if mark * most >= APART]
     axes.set_xticks([1, *marked, 1 / most], ["1", *(f"{power:g}" for power in marked), f"1/{most}"])
     share_axis(axes)
 
@@ -256,7 +258,7 @@ def limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
                 *zip(*_steps(points, most), strict=True),
                 color=COLOURS[at - 1] if at else INK,
                 linestyle=DASHES[at % len(DASHES)],
-                linewidth=1.3 if at else 1.0,
+                linewidth=1.3,
                 label=f"{limit} retries" if limit else "no retry",
                 drawstyle="steps-post",
                 clip_on=False,

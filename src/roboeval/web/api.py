@@ -50,25 +50,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         with _refusing():
             return _json(run_details(store.open(run, evaluation)))
 
-    @api.get("/{run}/report")
-    def show_report(run: str) -> Response:
-        """The report of a run, as `roboeval run` or `roboeval report` has written it there."""
-        with _refusing():
-            text = store.report(run)
-        if text is None:
-            raise HTTPException(404, "this run has no report")
-        # A folder from elsewhere may hold any page in place of a report: nothing in it may run.
-        headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
-        return HTMLResponse(text, headers=headers)
-
-    @api.get("/{run}/tables/{table}.csv")
-    def show_table(run: str, table: str) -> Response:
-        """A table of the report of a run, as CSV."""
-        with _refusing():
-            text = store.report(run, f"tables/{table}.csv") if TABLE.fullmatch(table) else None
-        if text is None:
-            raise HTTPException(404, "this run has no such table")
-        return Response(text, media_type="text/csv")
+    _add_report(api, store)
 
     @api.get("/{run}/completions")
     def list_completions(
@@ -97,6 +79,30 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
             return _json(completion_details(snapshot, row))
 
     return api
+
+
+def _add_report(api: APIRouter, store: RunStore) -> None:
+    """Add the addresses of a run's report and of its tables."""
+
+    @api.get("/{run}/report")
+    def show_report(run: str) -> Response:
+        """The report of a run, as `roboeval run` or `roboeval report` has written it there."""
+        with _refusing():
+            text = store.report(run)
+        if text is None:
+            raise HTTPException(404, "this run has no report")
+        # A folder from elsewhere may hold any page in place of a report: nothing in it may run.
+        headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+        return HTMLResponse(text, headers=headers)
+
+    @api.get("/{run}/tables/{table}.csv")
+    def show_table(run: str, table: str) -> Response:
+        """A table of the report of a run, as CSV."""
+        with _refusing():
+            text = store.report(run, f"tables/{table}.csv") if TABLE.fullmatch(table) else None
+        if text is None:
+            raise HTTPException(404, "this run has no such table")
+        return Response(text, media_type="text/csv")
 
 
 def _json(data: object) -> Response:
