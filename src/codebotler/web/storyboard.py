@@ -73,9 +73,7 @@ def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
-    is_among_them = any(number is not None for number in numbers)  # these are but some worlds
-    for strip, number_reached in zip(shown, numbers, strict=True):
-        is_folded = is_among_them and number_reached is None
+    for strip, number_reached, is_folded in zip(shown, numbers, folded(numbers), strict=True):
         with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:
                 PlainText("p", f"{strip.world}:", "world")
@@ -84,6 +82,12 @@ def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
                     is_reached = bool(reached.visited and number_reached) and number <= (number_reached or 0)
                     draw_scene(scene, is_reached=is_reached)
             PlainText("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
+
+
+def folded(numbers: Sequence[int | None]) -> list[bool]:
+    """Whether each strip is folded: none is where none fits, since they are but some worlds."""
+    is_among_them = any(number is not None for number in numbers)
+    return [is_among_them and number is None for number in numbers]
 
 
 def scenes_reached(strip: Strip, reached: Reached) -> int | None:

@@ -21,6 +21,7 @@ from codebotler.web.storyboard import (
     Reached,
     Scene,
     Strip,
+    folded,
     scenes_reached,
     strips,
     supposed,
@@ -227,6 +228,11 @@ def test_rooms_are_ticked_off_as_they_are_reached(visited: tuple[str, ...], reac
     strip = Strip("", tuple(map(Scene, rooms)), "Done.", ends_well=True)
     assert scenes_reached(strip, Reached(visited)) == reached
     assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), Reached(("kitchen",))) is None
+
+
+def test_strips_are_folded_only_beside_one_that_fits() -> None:
+    assert folded([2, None, 0]) == [False, True, False]
+    assert folded([None, None]) == [False, False]
 
 
 def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> None:

@@ -354,6 +354,7 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
         ("say('Good Day')", "good day", "Good Day"),
         ("say('Good Day, ' + name + '!')\nname = 'Amy'", "good day, amy!", "Good Day, Amy!"),
         ("say('NO'); say('no')", "no", "no"),  # either may be meant
+        ("say('Hi'); say('HI')", "hi", "hi"),
         ("say('Bo')", "bottle", "bottle"),
         ("say(f'Hello {name}.')", "hello ann.", "Hello ann."),
         ("not a program (", "good day", "good day"),
