@@ -93,7 +93,7 @@ class TaskScore:
     prompts: tuple[PromptScore, ...]
 
     def pass_at(self, k: int) -> Estimate:
-        """The mean pass@k over prompts, with its 95 % interval.
+        """The mean pass@k over prompts, with its 95% interval.
 
         Raises:
             ValueError: a prompt, which is named, has fewer than k completions.
@@ -164,7 +164,7 @@ def pass_at_1(tasks: Iterable[TaskScore]) -> dict[tuple[str, int], float]:
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
-    """The mean pass@k over all prompts of all tasks, with its 95 % interval.
+    """The mean pass@k over all prompts of all tasks, with its 95% interval.
 
     Raises:
         ValueError: a prompt, which is named, has fewer than k completions.

@@ -127,11 +127,9 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
 
 
-def as_written(steps: Sequence[Mapping[str, Any]], program: str | None) -> list[dict[str, Any]]:
-    """The steps of a program whose texts were lowered, with the capitals it has, where they are clear."""
+def as_written(worlds: Sequence[Mapping[str, Any]], program: str | None) -> list[dict[str, Any]]:
+    """What is told of worlds whose texts were lowered, with the program's capitals where they are clear."""
     spellings = _spellings(program or "")
-    if not spellings:
-        return [dict(step) for step in steps]
     pattern = re.compile("|".join(map(_whole, spellings)))
 
     def spelled(value: object) -> object:
@@ -139,10 +137,20 @@ def as_written(steps: Sequence[Mapping[str, Any]], program: str | None) -> list[
             return [spelled(one) for one in value]
         return pattern.sub(lambda match: spellings[match[0]], value) if isinstance(value, str) else value
 
-    texts = ("text", "options", "answer")
-    return [
-        {name: spelled(value) if name in texts else value for name, value in step.items()} for step in steps
-    ]
+    def told(those: Sequence[Mapping[str, Any]], *names: str) -> list[dict[str, Any]]:
+        return [
+            {name: spelled(value) if name in names else value for name, value in one.items()} for one in those
+        ]
+
+    def world_told(world: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            **world,
+            "error": told([world["error"]], "message")[0] if world["error"] else None,
+            "steps": told(world["steps"], "text", "options", "answer"),
+            "failed_checks": told(world["failed_checks"], "explanation"),
+        }
+
+    return [world_told(world) if spellings else dict(world) for world in worlds]
 
 
 def _whole(text: str) -> str:

@@ -206,8 +206,8 @@ def short_name(name: str, most: int = LONGEST_NAME) -> str:
 
 
 def share_axis(axes: Axes, *, along: str = "y") -> None:
-    """Let an axis show shares from 0 to 100 %."""
+    """Let an axis show shares from 0 to 100%."""
     axis = axes.yaxis if along == "y" else axes.xaxis
     (axes.set_ylim if along == "y" else axes.set_xlim)(0, 1)
-    axis.set_ticks([0, 0.25, 0.5, 0.75, 1], ["0", "25", "50", "75", "100 %"])
+    axis.set_ticks([0, 0.25, 0.5, 0.75, 1], ["0", "25", "50", "75", "100%"])
     axes.grid(visible=True, axis="y" if along == "y" else "x")

@@ -108,7 +108,7 @@ def _card(card: Card) -> str:
     return (
         f'<article class="card"><h3>{_text(card.name)}</h3><p><b>{estimate.mean:.3f}</b> pass@1</p>'
         f'<div class="bar" aria-hidden="true">{bar}</div>'
-        f"<p>95 % interval {estimate.low:.3f} to {estimate.high:.3f}</p><p>{failure}</p>{cost}</article>"
+        f"<p>95% interval {estimate.low:.3f} to {estimate.high:.3f}</p><p>{failure}</p>{cost}</article>"
     )
 
 

@@ -101,8 +101,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
     judged = completion["worlds"]
     with ui.element("div").classes("worlds-of"):
         if completion["lowered"]:
-            program = completion["program"]
-            judged = [{**world, "steps": as_written(world["steps"], program)} for world in judged]
+            judged = as_written(judged, completion["program"])
         if judged != completion["worlds"]:
             PlainText("p", LOWERED, "quiet")
         if not judged:

@@ -85,13 +85,13 @@ class TaskCells:
 
     def _mean(self, task: str, mean: float | None) -> dict[str, Any]:
         text = NONE if mean is None else percent(mean)
-        title = "nothing is judged yet" if mean is None else f"{text} % {self._verb}"
+        title = "nothing is judged yet" if mean is None else f"{text}% {self._verb}"
         return self._linked(task, None, text, f"mean {shade(mean, bad=self._bad)}", title)
 
     def _cell(self, of: Mapping[str, Any]) -> dict[str, Any]:
         share = of["share"]
         text = f"({of['written']})" if share is None else percent(share)
-        title = f"{text} % {self._verb}, {of['counted']} of {of['judged']}"
+        title = f"{text}% {self._verb}, {of['counted']} of {of['judged']}"
         if share is None:
             title = f"{of['written']} written, none judged yet"
         return self._linked(of["task"], of["prompt"], text, shade(share, bad=self._bad), title)

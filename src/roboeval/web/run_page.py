@@ -135,7 +135,7 @@ class _Kind:
         self._button.props(f"aria-pressed={'true' if is_here else 'false'}")
         self._button.style(f"--share: {count / of if of else 0:.3f}")
         self._count.say(f"{count:,}")
-        self._share.say(f"{percent(count / of)} %" if of else NONE)
+        self._share.say(f"{percent(count / of)}%" if of else NONE)
 
 
 def _draw_head(run: Snapshot, *, has_report: bool) -> None:

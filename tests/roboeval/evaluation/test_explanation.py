@@ -363,8 +363,14 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
 def test_texts_have_the_capitals_of_the_program_where_they_are_clear(
     program: str, text: str, shown: str
 ) -> None:
-    (step,) = as_written([{"step": 1, "kind": "say", "text": text}], program)
-    assert step == {"step": 1, "kind": "say", "text": shown}
+    def told(text: str) -> dict[str, Any]:
+        return {
+            "error": {"kind": "GoToInvalidLocation", "message": f'there is no room "{text}"'},
+            "steps": [{"step": 1, "kind": "say", "text": text}],
+            "failed_checks": [{"check": "polite", "explanation": f'it said "{text}"', "step": 1}],
+        }
+
+    assert as_written([told(text)], program) == [told(shown)]
 
 
 def test_a_program_whose_texts_were_lowered_is_shown_with_its_capitals() -> None:

@@ -61,7 +61,7 @@ def completion_view(data: Mapping[str, Any]) -> RenderableType:
         parts += [Text(), *_program(data["program"], lines)]
     worlds = data["worlds"]
     if data["lowered"]:
-        worlds = [{**world, "steps": as_written(world["steps"], data["program"])} for world in worlds]
+        worlds = as_written(worlds, data["program"])
     if worlds != data["worlds"]:
         parts += [Text(), Text(LOWERED, "dim")]
     for number, world in enumerate(worlds, 1):
