@@ -64,7 +64,8 @@ def _verdict(found: Check, name: str) -> Text:
     elif not any(sample.draws for sample in found.samples):
         ran = "it does the same in every world"
     else:
-        ran = f"run in {len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}"
+        worlds = f"{len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}"
+        ran = f"run in {worlds}, where people and things are put by chance"
     return verdict.append(f"\n{ran}", "dim")
 
 

@@ -126,8 +126,12 @@ class WorldFile(_Form):
         """The world that it describes, or a UserError about a room or a regex."""
         names = [room.name for room in self.rooms]
         for index, room in enumerate(self.rooms):
-            if room.name in names[:index]:
-                raise file.wrong(f'the room "{room.name}" is listed twice; remove one', *at, "rooms", index)
+            for other in names[:index]:
+                if room.name == other:
+                    raise file.wrong(f'the room "{other}" is listed twice; remove one', *at, "rooms", index)
+                if room.name.lower() == other.lower():
+                    sentence = f'the rooms "{other}" and "{room.name}" differ in capitals only; rename one'
+                    raise file.wrong(sentence, *at, "rooms", index)
             if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'

@@ -23,9 +23,11 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 from codebotler.simulator.robot import SimulatedRobot, resolve_room
-from codebotler.simulator.rules import ENDLESS, Rules
+from codebotler.simulator.rules import ENDLESS, WORDS_FOR_PEOPLE, Rules
 
-ROBOT_RULES = Rules(literals="as-written", limits=ENDLESS)
+ROBOT_RULES = Rules(
+    literals="as-written", people="own-name-or-word", words_for_people=WORDS_FOR_PEOPLE, limits=ENDLESS
+)
 METRES_PER_SECOND = 0.5
 FEEDBACK_EVERY = 0.25  # real seconds
 

@@ -193,8 +193,9 @@ def found_in(label: str, request: str) -> bool:
 
 
 def finds(request: str, label: str, matching: Matching) -> bool:
-    """Whether a request of the program finds a label of the world, a regex."""
-    return found_in(label if matching == "label-in-request" else whole_words(label), request)
+    """Whether a request of the program finds a label of the world, a regex, or is that label."""
+    pattern = label if matching == "label-in-request" else whole_words(label)
+    return found_in(pattern, request) or request.lower() == label.lower()
 
 
 @lru_cache(maxsize=4096)

@@ -6,6 +6,11 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Literal, TypeAlias
 
+WORDS_FOR_PEOPLE = (
+    *("person", "people", "human", "someone", "somebody", "anyone", "anybody", "everyone", "everybody"),
+    *("visitor", "guest", "employee", "colleague", "coworker", "occupant"),
+)
+
 Matching: TypeAlias = Literal["label-in-request", "whole-words"]
 
 

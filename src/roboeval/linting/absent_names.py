@@ -44,6 +44,8 @@ def _named(
             yield from ((what, one, known) for one in found)
         else:
             yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
+        if element.place is not None:
+            yield from (("room", one, there["room"]) for one in _alternatives(element.place))
     check = next(check for check in task.checks if check.name == requirement.check)
     for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
         if parameter == "person" or argument.lower() in _people(task):

@@ -20,7 +20,7 @@ from roboeval.linting.findings import Finding
 from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import judged_worlds
 from roboeval.suites.load import Requirement, Task
-from roboeval.suites.solutions import solutions
+from roboeval.suites.solutions import place_of, solutions
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
@@ -87,12 +87,19 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
         if (None if failed is None else failed.kind) == solution.fails:
             continue
         said = "pass" if solution.fails is None else f"fail by {solution.fails}"
-        where = "" if failed is None else f' by {failed.kind} in the world "{judged[failed.world].world}"'
+        where = "" if failed is None else _why(failed, judged)
         message = (
             f'the solution "{solution.about}" is said to {said}, but it '
             f"{'passes' if failed is None else 'fails'}{where}; correct the program, its `fails`, or a check"
         )
-        yield Finding("misjudged", solution.about, message, task.path, 1)
+        path, line = place_of(task, solution)
+        yield Finding("misjudged", solution.about, message, path, line)
+
+
+def _why(failed: Failure, judged: Verdicts) -> str:
+    """By which check or error a program fails, and where."""
+    by = failed.kind if failed.check is None else f'{failed.kind}, by "{failed.check}",'
+    return f' by {by} in world {failed.world + 1}, "{judged[failed.world].world}"'
 
 
 def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
@@ -110,9 +117,9 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
         return
     tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
     no_program = (
-        "the only wrong program of the task does not trip"
+        "the only program of the task that fails does not trip"
         if len(wrong) == 1
-        else f"none of the {len(wrong)} wrong programs of the task trips"
+        else f"of the {len(wrong)} programs of the task that fail, none trips"
     )
     lines = {check.name: check.line for check in task.checks}
     sides = {_side(requirement): requirement for requirement in reversed(_required(task))}

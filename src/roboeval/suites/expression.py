@@ -98,7 +98,10 @@ def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911,
             return [_value(element, each) for each in each_of(loop, names)]
         case ast.Call(ast.Name(name), [argument], []) if name in _FUNCTIONS:
             return _FUNCTIONS[name](_value(argument, names))
-    raise ExpressionError(f'"{ast.unparse(node)}" is not allowed in an expression here')
+    known = ""
+    if isinstance(node, ast.Call):
+        known = f"; the functions are {', '.join(_FUNCTIONS)}, with one argument"
+    raise ExpressionError(f'"{ast.unparse(node)}" is not allowed in an expression here{known}')
 
 
 def _part(whole: Any, name: str) -> Any:  # noqa: ANN401 - of a fact

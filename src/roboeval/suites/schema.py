@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from codebotler.core.world_file import AnswerFile, Name, Pattern, PersonFile, Text, WorldFile
-from codebotler.simulator.rules import Limits, Rules
+from codebotler.simulator.rules import WORDS_FOR_PEOPLE, Limits, Rules
 
 MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
 
@@ -194,6 +194,13 @@ class RulesFile(_Form):
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0
     clock_starts: Annotated[datetime, BeforeValidator(_moment)] = Rules().clock_starts
+
+    @model_validator(mode="before")
+    @classmethod
+    def _usual_words(cls, data: object) -> object:
+        if isinstance(data, dict) and data.get("people") == "own-name-or-word":
+            return {"words_for_people": WORDS_FOR_PEOPLE, **data}
+        return data
 
     def rules(self) -> Rules:
         """The rules it describes."""

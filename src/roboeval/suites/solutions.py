@@ -46,6 +46,15 @@ def solutions(task: Task) -> tuple[Solution, ...]:
     return tuple(distinct.values())
 
 
+def place_of(task: Task, solution: Solution) -> tuple[Path, int | None]:
+    """The file of a solution and its line there, or the task's file if its own suite does not have it."""
+    path = task.path.parents[1] / "solutions" / task.path.name
+    programs = _read(task.path.parents[1], task).programs
+    if solution not in programs:
+        return task.path, 1
+    return path, YamlFile.read(path).line(("programs", programs.index(solution)))
+
+
 def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
     """Why a mutant of a task is right, by its operator and its diff."""
     listed = _read(task.path.parents[1], task).equivalent_mutants

@@ -117,6 +117,11 @@ class Task:
         return (self.ablation or ()) if ablated else self.scenarios
 
 
+def world_title(number: int, of: str, about: str) -> str:
+    """The title of a world, whose own text may begin with its number where it is drawn."""
+    return f"World {number}{of}: {about.removeprefix(f'{number}: ')}"
+
+
 def describe_person(person: Person) -> str:
     """A person's name, with what they answer and when they come and go."""
     parts = [f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]

@@ -6,7 +6,7 @@ import ast
 import fnmatch
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from random import Random
@@ -242,7 +242,9 @@ def _entry(text: str) -> ast.expr:
     try:
         return parsed(f"({text})")
     except ExpressionError:
-        return parsed(f"({text} else None)")
+        with suppress(ExpressionError):
+            return parsed(f"({text} else None)")
+        raise
 
 
 def _called(node: ast.expr, names: Names) -> str:

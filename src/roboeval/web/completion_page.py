@@ -20,7 +20,7 @@ from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, as_written, cut_told, error_sentence
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import Key, name_of
-from roboeval.suites.task import describe_person
+from roboeval.suites.task import describe_person, world_title
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import completion_details
@@ -109,7 +109,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
         for number, data in enumerate(judged, 1):
             with ui.element("article").classes("pane world-of").props(f"aria-labelledby=h-world-{number}"):
                 with ui.element("div").classes("head"):
-                    title = f"World {number} of {len(judged)}: {shortened(data['world'], 300)}"
+                    title = world_title(number, f" of {len(judged)}", shortened(data["world"], 300))
                     PlainText("h2", title).props(f"id=h-world-{number}")
                     state = ("satisfied", "done") if data["satisfied"] else ("not satisfied", "failed")
                     PlainText("small", state[0], f"state state-{state[1]}")

@@ -241,7 +241,7 @@ def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
         + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
     )
     (finding,) = linted(checks, ["speaks", "not swears"], solutions=two, untripped=True)
-    assert "2 wrong programs" in finding.message
+    assert "2 programs of the task that fail" in finding.message
 
 
 def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:

@@ -24,6 +24,7 @@ from roboeval.evaluation.explanation import (
     shown_lines,
 )
 from roboeval.evaluation.runs.completions import name_of
+from roboeval.suites.task import world_title
 
 EXPLANATION = 2_000
 
@@ -65,7 +66,7 @@ def completion_view(data: Mapping[str, Any]) -> RenderableType:
     if worlds != data["worlds"]:
         parts += [Text(), Text(LOWERED, "dim")]
     for number, world in enumerate(worlds, 1):
-        parts += [Text(), *_world(world, f"World {number} of {len(worlds)}: ")]
+        parts += [Text(), *_world(world, world_title(number, f" of {len(worlds)}", visible(world["world"])))]
     return Group(*parts)
 
 
@@ -95,9 +96,9 @@ def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
     return [syntax, Text(f"... {left:,} more lines", "dim")] if left else [syntax]
 
 
-def _world(world: Mapping[str, Any], name: str) -> list[RenderableType]:
+def _world(world: Mapping[str, Any], title: str) -> list[RenderableType]:
     cut = world.get("cut")
-    parts: list[RenderableType] = [Text(name + visible(world["world"]), "bold"), _ending(world)]
+    parts: list[RenderableType] = [Text(title, "bold"), _ending(world)]
     if world["steps"] or cut is None:
         parts.append(storyboard(world["steps"], {check["step"] for check in world["failed_checks"]}))
     if cut is not None:

@@ -14,7 +14,7 @@ from rich.text import Text
 from codebotler.core.words import listed
 from roboeval.linting.clauses import clauses_of
 from roboeval.suites.load import Check, Scenario, Suite, Task
-from roboeval.suites.task import describe_person
+from roboeval.suites.task import describe_person, world_title
 
 
 def suite_view(suite: Suite) -> RenderableType:
@@ -43,7 +43,7 @@ def suite_task_view(task: Task) -> RenderableType:
     phrases = [Text.assemble((f"{{{name}}}", "bold"), f"  {', '.join(each)}") for name, each in task.phrases]
     parts += _section("Phrases in checks", phrases) if phrases else []
     for number, scenario in enumerate(task.scenarios, 1):
-        parts += _section(f"World {number}: {scenario.world.about}", _world_lines(scenario))
+        parts += _section(world_title(number, "", scenario.world.about), _world_lines(scenario))
     return Group(*parts)
 
 
