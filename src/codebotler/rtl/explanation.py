@@ -203,7 +203,7 @@ def _where(scopes: tuple[formulas.Scope, ...], trace: Trace) -> str:
         at = bound(scope, trace, span)
         when = "after" if scope.name.startswith("After") else "before"
         if at is None:
-            done = f"{deed(scope.element, 'ing')} (no such step, so no limit)"
+            done = f"{deed(scope.element, 'ing')} (which never happened)"
         else:
             done = f"{verb(scope.element.kind).ing} {happening(trace[at], scope.element)} (step {at + 1})"
         parts.append(f" {when} {done}")

@@ -114,6 +114,7 @@ def word(name: str, quoted: str) -> list[str]:
         (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", 5, ["this entry", "a text", "a number"]),
         (GOOD + "  - hall\n", 5, ['"hall"', "twice"]),
         (GOOD + "  - {name: lab}\n", 5, ['"lab"', "twice"]),
+        (GOOD + "  - Lab\n", 5, ['"lab" and "Lab"', "capitals", "rename"]),
         ("rooms: [hall, lab]\nrobot: attic\n", 2, ["robot", '"attic"', "hall, lab"]),
         (GOOD + "objects: [mug]\n", 5, ['"objects"', "a list", "a mapping"]),
         (GOOD + "objects:\n", 5, ['"objects"', "empty"]),
@@ -211,7 +212,7 @@ MEASURED = st.builds(
 
 @st.composite
 def worlds(draw: st.DrawFn) -> World:
-    rooms = draw(st.lists(ROOMS | MEASURED, min_size=1, max_size=4, unique_by=lambda room: room.name))
+    rooms = draw(st.lists(ROOMS | MEASURED, min_size=1, max_size=4, unique_by=lambda room: room.name.lower()))
     start = draw(st.sampled_from(rooms)).name
     return World(tuple(rooms), start, draw(TEXTS), may_wait_forever=draw(st.booleans()))
 

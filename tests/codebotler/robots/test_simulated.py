@@ -66,7 +66,8 @@ def test_skills_do_what_they_do_in_the_simulator() -> None:
     assert robot.perform("get_all_rooms", []) == ["hall", "kitchen"]
     assert robot.perform("is_in_room", ["mug"]) is True
     assert robot.perform("pick", ["mug"]) is None
-    assert robot.perform("is_in_room", ["mug"]) is True, "ann answers to any name"
+    assert robot.perform("is_in_room", ["mug"]) is False, "ann answers to her own name only"
+    assert robot.perform("is_in_room", ["somebody"]) is True
     assert robot.perform("ask", ["ann", "Tea?", ("No", "Yes")]) == "Yes"
     assert robot.perform("ask", ["ann", "Yes?", ("Yes", "No")]) == "Yes"
 

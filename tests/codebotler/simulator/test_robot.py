@@ -8,8 +8,17 @@ from hypothesis import strategies as st
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.robot import Result, RobotError, SimulatedRobot, Thing, _pattern, choose, located
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.robot import (
+    Result,
+    RobotError,
+    SimulatedRobot,
+    Thing,
+    _pattern,
+    choose,
+    located,
+    resolve_room,
+)
+from codebotler.simulator.rules import Matching, Rules
 
 Texts: TypeAlias = tuple[str, ...]
 
@@ -78,6 +87,14 @@ def test_of_two_rooms_in_one_request_the_first_of_the_world_is_meant() -> None:
 
 def test_room_named_later_in_the_world_is_found_where_the_earlier_one_does_not_match() -> None:
     assert go("alice's office", "bob's office", "alice's office") == "alice's office"
+
+
+@pytest.mark.parametrize("matching", ["label-in-request", "whole-words"])
+def test_a_name_is_found_by_itself_though_it_is_another_regex(matching: Matching) -> None:
+    for request in ("Lab (2F)", "lab (2f)"):
+        assert resolve_room(("hall", "Lab (2F)"), request, matching) == "Lab (2F)"
+        assert Thing("lab (2F)").is_meant_by(request, matching)
+    assert resolve_room(("hall", "Lab (2F)"), "Lab (2", matching) is None
 
 
 def test_labels_are_looked_for_without_case_and_across_lines() -> None:

@@ -9,7 +9,8 @@ from codebotler.core.trace import Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError, SimulatedRobot, choose, resolve_room
-from codebotler.simulator.rules import PAPER, Rules
+from codebotler.simulator.rules import PAPER, WORDS_FOR_PEOPLE, Rules
+from roboeval.suites.schema import RulesFile
 
 STRICT = Rules(
     literals="as-written",
@@ -44,6 +45,15 @@ def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
     loose = robot(rules=PAPER)
     loose.perform("go_to", ["room 123"])
     assert (loose.room, loose.trace[0].text) == ("room 1", "room 123")
+
+
+def test_words_for_people_are_usual_ones_where_a_suite_names_none() -> None:
+    rules = RulesFile.model_validate({"people": "own-name-or-word"}).rules()
+    assert robot(rules=rules).rules.words_for_people == WORDS_FOR_PEOPLE
+    assert RulesFile.model_validate(
+        {"people": "own-name-or-word", "words_for_people": ["dog"]}
+    ).rules() == Rules(people="own-name-or-word", words_for_people=("dog",))
+    assert RulesFile().rules() == PAPER
 
 
 WORDS = Rules(

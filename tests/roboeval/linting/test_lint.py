@@ -248,7 +248,7 @@ def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_wa
     speaks = SOLUTIONS.replace("pass", "say('hello')")
     found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], solutions=speaks, untripped=True)
     (message,) = (one.message for one in found if one.kind == "untripped")
-    for name in ("2 wrong programs", '"speaks"', '"not"'):
+    for name in ("2 programs of the task that fail", '"speaks"', '"not"'):
         assert name in message
 
 
@@ -362,6 +362,8 @@ def test_a_person_of_another_room_or_named_by_another_parameter(linted: Lint) ->
 def test_one_of_several_alternatives_that_is_not_in_the_world(linted: Lint) -> None:
     assert names(linted({"goes": 'tr.Exists(goto("kitchen|attic"))'}, ["goes"])) == ["absent: attic in goes"]
     assert linted({"goes": 'tr.Exists(goto("kitchen|conference room"))'}, ["goes"]) == []
+    found = linted({"says": 'tr.Exists(at("kitchn", say("hello")))'}, ["says"])
+    assert "absent: kitchn in says" in names(found)
 
 
 @pytest.mark.parametrize(
@@ -512,6 +514,9 @@ def test_a_solution_that_ends_otherwise_than_its_file_says(
     found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], solutions=solutions, untripped=True)
     (finding,) = (one for one in found if one.kind == "misjudged")
     assert all(name in finding.message for name in named), finding
+    assert finding.path.parts[-2] == "solutions"
+    assert solution.replace("`", '"') in finding.path.read_text().splitlines()[(finding.line or 0) - 1]
+    assert 'by "speaks", in world 1, "' in finding.message or "passes" in named
 
 
 # --- a new task

@@ -274,6 +274,11 @@ def test_nothing_else_is_an_expression(text: str) -> None:
         value(parsed(text), FACTS)
 
 
+def test_who_calls_an_unknown_function_is_told_the_known_ones() -> None:
+    with pytest.raises(ExpressionError, match=r"the functions are count, number, sum"):
+        value(parsed("len(people)"), FACTS)
+
+
 def test_a_loop_binds_one_name() -> None:
     node = parsed("[p for p in people if p.room]")
     assert isinstance(node, ast.ListComp)
