@@ -35,6 +35,8 @@ class Event:
         found: what a look, or another skill that answers yes or no, has returned; None for other kinds.
         place: the room where it happened, as the world names it (for a drive, the room where it started).
         time: simulated seconds since the start of the run.
+        holding: what the robot held when it began; empty for nothing. Rows of evaluations do not keep it.
+        to: whom a question was for, as the program said; None for other kinds. Rows do not keep it either.
     """
 
     kind: str
@@ -44,6 +46,8 @@ class Event:
     found: bool | None = None
     place: str = field(default="", compare=False)
     time: float = field(default=0.0, compare=False)
+    holding: str = field(default="", compare=False)
+    to: str | None = field(default=None, compare=False)
 
     def __init__(  # noqa: PLR0917 - as the generated one would have it
         self,
@@ -54,10 +58,13 @@ class Event:
         found: bool | None = None,  # noqa: FBT001 - the same
         place: str = "",
         time: float = 0.0,
+        holding: str = "",
+        to: str | None = None,
     ) -> None:
         values = self.__dict__  # by far the quickest way to fill what is frozen, and a trace has many events
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
+        values["holding"], values["to"] = holding, to
 
 
 Trace: TypeAlias = tuple[Event, ...]

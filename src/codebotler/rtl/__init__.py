@@ -10,6 +10,7 @@ from codebotler.rtl.formulas import (
     EventPattern,
     Exists,
     Formula,
+    Last,
     Not,
     Or,
     Regex,
@@ -19,6 +20,7 @@ from codebotler.rtl.formulas import (
     Without,
     Words,
 )
+from codebotler.rtl.monitor import Monitor
 from codebotler.rtl.semantics import Inconclusive, holds
 from codebotler.rtl.syntax import RtlSyntaxError, parse
 from codebotler.rtl.text.claims import Claim, Number, Time
@@ -35,6 +37,8 @@ __all__ = [
     "Explanation",
     "Formula",
     "Inconclusive",
+    "Last",
+    "Monitor",
     "Not",
     "Number",
     "Or",

@@ -111,6 +111,9 @@ def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     return None
 
 
+_AtPlace = formulas.ActAtFirst | formulas.ActAtSome
+
+
 class _Fact(NamedTuple):
     """Whether a test is true, in English; the words `the robot` stand before it."""
 
@@ -135,8 +138,9 @@ def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
     element, here = test.element, _positions(test, trace)
     at = next(at for at in here if matches(element, trace, at))
     done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
-    place = "" if isinstance(test, formulas.Exists) else f" in {room(test.arrival.text)}"
-    text = f"{did}{place} at step {at + 1}{_where(test.scopes, trace)}"
+    place = f" in {room(test.arrival.text)}" if isinstance(test, _AtPlace) else ""
+    last = " last," if isinstance(test, formulas.Last) else ""
+    text = f"{did}{place}{last} at step {at + 1}{_where(test.scopes, trace)}"
     return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}")
 
 
@@ -146,6 +150,8 @@ def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
     if isinstance(test, formulas.Exists):
         event, detail = _instead(element, trace, here)
         return _Fact(event, f"never {deed(element, 'past', negated=True)}{where}", detail=detail)
+    if isinstance(test, formulas.Last):
+        return _not_last(element, where, trace, here)
     span = scoped(test.scopes, trace)
     arrivals = [at for at in span if matches(test.arrival, trace, at)]
     if not arrivals:
@@ -164,6 +170,16 @@ def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
     failed = f"did not {deed(element, 'base', negated=True)} {there}{where}"
     text = f"went to {listed(few([*rooms]))} at {_steps(visits)} but {failed}"
     return _Fact(arrivals[0] if event is None else event, text, detail=detail)
+
+
+def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Sequence[int]) -> _Fact:
+    text = f"did not {deed(element, 'base', negated=True)} last{where}"
+    if not here:
+        return _Fact(None, text, detail=": it did nothing")
+    (at,) = here
+    kind, event = trace[at].kind, trace[at]
+    wanted = element if kind == element.kind else formulas.EventPattern(kind, formulas.Regex(".*"))
+    return _Fact(at, text, detail=f": it last {verb(kind).past} {happening(event, wanted)} (step {at + 1})")
 
 
 def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
@@ -191,9 +207,14 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
 def _positions(test: formulas.Presence, trace: Trace) -> Iterable[int]:
     """The positions of the events that a test looks at."""
     span = scoped(test.scopes, trace)
-    if isinstance(test, formulas.ActAtSome):
-        return during_stays(test, trace, span)
-    return span if isinstance(test, formulas.Exists) else first_stay(test, trace, span) or ()
+    match test:
+        case formulas.Exists():
+            return span
+        case formulas.Last():
+            return span[-1:]
+        case formulas.ActAtSome():
+            return during_stays(test, trace, span)
+    return first_stay(test, trace, span) or ()
 
 
 def _where(scopes: tuple[formulas.Scope, ...], trace: Trace) -> str:
@@ -201,7 +222,7 @@ def _where(scopes: tuple[formulas.Scope, ...], trace: Trace) -> str:
     span, parts = range(len(trace)), []
     for scope in scopes:
         at = bound(scope, trace, span)
-        when = "after" if scope.name.startswith("After") else "before"
+        when = "before" if scope.is_before else "after"
         if at is None:
             done = f"{deed(scope.element, 'ing')} (which never happened)"
         else:

@@ -12,7 +12,16 @@ from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
 from codebotler.rtl.text.matcher import Matcher
 
-ScopeName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
+ScopeName: TypeAlias = Literal[
+    "BeforeFirst",
+    "BeforeLast",
+    "AfterFirst",
+    "AfterLast",
+    "OnlyBeforeFirst",
+    "OnlyBeforeLast",
+    "OnlyAfterFirst",
+    "OnlyAfterLast",
+]
 
 
 @dataclass(frozen=True)
@@ -90,6 +99,9 @@ class EventPattern:
         mention: whether `text` may also be found in an option instead of in the question.
         place: a regex that the room's name must hold as a whole word; None for anywhere.
         answer: what the answer to a question must match; None if the answer does not matter.
+        found: whether a look must have succeeded or failed; None if that does not matter.
+        holding: what the robot must have held when it began; None if that does not matter.
+        to: what the person must match whom a question was for; None if that does not matter.
     """
 
     kind: str
@@ -98,18 +110,32 @@ class EventPattern:
     mention: bool = False
     place: str | None = None
     answer: Text | None = None
+    found: bool | None = None
+    holding: Text | None = None
+    to: Text | None = None
 
     @cached_property
     def place_regex(self) -> re.Pattern[str] | None:
         """The compiled regex for the room."""
         return None if self.place is None else whole_word(self.place)
 
+    @cached_property
+    def is_about_more(self) -> bool:
+        """Whether more than the texts and the room matters."""
+        return (self.answer, self.found, self.holding, self.to) != (None, None, None, None)
+
     def __str__(self) -> str:
         if self.answer is not None:
             written = f"answered({self.answer})"
+        elif self.found is not None:
+            written = f"{'found' if self.found else 'missed'}({self.text})"
         else:
             texts = [self.text] if self.options is None else [self.text, self.options]
             written = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
+        if self.to is not None:
+            written = f"to({self.to}, {written})"
+        if self.holding is not None:
+            written = f"holding({self.holding}, {written})"
         return written if self.place is None else f"at({quote(self.place)}, {written})"
 
 
@@ -119,11 +145,22 @@ class Scope:
 
     Args:
         name: which part; the event itself is in none.
-        element: the event that bounds the part; where none matches, the scope is the whole trace.
+        element: the event that bounds the part; where none matches, the scope is the whole trace, or nothing
+            if the name begins with `Only`.
     """
 
     name: ScopeName
     element: EventPattern
+
+    @property
+    def is_only(self) -> bool:
+        """Whether nothing is left where no event matches."""
+        return self.name.startswith("Only")
+
+    @property
+    def is_before(self) -> bool:
+        """Whether it is the part before the event."""
+        return "Before" in self.name
 
     def __str__(self) -> str:
         return f".{self.name}({self.element})"
@@ -143,6 +180,22 @@ class Exists:
 
     def __str__(self) -> str:
         return f"{_scoped(self.scopes)}.Exists({self.element})"
+
+
+@dataclass(frozen=True)
+class Last:
+    """There is a last event, and it matches.
+
+    Args:
+        element: what the event must match.
+        scopes: where to look, each within the one before.
+    """
+
+    element: EventPattern
+    scopes: tuple[Scope, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{_scoped(self.scopes)}.Last({self.element})"
 
 
 @dataclass(frozen=True)
@@ -249,7 +302,7 @@ class Not:
         return f"not {_bracketed(self.part, And | Or)}"
 
 
-Presence: TypeAlias = Exists | ActAtFirst | ActAtSome
+Presence: TypeAlias = Exists | Last | ActAtFirst | ActAtSome
 Test: TypeAlias = Presence | Count | AtLeast
 Formula: TypeAlias = Test | And | Or | Not
 

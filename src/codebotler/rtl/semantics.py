@@ -58,6 +58,8 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
     match test:
         case formulas.Exists(element):
             return first(element, trace, span) is not None
+        case formulas.Last(element):
+            return len(span) > 0 and matches(element, trace, span[-1])
         case formulas.ActAtFirst(_, element):
             stay = first_stay(test, trace, span)
             return stay is not None and first(element, trace, stay) is not None
@@ -76,21 +78,30 @@ def matches(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
     Raises:
         Inconclusive: an option that is no text comes before the first that matches, whatever the question is.
     """
-    return _matches(element, trace[at], at)
+    return is_match(element, trace[at], at)
 
 
-def _matches(element: formulas.EventPattern, event: Event, at: int) -> bool:
+def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
+    """Whether an element matches an event, which is at a position of its trace."""
     if event.kind != element.kind:
         return False
     if element.place_regex is not None and element.place_regex.search(event.place) is None:
         return False
-    if element.answer is not None and (event.answer is None or not element.answer.matches(event.answer)):
+    if element.is_about_more and not _fits(element, event):
         return False
     if element.mention and any(element.text.matches(option.text) for option in event.options):
         return True
     if element.options is not None and not _offers(element, event, at):
         return False
     return element.text.matches(event.text)
+
+
+def _fits(element: formulas.EventPattern, event: Event) -> bool:
+    """Whether answer, find, what is held and who is asked are as an element wants them."""
+    wanted = (element.answer, event.answer), (element.holding, event.holding or None), (element.to, event.to)
+    if any(text is not None and (is_ is None or not text.matches(is_)) for text, is_ in wanted):
+        return False
+    return element.found is None or event.found is element.found
 
 
 def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
@@ -108,7 +119,7 @@ def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> It
     kind = element.kind  # of most events it is another, for which no function need be called
     for at in span:
         event = trace[at]
-        if event.kind == kind and _matches(element, event, at):
+        if event.kind == kind and is_match(element, event, at):
             yield at
 
 
@@ -137,10 +148,10 @@ def bound(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
 
 
 def narrowed(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """What is left of a span by a scope whose bound is at a position; all of it without a bound."""
+    """What is left of a span by a scope whose bound is at a position; all of it, or nothing, without one."""
     if at is None:
-        return span
-    return range(span.start, at) if scope.name.startswith("Before") else range(at + 1, span.stop)
+        return range(span.stop, span.stop) if scope.is_only else span
+    return range(span.start, at) if scope.is_before else range(at + 1, span.stop)
 
 
 def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> range | None:

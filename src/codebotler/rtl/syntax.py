@@ -16,9 +16,11 @@ from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
 SCOPES: dict[str, formulas.ScopeName] = {name: name for name in get_args(formulas.ScopeName)}
-TESTS = ("Exists", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
+TESTS = ("Exists", "Last", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
 TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
 QUESTIONS = ("mention", "answered")
+LOOKS = {"found": True, "missed": False}
+AROUND = ("at", "holding", "to")  # what else an event must be like
 
 DEEPEST = 50
 """How deep a formula may be nested; few enough for Python's stack wherever it is evaluated."""
@@ -63,6 +65,8 @@ class _Parser:
         self.bytes = self.text.encode(errors="replace")  # in which `ast` counts columns
         self.recordings = skills.recordings
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
+        looks = (kind for kind, row in self.recordings.items() if row.names == "object or person")
+        self.look = next(looks, None)
 
     def formula(self) -> formulas.Formula:
         if not self.text:
@@ -103,9 +107,10 @@ class _Parser:
         if name not in TESTS:
             raise self.unknown(function, "test", name, [*TESTS, *SCOPES])
         scopes = self.scopes(function.value)
-        if name == "Exists":
+        if name in {"Exists", "Last"}:
             (element,) = self.arguments(node, function, name, 1)
-            return formulas.Exists(self.element(element), scopes)
+            kind = formulas.Exists if name == "Exists" else formulas.Last
+            return kind(self.element(element), scopes)
         one, other = self.arguments(node, function, name, 2)
         match name:
             case "ActAtFirst":
@@ -135,12 +140,8 @@ class _Parser:
 
     def element(self, node: ast.expr) -> formulas.EventPattern:
         match node:
-            case ast.Call(ast.Name("at")):
-                place, inner = self.arguments(node, node, "at", 2)
-                element = self.element(inner)
-                if element.place is not None:
-                    raise self.error(inner, "at cannot be nested in another at")
-                return replace(element, place=self.word(place))
+            case ast.Call(ast.Name(name)) if name in AROUND:
+                return self.around(name, *self.arguments(node, node, name, 2))
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
                     (text,) = self.arguments(node, node, kind, 1)
@@ -152,9 +153,26 @@ class _Parser:
                 if kind == "mention":
                     return formulas.EventPattern(self.question, self.matched(text), mention=True)
                 return formulas.EventPattern(self.question, formulas.Regex(".*"), answer=self.matched(text))
+            case ast.Call(ast.Name(kind)) if kind in LOOKS and self.look is not None:
+                (text,) = self.arguments(node, node, kind, 1)
+                return formulas.EventPattern(self.look, self.matched(text), found=LOOKS[kind])
             case ast.Call(ast.Name(kind)):
-                raise self.unknown(node, "element", kind, [*self.recordings, *QUESTIONS, "at"])
+                raise self.unknown(node, "element", kind, [*self.recordings, *QUESTIONS, *LOOKS, *AROUND])
         raise self.expected('an element such as goto("lobby")', node)
+
+    def around(self, name: str, what: ast.expr, inner: ast.expr) -> formulas.EventPattern:
+        element = self.element(inner)
+        nested = {"at": element.place, "holding": element.holding, "to": element.to}[name]
+        if nested is not None:
+            raise self.error(inner, f"{name} cannot be nested in another {name}")
+        match name:
+            case "at":
+                return replace(element, place=self.word(what))
+            case "holding":
+                return replace(element, holding=self.matched(what))
+        if element.kind != self.question:
+            raise self.error(inner, "to is about questions; use ask, mention or answered")
+        return replace(element, to=self.matched(what))
 
     def matched(self, node: ast.expr) -> formulas.Text:
         match node:

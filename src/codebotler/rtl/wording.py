@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Literal, TypeAlias
 
@@ -15,6 +15,10 @@ from codebotler.rtl.text.claims import Claim, Number, Time
 
 Form: TypeAlias = Literal["base", "past", "ing"]
 
+_LOOKS: Mapping[bool, Mapping[Form, str]] = {
+    True: {"base": "find", "past": "found", "ing": "finding"},
+    False: {"base": "look in vain for", "past": "looked in vain for", "ing": "looking in vain for"},
+}
 _MOST_LISTED = 5
 _TEXT = r"[\w ',;:!%@&/-]+"
 _ALTERNATIVES = re.compile(rf"{_TEXT}(?:\|{_TEXT})*")
@@ -24,7 +28,9 @@ _WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
 def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
     """What an element asks for, such as `said something with "hello"`; `anything` after a negation."""
     thing = "anything" if negated else "something"
-    if element.answer is not None:
+    if element.found is not None:
+        done = f"{_LOOKS[element.found][form]} {_wanted(element, thing)}"
+    elif element.answer is not None:
         got = {"base": "get", "past": "got", "ing": "getting"}[form]
         done = f"{got} an answer {described(element.answer)}"
     else:
@@ -33,6 +39,10 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
         done += " in the question or an option"
     if element.options is not None and not is_any(element.options):
         done += f" offering an option {described(element.options)}"
+    if element.to is not None:
+        done = f"{done.rstrip()} of somebody {described(element.to)}"
+    if element.holding is not None:
+        done = f"{done.rstrip()} while holding something {described(element.holding)}"
     return done.rstrip() if element.place is None else f"{done.rstrip()} in {room(Regex(element.place))}"
 
 
@@ -54,6 +64,12 @@ def happening(event: Event, element: EventPattern) -> str:
         thing += (
             " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
         )
+    if element.found is not None:
+        thing += " in vain" if event.found is False else " and found it"
+    if element.to is not None:
+        thing += f" of {quoted(event.to or '')}"
+    if element.holding is not None:
+        thing += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
     return thing if element.place is None else f"{thing} in {room_name(event.place)}"
 
 

@@ -1,6 +1,7 @@
 """Random traces and formulas, small enough to meet each other."""
 
 from dataclasses import replace
+from typing import get_args
 
 import pytest
 from hypothesis import strategies as st
@@ -8,6 +9,7 @@ from hypothesis.strategies import SearchStrategy
 
 from codebotler import rtl
 from codebotler.core.trace import Event, Option, Trace
+from codebotler.rtl.formulas import ScopeName
 
 NAMES = st.sampled_from(["a", "b", "ab", "a b", "No"])
 PATTERNS = st.sampled_from([".*", "a", "b", "ab", "a|b", "^b", r"\bb\b", "no", "[", ""]).map(
@@ -29,8 +31,19 @@ def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.EventPatt
     asked = st.builds(rtl.EventPattern, st.just("ask"), texts, texts)
     mentioned = st.builds(rtl.EventPattern, st.just("ask"), texts, st.none(), st.just(value=True))
     answered = st.builds(lambda text: rtl.EventPattern("ask", rtl.Regex(".*"), answer=text), texts)
-    anywhere = plain | asked | mentioned | answered
-    return anywhere | st.builds(lambda element, p: replace(element, place=p), anywhere, patterns)
+    looks = st.builds(lambda text, found: rtl.EventPattern("check", text, found=found), texts, st.booleans())
+    anything = plain | asked | mentioned | answered | looks
+
+    @st.composite
+    def element(draw: st.DrawFn) -> rtl.EventPattern:
+        drawn = draw(anything)
+        if drawn.kind == "ask" and draw(st.booleans()):
+            drawn = replace(drawn, to=draw(texts))
+        if draw(st.integers(0, 3)) == 0:
+            drawn = replace(drawn, holding=draw(texts))
+        return replace(drawn, place=draw(patterns)) if draw(st.booleans()) else drawn
+
+    return element()
 
 
 def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Text]:
@@ -46,11 +59,12 @@ def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Text]:
 
 def tests_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Test]:
     elements = elements_from(patterns)
-    names = st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"])
+    names = st.sampled_from(get_args(ScopeName))
     scopes = st.lists(st.builds(rtl.Scope, names, elements), max_size=3).map(tuple)
     numbers = st.integers(0, 3)
     return st.one_of(
         st.builds(rtl.Exists, elements, scopes),
+        st.builds(rtl.Last, elements, scopes),
         st.builds(rtl.ActAtFirst, patterns, elements, scopes),
         st.builds(rtl.ActAtSome, patterns, elements, scopes),
         st.builds(rtl.Count, elements, numbers, scopes),
@@ -70,10 +84,13 @@ def formulas_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Formula]:
 
 def traces_from(options: SearchStrategy[Option]) -> SearchStrategy[Trace]:
     texts = NAMES | st.sampled_from(["2 a", "no b", "11:00", "3 a and 2 b"])
-    plain = st.builds(Event, st.sampled_from(PLAIN), texts, place=NAMES)
+    held = st.just("") | NAMES
+    plain = st.builds(Event, st.sampled_from(PLAIN), texts, place=NAMES, holding=held)
+    looks = st.builds(Event, st.just("check"), texts, found=st.booleans(), place=NAMES, holding=held)
     offered = st.lists(options, max_size=2).map(tuple)
-    asked = st.builds(Event, st.just("ask"), texts, offered, st.none() | texts, place=NAMES)
-    return st.lists(plain | asked, max_size=8).map(tuple)
+    answer = st.none() | texts
+    asked = st.builds(Event, st.just("ask"), texts, offered, answer, place=NAMES, holding=held, to=held)
+    return st.lists(plain | looks | asked, max_size=8).map(tuple)
 
 
 @pytest.fixture(scope="session")

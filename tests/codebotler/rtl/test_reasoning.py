@@ -162,6 +162,7 @@ TESTS = (
     'ActAtSome("a", say("x"))',
     'ActAtSome("a", goto("a"))',
     'Exists(ask("x", "y"))',
+    'Last(say("x"))',
 )
 
 
@@ -210,17 +211,28 @@ def test_found_traces_and_conflicts_are_right(data: st.DataObject) -> None:
 
 def single_tests() -> st.SearchStrategy[str]:
     elements = st.sampled_from(
-        ['goto("a")', 'goto(without("a"))', 'say("x|y")', 'say(words("x", without("y")))', 'ask("x", "y")']
+        [
+            *(
+                'goto("a")',
+                'goto(without("a"))',
+                'say("x|y")',
+                'say(words("x", without("y")))',
+                'ask("x", "y")',
+            ),
+            *('found("x")', 'missed("x")', 'holding("x", goto("a"))', 'to("x", ask(".*", "y"))'),
+        ]
     )
-    scope = st.builds(
-        "{}({})".format, st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]), elements
-    )
+    scope = st.builds("{}({})".format, st.sampled_from(get_args(ScopeName)), elements)
     scopes = st.lists(scope, max_size=2).map(lambda parts: ".".join(["tr", *parts]))
     counts = st.builds(
         "{}({}, {})".format, st.sampled_from(["Count", "AtLeast"]), elements, st.integers(0, 3)
     )
     acts = st.builds('{}("a", {})'.format, st.sampled_from(["ActAtFirst", "ActAtSome"]), elements)
-    return st.builds("{}.{}".format, scopes, st.one_of(elements.map("Exists({})".format), counts, acts))
+    return st.builds(
+        "{}.{}".format,
+        scopes,
+        st.one_of(elements.map("Exists({})".format), elements.map("Last({})".format), counts, acts),
+    )
 
 
 def formulas() -> st.SearchStrategy[Formula]:

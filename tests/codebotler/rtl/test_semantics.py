@@ -22,6 +22,7 @@ from codebotler.rtl import (
     Exists,
     Formula,
     Inconclusive,
+    Last,
     Not,
     Number,
     Or,
@@ -82,12 +83,16 @@ def same(element: EventPattern, placed: tuple[int, Event]) -> bool:
         return False
     if element.place is not None and not found(Regex(rf"\b(?:{element.place})\b"), event.place):
         return False
-    if element.answer is not None:
-        return (
-            event.answer is not None
-            and found(element.answer, event.answer)
-            and found(element.text, event.text)
-        )
+    held, to, answer = event.holding or None, event.to, event.answer
+    for wanted, actual in ((element.holding, held), (element.to, to), (element.answer, answer)):
+        if wanted is not None and (actual is None or not found(wanted, actual)):
+            return False
+    if element.found is not None and event.found is not element.found:
+        return False
+    return matches_text(element, event, at)
+
+
+def matches_text(element: EventPattern, event: Event, at: int) -> bool:
     if element.mention:
         return any(found(element.text, text) for text in (event.text, *(o.text for o in event.options)))
     if element.options is None:
@@ -142,11 +147,19 @@ def count(tr: Placed, e: EventPattern, n: int) -> bool:
     return at_least(tr, e, n) and not at_least(tr, e, n + 1)
 
 
+def only(scope: Callable[[Placed, EventPattern], Placed]) -> Callable[[Placed, EventPattern], Placed]:
+    return lambda tr, e: scope(tr, e) if exists(tr, e) else []
+
+
 SCOPES: dict[str, Callable[[Placed, EventPattern], Placed]] = {
     "BeforeFirst": before_first,
     "BeforeLast": before_last,
     "AfterFirst": after_first,
     "AfterLast": after_last,
+    "OnlyBeforeFirst": only(before_first),
+    "OnlyBeforeLast": only(before_last),
+    "OnlyAfterFirst": only(after_first),
+    "OnlyAfterLast": only(after_last),
 }
 
 
@@ -169,6 +182,8 @@ def defined_test(test: Test, tr: Placed) -> bool:
     match test:
         case Exists(e):
             return exists(tr, e)
+        case Last(e):
+            return bool(tr) and same(e, tr[-1])
         case ActAtFirst(p, e):
             return act_at_first(tr, p, e)
         case ActAtSome(p, e):

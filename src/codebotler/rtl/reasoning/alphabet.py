@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, overload
 
 from codebotler.core.trace import Event, Option
 from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
@@ -24,19 +25,33 @@ def elements(formula: Formula) -> Iterator[EventPattern]:
             yield formula.element
 
 
-def alphabet(wanted: Iterable[EventPattern], rooms: Sequence[str] | None = None) -> list[Event]:
-    """Events in given rooms, or any, that match elements in all combinations for which strings were found."""
+def alphabet(
+    wanted: Iterable[EventPattern],
+    rooms: Sequence[str] | None = None,
+    moves: Sequence[str] | None = None,
+) -> list[Event]:
+    """Events that match elements in all combinations for which strings were found.
+
+    Args:
+        wanted: the elements.
+        rooms: where events happen; by default in rooms of any names.
+        moves: the requests to move; by default any texts.
+    """
     kinds: dict[str, list[EventPattern]] = {}
     for element in dict.fromkeys(wanted):
         kinds.setdefault(element.kind, []).append(element)
     places = _places([element for alike in kinds.values() for element in alike], rooms)
+    held = _texts([element.holding for alike in kinds.values() for element in alike], nothing="")
     return [
-        Event(kind, text, options, answer, place=place)
+        Event(kind, text, options, answer, found, place, holding=holding, to=to)
         for kind, alike in kinds.items()
-        for text in distinct_strings(_distinct(element.text for element in alike))
+        for text in (moves if kind == "goto" and moves is not None else _requests(alike))
         for options in _options(alike)
-        for answer in _answers(alike)
-        for place in (places if kind != "goto" else [""])
+        for answer in _texts([element.answer for element in alike])
+        for found in ([None] if all(e.found is None for e in alike) else [True, False])
+        for place in (places if kind != "goto" or any(e.place for e in alike) else [""])
+        for holding in (held if any(e.holding for e in alike) else [""])
+        for to in _texts([element.to for element in alike])
     ]
 
 
@@ -52,9 +67,18 @@ def _places(wanted: Sequence[EventPattern], rooms: Sequence[str] | None) -> Sequ
     return distinct_strings(regexes) if rooms is None else rooms
 
 
-def _answers(wanted: Sequence[EventPattern]) -> list[str | None]:
-    answers = _distinct(element.answer for element in wanted)
-    return [None, *(distinct_strings(answers, outer=True) if answers else ())]
+def _requests(alike: Sequence[EventPattern]) -> Sequence[str]:
+    return distinct_strings(_distinct(element.text for element in alike))
+
+
+@overload
+def _texts(wanted: Sequence[Text | None]) -> list[str | None]: ...
+@overload
+def _texts(wanted: Sequence[Text | None], nothing: str) -> list[str]: ...
+def _texts(wanted: Sequence[Text | None], nothing: str | None = None) -> list[Any]:
+    """Texts that match in all combinations, and what stands for there being none."""
+    texts = _distinct(wanted)
+    return [*dict.fromkeys([nothing, *(distinct_strings(texts, outer=True) if texts else ())])]
 
 
 def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:

@@ -33,7 +33,7 @@ class Automaton:
     @lru_cache(maxsize=1_000)  # worlds of a task have most requirements in common
     def of(cls, formula: formulas.Formula, letters: tuple[Letter, ...]) -> Automaton:
         """The automaton of a formula, reading these letters."""
-        machine = _machine(formula)
+        machine = machine_of(formula)
         number: dict[State, int] = {machine.start: 0}
         rows: list[list[int]] = []
         states = [machine.start]
@@ -73,7 +73,7 @@ class Automaton:
         return tuple(found)
 
 
-class _Machine(NamedTuple):
+class Machine(NamedTuple):
     """An automaton before its states are numbered."""
 
     start: State
@@ -81,13 +81,14 @@ class _Machine(NamedTuple):
     accepts: Callable[[Any], bool]
 
 
-def _machine(formula: formulas.Formula) -> _Machine:
+def machine_of(formula: formulas.Formula) -> Machine:
+    """The automaton of a formula, whose states are found as they are needed."""
     match formula:
         case formulas.And(parts) | formulas.Or(parts):
-            return _together([*map(_machine, parts)], all if isinstance(formula, formulas.And) else any)
+            return _together([*map(machine_of, parts)], all if isinstance(formula, formulas.And) else any)
         case formulas.Not(part):
-            start, step, accepts = _machine(part)
-            return _Machine(start, step, lambda state: not accepts(state))
+            start, step, accepts = machine_of(part)
+            return Machine(start, step, lambda state: not accepts(state))
         case formulas.ActAtFirst():
             arrival = formula.arrival
             stay = (
@@ -95,7 +96,7 @@ def _machine(formula: formulas.Formula) -> _Machine:
                 formulas.Scope("AfterFirst", arrival),
                 formulas.Scope("BeforeFirst", formula.departure),
             )
-            return _machine(
+            return machine_of(
                 formulas.And(
                     (formulas.Exists(arrival, formula.scopes), formulas.Exists(formula.element, stay))
                 )
@@ -104,6 +105,8 @@ def _machine(formula: formulas.Formula) -> _Machine:
             machine = _during_stays(formula)
         case formulas.Exists(element):
             machine = _counter(element, 1, 1)
+        case formulas.Last(element):
+            machine = Machine(0, lambda _, letter: int(element in letter), bool)
         case formulas.AtLeast(element, number):
             machine = _counter(element, number, number)
         case formulas.Count(element, number):
@@ -115,50 +118,69 @@ def _machine(formula: formulas.Formula) -> _Machine:
     return machine
 
 
-def _together(machines: Sequence[_Machine], join: Callable[[list[bool]], bool]) -> _Machine:
-    return _Machine(
+def _together(machines: Sequence[Machine], join: Callable[[list[bool]], bool]) -> Machine:
+    return Machine(
         tuple(machine.start for machine in machines),
         lambda state, letter: tuple(m.step(s, letter) for m, s in zip(machines, state, strict=True)),
         lambda state: join([m.accepts(s) for m, s in zip(machines, state, strict=True)]),
     )
 
 
-def _counter(element: formulas.EventPattern, number: int, most: int) -> _Machine:
-    return _Machine(0, lambda n, letter: min(n + (element in letter), most), lambda n: n == number)
+def _counter(element: formulas.EventPattern, number: int, most: int) -> Machine:
+    return Machine(0, lambda n, letter: min(n + (element in letter), most), lambda n: n == number)
 
 
-def _during_stays(test: formulas.ActAtSome) -> _Machine:
+def _during_stays(test: formulas.ActAtSome) -> Machine:
     def step(state: str, letter: Letter) -> State:
         stays = state == "there" and test.departure not in letter
         if state == "done" or (stays and test.element in letter):
             return "done"
         return "there" if stays or test.arrival in letter else "away"
 
-    return _Machine("away", step, lambda state: state == "done")
+    return Machine("away", step, lambda state: state == "done")
 
 
-def _within(scope: formulas.Scope, inner: _Machine) -> _Machine:
-    """The machine that lets an inner one read only the events in a scope."""
+def _within(scope: formulas.Scope, inner: Machine) -> Machine:
+    """The machine that lets an inner one read only the events in a scope.
+
+    Its state is whether the event has come, and the inner state.
+    """
     at, (start, step, accepts) = scope.element, inner
-    match scope.name:
-        case "BeforeFirst":  # whether the event has come, and the inner state
-            return _Machine(
-                (False, start),
-                lambda s, letter: (True, s[1]) if s[0] or at in letter else (False, step(s[1], letter)),
-                lambda s: accepts(s[1]),
-            )
+    match scope.name.removeprefix("Only"):
+        case "BeforeFirst":
+
+            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401 - as in Machine
+                came, here = state
+                return (True, here) if came or at in letter else (False, step(here, letter))
+
         case "AfterFirst":
-            return _Machine(
-                (False, start),
-                lambda s, letter: (True, start) if not s[0] and at in letter else (s[0], step(s[1], letter)),
-                lambda s: accepts(s[1]),
-            )
-        case "BeforeLast":  # the inner state, and what it was when the event last came
-            return _Machine(
-                (start, ()),
-                lambda s, letter: (step(s[0], letter), (s[0],) if at in letter else s[1]),
-                lambda s: accepts(s[1][0] if s[1] else s[0]),
-            )
+
+            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401
+                came, here = state
+                return (True, start) if not came and at in letter else (came, step(here, letter))
+
         case "AfterLast":
-            return _Machine(start, lambda s, letter: start if at in letter else step(s, letter), accepts)
-    assert_never(scope.name)
+
+            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401
+                came, here = state
+                return (True, start) if at in letter else (came, step(here, letter))
+
+        case _:
+            return _before_last(scope, inner)
+
+    def accepted(state: Any) -> bool:  # noqa: ANN401
+        came, here = state
+        return accepts(start if scope.is_only and not came else here)
+
+    return Machine((False, start), read, accepted)
+
+
+def _before_last(scope: formulas.Scope, inner: Machine) -> Machine:
+    """The same for what is before the last event: the inner state, and what it was when that last came."""
+    at, (start, step, accepts) = scope.element, inner
+    nothing = (start,) if scope.is_only else ()
+    return Machine(
+        (start, nothing),
+        lambda s, letter: (step(s[0], letter), (s[0],) if at in letter else s[1]),
+        lambda s: accepts(s[1][0] if s[1] else s[0]),
+    )

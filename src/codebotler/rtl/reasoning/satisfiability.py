@@ -40,9 +40,8 @@ class Reasoner:
     ) -> None:
         wanted = [*dict.fromkeys(chain.from_iterable(map(elements, formulas)))]
         rooms = None if moves is None else [*dict.fromkeys([start, *moves.values()])]
-        events = alphabet(wanted, rooms)
-        if moves is not None:
-            events = [event for event in events if event.kind != "goto"]
+        events = alphabet(wanted, rooms, None if moves is None else [*moves])
+        if moves is not None and all(event.kind != "goto" for event in events):
             events += [Event("goto", move) for move in moves]
         distinct: dict[tuple[object, ...], tuple[list[bool], Event]] = {}
         for event in events:  # of tens of thousands, only hundreds differ in what they match
@@ -119,7 +118,14 @@ def _driving(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, 
     kinds = [(event.text if event.kind == "goto" else "", event.place) for event in events]
     number = {kind: index for index, kind in enumerate(dict.fromkeys(kinds))}
     rows = [
-        tuple(rooms.index(moves[move]) if move else here if room == place else lost for move, place in number)
+        tuple(
+            lost
+            if place not in {room, *([""] if move else [])}
+            else rooms.index(moves[move])
+            if move
+            else here
+            for move, place in number
+        )
         for here, room in enumerate(rooms)
     ]
     automaton = Automaton((*rows, (lost,) * len(number)), (*(True for _ in rooms), False))

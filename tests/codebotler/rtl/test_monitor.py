@@ -1,0 +1,107 @@
+"""The monitor, against `holds` on every prefix, and against all that can follow."""
+
+import pickle
+from itertools import product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from codebotler.core.trace import Event, Option, Trace
+from codebotler.rtl import Formula, Inconclusive, Monitor, holds, parse
+
+ROOMS = (Event("goto", "kitchen"), Event("goto", "office"), Event("say", "knock knock"))
+KNOCK = parse(
+    'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))'
+)
+
+
+@settings(max_examples=300)
+@given(st.data())
+def test_it_says_of_every_prefix_what_the_formula_does(
+    formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    formula, trace = data.draw(formulas), data.draw(traces)
+    monitor = Monitor(formula)
+    assert monitor.holds == holds(formula, ())
+    for end, event in enumerate(trace, 1):
+        ahead = monitor.would_hold(event)
+        assert monitor.feed(event) == monitor.holds == ahead == holds(formula, trace[:end])
+    assert monitor.is_final is None
+
+
+TEXTS = (
+    'not tr.Exists(goto("kitchen"))',
+    'tr.Exists(goto("kitchen"))',
+    'tr.AtLeast(say("knock"), 2)',
+    'tr.Count(goto("office"), 1)',
+    'tr.Last(goto("office"))',
+    'tr.AfterFirst(goto("kitchen")).Exists(goto("office")) and not tr.Exists(say("knock"))',
+    'tr.OnlyAfterLast(goto("kitchen")).Exists(say("knock"))',
+    'tr.BeforeFirst(goto("kitchen")).Exists(goto("office"))',
+    'tr.Exists(goto("attic"))',
+    'tr.AtLeast(goto("attic"), 0)',
+    str(KNOCK),
+)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_what_is_final_is_so_whatever_follows(text: str) -> None:
+    formula, length = parse(text), 3
+    for word in product(ROOMS, repeat=length):
+        monitor = Monitor(formula, ROOMS)
+        for end in range(length + 1):
+            if end:
+                monitor.feed(word[end - 1])
+            futures = (word[:end] + more for n in range(4) for more in product(ROOMS, repeat=n))
+            same = len({holds(formula, future) for future in futures}) == 1
+            assert monitor.is_final is same, (word[:end], text)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_what_is_final_stays_so_for_any_formula(
+    formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    formula, trace = data.draw(formulas), data.draw(traces)
+    monitor, final = Monitor(formula, trace), None
+    for event in trace:
+        now = monitor.feed(event)
+        assert final is None or now is final
+        final = now if monitor.is_final else final
+
+
+def test_what_cannot_happen_is_refused_and_does_not_count() -> None:
+    monitor = Monitor(parse('tr.Exists(say("attic"))'), ROOMS)
+    assert monitor.is_final
+    with pytest.raises(ValueError, match="not one of those"):
+        monitor.feed(Event("say", "attic"))
+    assert not monitor.holds
+    assert not monitor.feed(Event("goto", "another room"))  # as the others, by what the formula compares
+
+
+def test_a_formula_too_large_to_look_ahead_is_inconclusive() -> None:
+    parts = " and ".join(f'tr.Count(say("{name}"), 50)' for name in "abcd")
+    monitor = Monitor(parse(parts), [Event("say", name) for name in "abcd"])
+    assert monitor.is_final is None
+    assert not monitor.feed(Event("say", "a"))
+
+
+def test_an_option_that_is_no_text_is_never_judged() -> None:
+    monitor = Monitor(parse('not tr.Exists(ask("tea", "yes"))'))
+    odd = Event("ask", "tea?", (Option("1", is_text=False),))
+    for judge in (monitor.feed, monitor.would_hold):
+        with pytest.raises(Inconclusive):
+            judge(odd)
+    assert monitor.holds
+
+
+def test_what_it_remembers_does_not_grow_with_the_trace() -> None:
+    monitor, sizes = Monitor(KNOCK), set()
+    for round_ in range(1_000):
+        for event in ROOMS:
+            monitor.feed(event)
+        if round_ in {1, 999}:
+            sizes.add(len(pickle.dumps(monitor._state)))
+    assert len(sizes) == 1
