@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.trace import Option
+from codebotler.core.trace import Event, Option
+from codebotler.rtl import parse
+from codebotler.simulator.guard import Rule
 
 SOURCES = Path(__file__).parent.parent / "src"
-ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError"}
+ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError", "RobotError"}
 WITHIN = {
     "codebotler.robots.ros.workers.channel",
     "codebotler.simulator.sandbox.execution",
@@ -23,7 +25,11 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.models.base.ModelError": (A_SENTENCE, {"may_pass": True, "retry_after": 2.5}),
     "codebotler.rtl.semantics.Inconclusive": ((4, 1, Option("3", is_text=False)), {}),
     "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
-    "codebotler.simulator.robot.RobotError": (("PickInvalidObject", "there is no mug"), {}),
+    "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),
+    "codebotler.simulator.guard.RuleViolationError": (
+        (Rule("quiet", "Be quiet.", parse('not tr.Exists(say(".*"))')), Event("say", "hello")),
+        {"is_late": True},
+    ),
     "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
     "roboeval.web.run_store.RunGoneError": (A_SENTENCE, {"file": "runs/a"}),
 }

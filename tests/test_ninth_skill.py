@@ -8,7 +8,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.checking.storyboard import step_text, steps_of
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.program import Flaw, Program
 from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable, Verb
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, trace_data, trace_from
@@ -16,7 +16,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
+from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.sampled_robot import SAMPLED
 from roboeval.suites.load import SUITES, load_suite
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError
 from codebotler.robots.ros.ros1 import MEND
-from codebotler.simulator.robot import RobotError
 from ros_graph import GO_TO, Graph, Process, free_port, installed, started
 
 PAGE = (Path(__file__).parents[2] / "docs" / "ros.md").read_text()

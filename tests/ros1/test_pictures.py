@@ -20,13 +20,13 @@ import pytest
 from mcap.reader import make_reader
 from PIL import Image
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.missions.log import events_of
 from codebotler.perception import image_of
 from codebotler.robots.base import ROS_PYTHON, CancelledError, Picture
 from codebotler.robots.ros.robot import Waits
 from codebotler.robots.ros.worker import WORKERS
-from codebotler.simulator.robot import RobotError
 from ros_graph import LONG, Graph, Process, free_port, started
 from server import Fault, Request, Server
 

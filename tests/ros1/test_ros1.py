@@ -15,13 +15,12 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills import SKILLS, Parameter, RosAction, Skill
 from codebotler.robots.base import ROS_PYTHON, CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros.robot import RosRobot, Waits
 from codebotler.robots.ros.worker import WORKERS
-from codebotler.simulator.robot import RobotError
 from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
 
 

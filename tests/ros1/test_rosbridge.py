@@ -20,12 +20,12 @@ import pytest
 from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import rosbridge
 from codebotler.robots.ros.robot import RosRobot, Waits
-from codebotler.simulator.robot import RobotError
 from processes import are_gone, children_of
 from ros_graph import GO_TO, SAY, Graph, free_port, started
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.trace import Status
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot
@@ -23,7 +24,6 @@ from codebotler.robots.open import open_robot
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.simulated import ROBOT_RULES
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import RobotError
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
 from ros_graph import Graph, free_port, started

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
@@ -22,7 +22,6 @@ from codebotler.robots.ros import ros2
 from codebotler.robots.ros.robot import RosRobot, Waits
 from codebotler.robots.ros.ros2 import NOTE, readiness
 from codebotler.robots.ros.worker import WORKERS
-from codebotler.simulator.robot import RobotError
 
 STUB = Path(__file__).parent / "stub"
 WAITS = Waits(patience=1.0, silence=0.5, longest=20.0)

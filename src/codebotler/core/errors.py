@@ -78,3 +78,25 @@ def installed() -> Iterator[None]:
         if not package:
             raise
         raise UserError(f"{package} is not installed; `{install_command(package)}` installs it") from None
+
+
+class RobotError(Exception):
+    """The robot cannot do what it was asked to do.
+
+    Args:
+        kind: one of the seven kinds of the taxonomy (paper, section V.B, and AskInvalidOptions), or
+            RuleViolation.
+        message: why, in a sentence.
+    """
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+    @property
+    def ends_run(self) -> bool:
+        """Whether the program cannot go on, whatever it catches."""
+        return False
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.kind, str(self)), vars(self)

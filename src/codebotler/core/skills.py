@@ -25,6 +25,7 @@ class Recording:
     kind: str  # of the event, and its name in RTL, such as `goto`
     text: str  # the parameter whose value is the event's text
     options: str | None = None  # the parameter whose value is the event's list of options
+    to: str | None = None  # the parameter that says whom it is for
     names: str = ""  # the sort of thing that the text names, such as `room`; empty for what is spoken
     when_tried: bool = False  # whether an attempt that fails is an event, too
 
@@ -200,7 +201,7 @@ SKILLS = SkillTable(
             (Parameter("person"), Parameter("question"), Parameter("options", list, "list[str]")),
             "str",
             "Ask a person in the same room a question and return the option that they choose.",
-            Recording("ask", "question", "options", when_tried=True),
+            Recording("ask", "question", "options", to="person", when_tried=True),
             RosAction(
                 "Ask", "/ask_server", ("string person", "string question", "string[] options"), "string"
             ),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, NamedTuple, TypeAlias
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills import SKILLS, Skill, SkillTable
 
 
 class Option(NamedTuple):
@@ -65,6 +65,26 @@ class Event:
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
         values["holding"], values["to"] = holding, to
+
+
+def attempted(
+    skill: Skill,
+    arguments: Sequence[str | tuple[Option, ...]],
+    *,
+    place: str,
+    time: float,
+    holding: str = "",
+) -> Event | None:
+    """The event that a skill leaves if it is executed now; None for skills without one."""
+    if skill.recording is None:
+        return None
+    given = dict(zip((p.name for p in skill.parameters), arguments, strict=True))
+    text, options = given[skill.recording.text], given.get(skill.recording.options or "", ())
+    to = given.get(skill.recording.to or "")
+    assert isinstance(text, str)
+    assert not isinstance(options, str)
+    assert not isinstance(to, tuple)
+    return Event(skill.recording.kind, text.strip(), options, place=place, time=time, holding=holding, to=to)
 
 
 Trace: TypeAlias = tuple[Event, ...]

@@ -8,11 +8,12 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, Protocol
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import Skill
 from codebotler.core.trace import Event, Trace
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
-from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rules import ENDLESS, Rules
 
 RETURNS: Mapping[str, type] = {"str": str, "bool": bool, "list[str]": list, "None": type(None)}

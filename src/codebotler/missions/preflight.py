@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 from codebotler.checking.problems import no_room
 from codebotler.checking.room_names import named_rooms
+from codebotler.core.errors import RobotError
 from codebotler.core.program import called_skills, tree_of
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.live import answered
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
-from codebotler.simulator.robot import RobotError
 from codebotler.simulator.sampled_robot import RoomMap
 
 MOST_ROOMS = 1_000

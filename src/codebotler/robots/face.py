@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS, Recording, Skill, SkillTable
 from codebotler.core.words import counted
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
 from codebotler.robots.clock import Clock
-from codebotler.simulator.robot import RobotError
 
 PATIENCE = 60.0  # real seconds that people have for an answer by default
 TIMED_OUT = "AskTimeout"  # kind of the error

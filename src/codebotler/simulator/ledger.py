@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SkillTable
 from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
-from codebotler.simulator.robot import Argument, Result, RobotError, SimulatedRobot
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 
 FEW = 50  # calls of which nothing is remembered
@@ -52,6 +53,7 @@ class Ledger:
         self.calls = self.text = 0  # characters of all texts
         self.limit: str | None = None  # the one that was reached, in words
         self.errors: list[RobotError] = []
+        self.broken: RobotError | None = None  # of a rule: it has ended the run
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
         """Let the robot execute one skill, unless that goes beyond a limit."""
@@ -61,6 +63,9 @@ class Ledger:
         try:
             result = self.robot.perform(skill, arguments)
         except RobotError as error:
+            if error.ends_run:
+                self.broken, self.limit = error, str(error)
+                return STOP
             self.errors.append(error)
             return ("error", (len(self.errors) - 1, error.kind, str(error)))
         return ("ok", result)
@@ -77,7 +82,8 @@ class Ledger:
         """The outcome of a run, by what its process said at the end."""
         line = final.get("line")
         if self.limit is not None:
-            return self.outcome(Status.TIMEOUT, "TimeoutError", self.limit, line)
+            status = Status.TIMEOUT if self.broken is None else Status.ROBOT_ERROR
+            return self.outcome(status, getattr(self.broken, "kind", "TimeoutError"), self.limit, line)
         match final:
             case {"end": "finished"}:
                 return Outcome(Status.FINISHED, self.robot.trace)
@@ -118,6 +124,14 @@ class Ledger:
             self.limit = f"texts of more than {limits.trace:,} characters in all"
 
 
+def kept(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
+    """The outcome of a run in simulation, which has finished only if all rules are kept at its end."""
+    unkept = robot.guard.at_end() if robot.guard is not None and outcome.error is None else None
+    if unkept is None:
+        return outcome
+    return Outcome(Status.ROBOT_ERROR, outcome.trace, RunError(unkept.kind, str(unkept)))
+
+
 def too_long(limits: Limits) -> str:
     """The limit that a text has reached, in words."""
     return f"a text of more than {limits.text:,} characters"
@@ -143,6 +157,8 @@ class RememberingLedger(Ledger):
 
     @cached_property
     def _idle(self) -> frozenset[str]:
+        if self._simulated.guard is not None:  # which sees each event
+            return frozenset()
         return self._simulated.idle_skills.difference(self._simulated.own_skills)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:

@@ -6,31 +6,17 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.trace import Event, Option, Trace
+from codebotler.core.trace import Event, Option, Trace, attempted
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.rules import PAPER, Matching, Rules
 
-
-class RobotError(Exception):
-    """The robot cannot do what it was asked to do.
-
-    Args:
-        kind: one of the seven kinds of the taxonomy (paper, section V.B, and AskInvalidOptions).
-        message: why, in a sentence.
-    """
-
-    def __init__(self, kind: str, message: str) -> None:
-        super().__init__(message)
-        self.kind = kind
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.kind, str(self)), vars(self)
-
+if TYPE_CHECKING:
+    from codebotler.simulator.guard import Guard
 
 Argument: TypeAlias = str | tuple[Option, ...]
 Result: TypeAlias = str | list[str] | bool | int | None
@@ -90,7 +76,10 @@ class SimulatedRobot:
         rules: Rules = PAPER,
         skills: SkillTable = SKILLS,
         behaviours: Mapping[str, Behaviour] | None = None,
+        *,
+        guard: Guard | None = None,
     ) -> None:
+        self.guard = guard
         self.world, self.rules, self.skills = world, rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
         self.setup: Setup = ("simulated", (world, rules))
@@ -141,6 +130,34 @@ class SimulatedRobot:
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill; a question is answered by the position of the chosen option."""
+        if self.guard is not None:
+            return self._perform_guarded(self.guard, skill, arguments)
+        return self._perform(skill, arguments)
+
+    def _perform_guarded(self, guard: Guard, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Execute one skill, unless a rule forbids it; RuleViolation if it does, or was broken by it."""
+        row, before = self.skills[skill], len(self.events)
+        attempt = attempted(row, arguments, place=self.room, time=self.now, holding=self.held or "")
+        if attempt is None:
+            return self._perform(skill, arguments)
+        is_drive = row.recording is not None and row.recording.is_drive
+        meant = (replace(attempt, text=room) for room in self.meant_rooms(attempt.text)) if is_drive else ()
+        guard.judge(attempt, *meant)
+        try:
+            result = self._perform(skill, arguments)
+        except RobotError:
+            for event in self.events[before:]:
+                guard.happened(event)
+            raise
+        for event in self.events[before:]:
+            guard.happened(replace(event, text=self.room) if is_drive else event)
+        return result
+
+    def meant_rooms(self, request: str) -> Sequence[str]:
+        """All rooms that a request may mean."""
+        return [room for room in self.rooms if finds(request, room, self.rules.matching)]
+
+    def _perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         result = self.behaviours[skill](self, *arguments)
         if isinstance(result, bool) and self.events and self.events[-1].found is None:
             self._add_result(skill, found=result)
@@ -157,23 +174,29 @@ class SimulatedRobot:
         self.now = now
 
     def record(
-        self, kind: str, text: str, options: tuple[Option, ...] = (), *, found: bool | None = None
+        self,
+        kind: str,
+        text: str,
+        options: tuple[Option, ...] = (),
+        *,
+        found: bool | None = None,
+        to: str | None = None,
     ) -> None:
         """Add an event that happens here and now; the text loses the spaces at its ends."""
-        self.events.append(Event(kind, text.strip(), options, None, found, self.room, self.now))
+        held = self.held or ""
+        self.events.append(Event(kind, text.strip(), options, None, found, self.room, self.now, held, to))
 
     def repeat(self, events: Sequence[Event]) -> None:
         """Add events that happened here before, and happen again now."""
         for event in events:
-            again = Event(
-                event.kind, event.text, event.options, event.answer, event.found, self.room, self.now
-            )
-            self.events.append(again)
+            seen = event.kind, event.text, event.options, event.answer, event.found
+            self.events.append(Event(*seen, self.room, self.now, event.holding, event.to))
 
     def amend(self, answer: str) -> None:
         """Add to the last event what was answered."""
         last = self.events[-1]
-        self.events[-1] = Event(last.kind, last.text, last.options, answer, last.found, last.place, last.time)
+        asked = last.kind, last.text, last.options, answer, last.found
+        self.events[-1] = Event(*asked, last.place, last.time, last.holding, last.to)
 
 
 def own_skills(
@@ -284,7 +307,7 @@ def say(robot: SimulatedRobot, message: str) -> None:
 
 def ask(robot: SimulatedRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
     """Ask the first person here who is meant, and return the position of the option they choose."""
-    robot.record("ask", question, options)
+    robot.record("ask", question, options, to=person)
     if not options:
         raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
     here = (one for one in robot.people[robot.room] if one.is_here)
@@ -353,8 +376,8 @@ def pick(robot: SimulatedRobot, obj: str) -> None:
     if thing is None:
         raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{robot.room}"')
     here.remove(thing)
-    robot.held, robot.taken = obj, thing
     robot.record("pick", obj if robot.rules.events == "as-requested" else thing.label)
+    robot.held, robot.taken = obj, thing
 
 
 def place(robot: SimulatedRobot, obj: str) -> None:
@@ -368,8 +391,8 @@ def place(robot: SimulatedRobot, obj: str) -> None:
         holds = "nothing" if robot.held is None else f'"{robot.held}"'
         raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
     robot.things[robot.room].append(taken or Thing(obj, is_pattern=False))
-    robot.held = robot.taken = None
     robot.record("place", taken.label if taken else obj)
+    robot.held = robot.taken = None
 
 
 BEHAVIOURS: Mapping[str, Behaviour] = {

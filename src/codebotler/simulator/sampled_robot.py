@@ -7,8 +7,9 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Option
 from codebotler.core.words import brief
@@ -17,13 +18,15 @@ from codebotler.simulator import robot as real
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.robot import (
     Behaviour,
-    RobotError,
     SimulatedRobot,
     Thing,
     found_in,
     own_skills,
 )
 from codebotler.simulator.rules import Rules
+
+if TYPE_CHECKING:
+    from codebotler.simulator.guard import Guard
 
 AS_WRITTEN = Rules(literals="as-written")  # for a program that a robot is to run: nothing in it is changed
 
@@ -150,9 +153,12 @@ class SampledRobot(SimulatedRobot):
         rules: Rules = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         behaviours: Mapping[str, Behaviour] | None = None,
+        *,
+        guard: Guard | None = None,
     ) -> None:
         does = SAMPLED if behaviours is None else behaviours
-        super().__init__(World(tuple(map(Room, room_map.rooms)), room_map.start), rules, skills, does)
+        world = World(tuple(map(Room, room_map.rooms)), room_map.start)
+        super().__init__(world, rules, skills, does, guard=guard)
         self.setup = "sampled", (room_map, sampler, rules)
         self.room_map, self.sampler = room_map, sampler
         self.things = defaultdict(list)
@@ -173,6 +179,11 @@ class SampledRobot(SimulatedRobot):
     def idle_skills(self) -> frozenset[str]:
         """The skills that leave the robot and its world as they are, once the first has drawn its facts."""
         return self.skills_that(real.IDLE | {look})
+
+    def meant_rooms(self, request: str) -> Sequence[str]:
+        """All rooms that a request may mean."""
+        room = self.room_map.room(request)
+        return [*super().meant_rooms(request), *([] if room is None else [room])]
 
     @property
     def here(self) -> ExploredRoom:
@@ -274,7 +285,7 @@ def ask(robot: SampledRobot, person: str, question: str, options: tuple[Option, 
         lost = robot.search(who).is_lost or robot.search(SOMEBODY).is_lost
         with robot.excused(when=bool(options) and lost):
             return real.ask(robot, person, question, options)
-    robot.record("ask", question, options)
+    robot.record("ask", question, options, to=person)
     asked = (robot.room, who, question.strip())
     texts = [option.text for option in options]
     if robot.answers.get(asked) not in texts:

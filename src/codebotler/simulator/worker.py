@@ -12,7 +12,7 @@ from codebotler.core.trace import Outcome
 from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fork_server import BatchServer, ForkServer
 from codebotler.simulator.isolated_process import LostProcessError, ProtocolError
-from codebotler.simulator.ledger import SkillPerformer
+from codebotler.simulator.ledger import SkillPerformer, kept
 from codebotler.simulator.preparer import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
@@ -130,6 +130,8 @@ class Worker:
 
     def _tame(self, jobs: Sequence[Job]) -> Iterator[tuple[int, bytes, list[SimulatedRobot]]]:
         robot = jobs[0][1][0]()
+        if robot.guard is not None and robot.guard.may_refuse:
+            return  # the child's copies refuse nothing
         lowercase = robot.rules.literals == "lowercase"
         sources = [source for source, _ in jobs]
         told = self._preparer.prepare_all(sources, lowercase=lowercase, skills=tuple(robot.skills))
@@ -187,7 +189,7 @@ class Worker:
             prepared = self._prepare(source, robot)
             if isinstance(prepared, Outcome):
                 return prepared
-            return self._fork(FORK_SERVER, prepared, robot)
+            return kept(self._fork(FORK_SERVER, prepared, robot), robot)
         except (LostProcessError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
@@ -17,7 +18,6 @@ from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, Result, RobotLostError
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import RobotError
 from codebotler.simulator.rules import PAPER
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
@@ -85,7 +85,7 @@ def test_a_question_without_options_is_named_wherever_its_text_stands() -> None:
         ("go_to('cellar')", "GoToInvalidLocation"),
         ("ask('ann', 'Tea?', ['Yes', 'No'])", "AskNoPerson"),
         ("ask('ann', 'Tea?', [])", "AskEmptyOptions"),
-        ("ask('bob', 'Tea?', ['Never', 'Always'])", "AskInvalidOptions"),
+        ("ask('ann', 'Tea?', ['Never', 'Always'])", "AskInvalidOptions"),
         ("pick('cup')", "PickInvalidObject"),
         ("place('mug')", "PlaceNoObject"),
         ("[pick('mug') for _ in 'ab']", "PickWhileHolding"),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Room, World
 from codebotler.missions import mission as module
@@ -25,7 +25,6 @@ from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator import ledger
-from codebotler.simulator.robot import RobotError
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from processes import are_gone, children_of

@@ -16,6 +16,7 @@ import rich.progress  # noqa: F401 - by now, since an interrupt in the middle of
 from codebotler.checking.check import check
 from codebotler.cli.run import Request
 from codebotler.cli.run import run as run_mission
+from codebotler.core.errors import RobotError
 from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
@@ -26,7 +27,6 @@ from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, NotReadyError, Result
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.robot import RobotError
 from doubles import Answering, raising
 
 

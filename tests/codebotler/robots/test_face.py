@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
@@ -28,7 +29,6 @@ from codebotler.robots.face import (
 from codebotler.robots.open import KINDS, open_with_face
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.robot import RobotError
 from doubles import Answering
 
 TEA = """def task_program():

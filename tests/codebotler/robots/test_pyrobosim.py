@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.missions.live import LiveRobot
@@ -28,7 +29,6 @@ from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, ROBOT_RULES
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import RobotError
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
 

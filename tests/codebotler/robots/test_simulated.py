@@ -10,14 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Person, Room, World
 from codebotler.robots.base import CancelledError, Options, Picture, Robot
 from codebotler.robots.open import all_readiness, open_robot
 from codebotler.robots.ros.ros1 import MEND
 from codebotler.robots.ros.ros2 import mend_of
 from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
-from codebotler.simulator.robot import RobotError
 
 WORLD = World(
     (

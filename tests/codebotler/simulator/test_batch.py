@@ -16,6 +16,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill, SkillTable
 from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
@@ -23,7 +24,7 @@ from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import FEW, LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool
-from codebotler.simulator.robot import BEHAVIOURS, Argument, Behaviour, Result, RobotError, SimulatedRobot
+from codebotler.simulator.robot import BEHAVIOURS, Argument, Behaviour, Result, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
 from codebotler.simulator.worker import EngineError, Job, Worker

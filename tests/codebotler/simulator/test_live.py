@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
-from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rules import ENDLESS, PAPER
 from codebotler.simulator.sandbox import PROGRAM
 from codebotler.simulator.worker import EngineError, Worker

@@ -5,19 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.robot import (
-    Result,
-    RobotError,
-    SimulatedRobot,
-    Thing,
-    _pattern,
-    choose,
-    located,
-    resolve_room,
-)
+from codebotler.simulator.robot import Result, SimulatedRobot, Thing, _pattern, choose, located, resolve_room
 from codebotler.simulator.rules import Matching, Rules
 
 Texts: TypeAlias = tuple[str, ...]

@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot, Whereabouts, meant
 
 ROOMS = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import RobotError, SimulatedRobot, choose, resolve_room
+from codebotler.simulator.robot import SimulatedRobot, choose, resolve_room
 from codebotler.simulator.rules import PAPER, WORDS_FOR_PEOPLE, Rules
 from roboeval.suites.schema import RulesFile
 

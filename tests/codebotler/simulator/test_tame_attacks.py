@@ -15,13 +15,14 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
-from codebotler.simulator.robot import BEHAVIOURS, RobotError, SimulatedRobot
+from codebotler.simulator.robot import BEHAVIOURS, SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.sandbox.fuel import prepared

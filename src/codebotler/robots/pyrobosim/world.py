@@ -20,13 +20,13 @@ from pyrobosim.utils.pose import Pose, wrap_angle
 from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
 from shapely.geometry import LineString
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.core.world import World
 from codebotler.robots.base import CancelledError, Feedback, no_feedback
 from codebotler.robots.clock import Clock
 from codebotler.robots.pyrobosim.floorplan import RADIUS, Floorplan, Table, plan_floor
 from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND
-from codebotler.simulator.robot import RobotError
 
 RADIANS_PER_SECOND = math.pi / 2
 MOVES_EVERY = 0.05  # real seconds between two places on the way

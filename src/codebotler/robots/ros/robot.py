@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import RosAction, SkillTable
 from codebotler.robots.base import (
     ROS_PYTHON,
@@ -25,7 +26,6 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.ros.worker import Message, RosWorker, lacks
-from codebotler.simulator.robot import RobotError
 
 OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
 UNCANCELLED = "its goals could not be cancelled: STOP THE ROBOT BY HAND"

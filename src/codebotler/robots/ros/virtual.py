@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
@@ -16,7 +17,6 @@ from codebotler.robots.ros.robot import actions_of
 from codebotler.robots.ros.ros1 import master_uri
 from codebotler.robots.ros.worker import Message, RosWorker
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.robot import RobotError
 
 NODE = "virtual_robot"
 HERE = ("localhost", "127.0.0.1")

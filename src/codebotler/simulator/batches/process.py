@@ -15,9 +15,10 @@ from pickle import loads as unpickled
 from types import CodeType, ModuleType
 from typing import Any, NoReturn
 
+from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option
 from codebotler.simulator.ledger import RememberingLedger
-from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
+from codebotler.simulator.robot import Argument, SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, MAX_FRAME
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames

@@ -12,7 +12,7 @@ import msgspec
 from codebotler.core.skills import SkillTable
 from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
-from codebotler.simulator.ledger import RememberingLedger, SkillAnswer
+from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, kept
 from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
 from codebotler.simulator.sandbox import MAX_FRAME
 from codebotler.simulator.skill_protocol import Description, described
@@ -81,8 +81,12 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
     replay = Replay(robot)
     while (transcript := decoded(frame)) is not None:
         answer = replay.follow(transcript)
+        if replay.ledger.broken is not None:
+            if transcript.end is None:
+                raise ProtocolError("a rule ends the run, and the child waits")
+            return None  # by itself, it also has the line at which the rule ends it
         if transcript.end is not None:
-            outcome = replay.ledger.ended(transcript.end)
+            outcome = kept(replay.ledger.ended(transcript.end), robot)
             if outcome.status is Status.KILLED:
                 raise ProtocolError("an end is malformed")
             if key is not None:
@@ -102,7 +106,7 @@ def _frame(child: IsolatedProcess) -> bytes:
 
 def key_of(frame: bytes, robot: SimulatedRobot) -> Key | None:
     """What a transcript is remembered by; None where it is long, or its robot of a kind of its own."""
-    if len(frame) > LONGEST_REMEMBERED or robot.setup[0] != "simulated" or robot.own_skills:
+    if len(frame) > LONGEST_REMEMBERED or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
 
@@ -151,6 +155,8 @@ class Replay:
             if expected == ONLY_TIME:
                 continue
             told = ledger.perform(skill, arguments)
+            if ledger.broken is not None:
+                return told
             if expected is not None and expected != (told if told[0] != "error" else ("error", told[1][1:])):
                 raise ProtocolError("the robot answers otherwise")
         if next(moments, None) is not None:

@@ -1,0 +1,136 @@
+"""`Guard`: keeps a robot from breaking the rules of the house, whatever its program asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from codebotler.core.errors import RobotError
+from codebotler.core.trace import Event
+from codebotler.rtl import Formula, Inconclusive, Monitor
+from codebotler.rtl.reasoning.alphabet import elements
+
+VIOLATION = "RuleViolation"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What must hold whatever the instruction is.
+
+    Args:
+        name: how messages name it.
+        says: the rule for people and models, in a sentence.
+        formula: the rule as a formula.
+        when: `always`, of every prefix of a trace, or `finally`, when the mission ends.
+        refuse: whether the program goes on without what it was refused; else the mission ends.
+    """
+
+    name: str
+    says: str
+    formula: Formula
+    when: Literal["always", "finally"] = "always"
+    refuse: bool = False
+
+
+class RuleViolationError(RobotError):
+    """A rule would be broken, or has been.
+
+    Args:
+        rule: the rule.
+        event: what would break it, or has broken it; None at the end of a mission.
+        is_late: whether that has happened already.
+    """
+
+    def __init__(self, rule: Rule, event: Event | None, *, is_late: bool = False) -> None:
+        if event is None:
+            what = f'the rule "{rule.name}" is not kept at the end'
+        else:
+            what = f'the rule "{rule.name}" {"is broken" if is_late else "forbids this"}'
+        super().__init__(VIOLATION, f"{what}: {rule.says}")
+        self.rule, self.event, self.is_late = rule, event, is_late
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _violation, (self.rule, self.event, self.is_late)
+
+    @property
+    def ends_run(self) -> bool:
+        """Whether the program cannot go on, whatever it catches."""
+        return self.is_late or not self.rule.refuse
+
+
+def _violation(rule: Rule, event: Event | None, is_late: bool) -> RuleViolationError:  # noqa: FBT001 - for pickle
+    return RuleViolationError(rule, event, is_late=is_late)
+
+
+class Guard:
+    """Judges by rules all that one robot is to do, before it does it.
+
+    Args:
+        rules: the rules in force.
+    """
+
+    def __init__(self, rules: Sequence[Rule]) -> None:
+        self.rules = tuple(rules)
+        self._always = [(rule, Monitor(rule.formula)) for rule in rules if rule.when == "always"]
+        self._finally = [(rule, Monitor(rule.formula)) for rule in rules if rule.when == "finally"]
+        self._unjudged: set[str] = set()  # names of rules that had to compare an option that is no text
+
+    @property
+    def may_refuse(self) -> bool:
+        """Whether a program may go on after something was refused."""
+        return any(rule.refuse for rule, _ in self._always)
+
+    def judge(self, *attempts: Event) -> None:
+        """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
+        for rule, monitor in self._always:
+            for attempt in attempts:
+                if not any(_would_hold(monitor, event) for event in _results(rule, attempt)):
+                    raise RuleViolationError(rule, attempt)
+
+    def happened(self, event: Event) -> None:
+        """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
+        late: RuleViolationError | None = None
+        for rule, monitor in (*self._always, *self._finally):
+            try:
+                holds = monitor.feed(event)
+            except Inconclusive:
+                self._unjudged.add(rule.name)
+                holds = False
+            if not holds and rule.when == "always" and late is None:
+                late = RuleViolationError(rule, event, is_late=True)
+        if late is not None:
+            raise late
+
+    def at_end(self) -> RuleViolationError | None:
+        """The first rule that is not kept if the mission ends now."""
+        for rule, monitor in self._finally:
+            if rule.name in self._unjudged or not monitor.holds:
+                return RuleViolationError(rule, None)
+        return None
+
+
+def _would_hold(monitor: Monitor, event: Event) -> bool:
+    try:
+        return monitor.would_hold(event)
+    except Inconclusive:
+        return False
+
+
+def depends_on_results(rule: Rule) -> bool:
+    """Whether a rule is about what a look finds or a person answers, which nobody knows before."""
+    return any(one.found is not None or one.answer is not None for one in elements(rule.formula))
+
+
+def _results(rule: Rule, attempt: Event) -> Iterator[Event]:
+    """An event as it may turn out."""
+    wanted = [one for one in elements(rule.formula) if one.kind == attempt.kind]
+    if any(one.found is not None for one in wanted):
+        yield replace(attempt, found=True)
+        yield replace(attempt, found=False)
+    elif any(one.answer is not None for one in wanted):
+        yield from (replace(attempt, answer=option.text) for option in attempt.options)
+        if not attempt.options:
+            yield attempt
+    else:
+        yield attempt
