@@ -25,6 +25,7 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.guard import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
@@ -49,6 +50,7 @@ def check(
     workers: int = 1,
     pool: WorkerPool | None = None,
     room_map: RoomMap | None = None,
+    house_rules: Sequence[Rule] = (),
 ) -> Check:
     """Find what is wrong with a program, by its text and by runs in sampled worlds.
 
@@ -65,6 +67,7 @@ def check(
         workers: how many runs go on at the same time.
         pool: what runs the programs, to be used for many checks; by default a new one.
         room_map: the rooms and the start, in place of those two, where more is known of them.
+        house_rules: what a program must keep to in every world.
 
     Raises:
         UserError: the name of a room is no regular expression, the robot starts in none of the rooms, or the
@@ -72,7 +75,7 @@ def check(
         EngineError: no isolated process could be started.
     """
     expect_list(rooms, "the rooms")
-    settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
+    settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, behaviours, tuple(house_rules))
     known = room_map or _room_map(program, rooms, start, skills)
     with nullcontext(pool) if pool else WorkerPool(workers) as opened:
 

@@ -13,6 +13,7 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.words import listed
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.guard import Guard, Rule
 from codebotler.simulator.isolated_process import PROCESSOR_TIME
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rules import Rules
@@ -20,6 +21,7 @@ from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
 from codebotler.simulator.worker import Job, Worker
 
 SAMPLES, MOST_SAMPLES = 5, 10_000
+EXPLORED = 2  # times as many worlds at most, to meet each fact in every way
 MORE = 20  # worlds in addition, where the program waits in vain in all that were drawn before
 MOST_FACTS = 4
 
@@ -34,6 +36,7 @@ class CheckSettings:
     rules: Rules = AS_WRITTEN
     skills: SkillTable = SKILLS
     behaviours: Mapping[str, Behaviour] | None = None  # by default those of the eight skills
+    house_rules: tuple[Rule, ...] = ()  # what a program must keep to in every world
 
     def __post_init__(self) -> None:
         if not 1 <= self.samples <= MOST_SAMPLES:
@@ -68,7 +71,9 @@ class SampledRuns:
 
     def _new_robot(self, number: int) -> SampledRobot:
         how = self._settings
-        robot = SampledRobot(self._room_map, self._samplers[number], how.rules, how.skills, how.behaviours)
+        guard = Guard(how.house_rules) if how.house_rules else None
+        sampler = self._samplers[number]
+        robot = SampledRobot(self._room_map, sampler, how.rules, how.skills, how.behaviours, guard=guard)
         self._robots[number] = robot
         return robot
 
@@ -99,20 +104,22 @@ Run: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
 
 
 def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
-    """The runs in so many worlds, and in more if the program waits or searches in vain in all of them.
+    """The runs in so many worlds, and in more to meet each fact both ways, or where all search in vain.
 
     Worlds that are alike to the program need one run only; `run` is called with at most `width` worlds.
     """
     known: list[Sample] = []
     ran: list[Sample] = []
+    drew: list[FactSampler] = []  # the worlds of those that ran
 
     def add(samplers: Sequence[FactSampler]) -> None:
+        drew.extend(samplers)
         for start in range(0, len(samplers), width):
             these = samplers[start : start + width]
             known.extend(run(room_map, [s for s in these if not any(one.is_as_in(s) for one in known)]))
             for sampler in these:
                 same = next(one for one in known if one.is_as_in(sampler))
-                ran.append(replace(same, number=sampler.sample))
+                ran.append(replace(same, number=len(ran)))
 
     first = FactSampler(settings.seed, 0, settings.strict)
     add(first_samplers(settings))
@@ -121,7 +128,23 @@ def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: in
             break
         # A program that waits in many places needs luck to end; a search, that not all is full of things.
         add([replace(first, sample=len(ran), lucky=more % 2 == 1)])
+    most = len(ran) + EXPLORED * settings.samples
+    while len(ran) < most and (new := unexplored(ran, drew)):
+        add(new[: most - len(ran)])
     return ran
+
+
+def unexplored(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactSampler]:
+    """Worlds that differ from those in which a program ran by one fact, which was never so when it asked."""
+    met = {(draw.method, draw.arguments, draw.result) for sample in ran for draw in sample.draws}
+    found: list[FactSampler] = []
+    for sample, sampler in zip(ran, drew, strict=True):
+        for draw in sample.draws:
+            for other in draw.others:
+                if (other.method, other.arguments, other.result) not in met:
+                    met.add((other.method, other.arguments, other.result))
+                    found.append(replace(sampler, forced=(*sampler.forced, other)))
+    return found
 
 
 def first_samplers(settings: CheckSettings) -> list[FactSampler]:

@@ -62,11 +62,13 @@ def generate(
     seed: options.SeedOption = None,
     timeout: options.TimeoutOption = 60.0,
     base_url: options.BaseUrlOption = None,
+    rules: options.RulesOption = None,
 ) -> None:
     """Have a model write a program, and print it.
 
     The exit status is 1 if the check finds problems.
     """
+    from codebotler.checking.rules import read_rules
     from codebotler.cli.generate import show, write
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
@@ -75,13 +77,27 @@ def generate(
 
     chosen = chosen_model(model, base_url)
     known = None if world is None else World.read(world)
-    prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
+    house_rules = () if rules is None else read_rules(rules)
+    prompt = prompt_for(
+        instruction,
+        rooms=() if known is None else [room.name for room in known.rooms],
+        rules=[rule.says for rule in house_rules],
+    )
     if show_prompt:
         show(prompt, chosen.name)
         return
     settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, chosen.base_url)
     tries = int(repair) if retries is None else retries
-    accepted = write(prompt, chosen.name, settings, world=known, retries=tries, repair=repair, record=record)
+    accepted = write(
+        prompt,
+        chosen.name,
+        settings,
+        world=known,
+        house_rules=house_rules,
+        retries=tries,
+        repair=repair,
+        record=record,
+    )
     raise typer.Exit(0 if accepted else 1)
 
 
@@ -102,17 +118,20 @@ def check(
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,
+    rules: options.RulesOption = None,
 ) -> None:
     """Look for problems in a program before a robot runs it.
 
     It reads the program and runs it in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
+    from codebotler.checking.rules import read_rules
     from codebotler.cli.check import check_view, read_program
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
 
     known = None if world is None else World.read(world)
+    house_rules = () if rules is None else read_rules(rules)
     source = read_program(program)
     with busy("checking"):
         found = check.check(
@@ -123,6 +142,7 @@ def check(
             seed=seed,
             strict=strict,
             workers=workers,
+            house_rules=house_rules,
         )
     if json:
         print_json(found.data())
@@ -150,11 +170,13 @@ def run(
     speed: options.SpeedOption = 1.0,
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
+    rules: options.RulesOption = None,
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
     Ctrl-C stops the robot; the exit status is then 130.
     """
+    from codebotler.checking.rules import read_rules
     from codebotler.cli import run
     from codebotler.cli.run import Request
     from codebotler.core.files import home
@@ -166,7 +188,8 @@ def run(
     from codebotler.robots.open import open_robot
 
     chosen = chosen_model(model, base_url)
-    request = Request(program, chosen.name, yes, despite_problems)
+    house_rules = () if rules is None else read_rules(rules)
+    request = Request(program, chosen.name, yes, despite_problems, house_rules)
     asked = SamplingSettings(base_url=chosen.base_url)
     settings = Options(
         world=None if world is None else World.read(world),
@@ -287,11 +310,13 @@ def serve(
         typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
+    rules: options.RulesOption = None,
 ) -> None:
     """Serve the web page for operating a robot.
 
     Ctrl-C ends it, which also stops the robot.
     """
+    from codebotler.checking.rules import read_rules
     from codebotler.core.files import home
     from codebotler.core.world import World
     from codebotler.models.chosen import chosen_model
@@ -308,12 +333,13 @@ def serve(
         world = OFFICE
         note("the robot works in an example office; --world FILE names another world")
     known = None if world is None else World.read(world)
+    house_rules = () if rules is None else read_rules(rules)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
     opened = _opener(models, base_url)
     settings = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
     body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
-    console = Console(body, home(), opened, models=models, world=known, face=shown)
+    console = Console(body, home(), opened, models=models, world=known, face=shown, rules=house_rules)
 
     from codebotler.web import server
     from codebotler.web.frame import installed_pages

@@ -14,6 +14,7 @@ from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import NOTICE, is_recorded
 from codebotler.prompts import Prompt
+from codebotler.simulator.guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 
@@ -23,6 +24,7 @@ def write(
     settings: SamplingSettings,
     *,
     world: World | None,
+    house_rules: tuple[Rule, ...] = (),
     retries: int,
     repair: bool,
     record: Path | None,
@@ -39,7 +41,13 @@ def write(
 
             room_map = None if world is None else RoomMap.of(world)
             made = write_checked_program(
-                asked, prompt, room_map=room_map, retries=retries, repair=repair, tried=tried
+                asked,
+                prompt,
+                room_map=room_map,
+                house_rules=house_rules,
+                retries=retries,
+                repair=repair,
+                tried=tried,
             )
         print_source(made.program)
     if is_recorded(asked.name):

@@ -19,6 +19,14 @@ ModelOption = Annotated[
     ),
 ]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file with the rooms.")]
+RulesOption = Annotated[
+    Path | None,
+    typer.Option(
+        envvar="CODEBOTLER_RULES",
+        help="A file of house rules that every program must keep to.",
+        metavar="FILE",
+    ),
+]
 TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
 TopPOption = Annotated[
     float,

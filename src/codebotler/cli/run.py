@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codebotler.checking.check import check
+from codebotler.checking.problems import Check
 from codebotler.cli.check import check_view, read_program
 from codebotler.cli.views import Watcher, ending, source_view
 from codebotler.core.errors import UserError
@@ -22,6 +23,8 @@ from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
 from codebotler.models.recorded import NOTICE, is_recorded
 from codebotler.robots.base import Robot
+from codebotler.simulator.guard import Rule
+from codebotler.simulator.sampled_robot import RoomMap
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",
@@ -44,6 +47,7 @@ class Request:
     model: str = "recorded"  # writes the program for an instruction
     yes: bool = False  # whether to run the program without asking
     despite_problems: bool = False
+    rules: tuple[Rule, ...] = ()  # of the house
 
     def __post_init__(self) -> None:
         if not self.what.strip():
@@ -72,9 +76,7 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
     program = read_program(request.what) if request.is_program else ""
     recover(home)
     order = Order(program=program) if program else Order(request.what, request.model)
-    session = MissionSession(
-        robot, home, order, open_model=open_model, check=lambda source, rooms: check(source, room_map=rooms)
-    )
+    session = MissionSession(robot, home, order, open_model=open_model, check=checked, rules=request.rules)
     session.start()
     try:
         view = _prepared(session)
@@ -87,6 +89,11 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
         raise
     session.join(GRACE)
     return 1
+
+
+def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> Check:
+    """The check of a program for a robot that knows these rooms."""
+    return check(program, room_map=room_map, house_rules=rules)
 
 
 def _prepared(session: MissionSession) -> SessionView:

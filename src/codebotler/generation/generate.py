@@ -15,6 +15,7 @@ from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unhear
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt, prompt_for
+from codebotler.simulator.guard import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -115,6 +116,7 @@ def write_checked_program(
     *,
     rooms: Sequence[str] | None = None,
     room_map: RoomMap | None = None,
+    house_rules: tuple[Rule, ...] = (),
     retries: int = 0,
     repair: bool = False,
     tried: Callable[[Attempt], None] = ignore,
@@ -123,7 +125,7 @@ def write_checked_program(
     with WorkerPool(1) as pool:
 
         def problems_of(program: str) -> list[str]:
-            found = check(program, rooms=rooms, room_map=room_map, pool=pool)
+            found = check(program, rooms=rooms, room_map=room_map, pool=pool, house_rules=house_rules)
             return [problem.sentence for problem in found.problems]
 
         def result() -> Generation:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, Protocol
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills import Skill
-from codebotler.core.trace import Event, Trace
+from codebotler.core.trace import Event, Trace, attempted, trace_data
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
+from codebotler.simulator.guard import Guard, RuleViolationError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rules import ENDLESS, Rules
+from codebotler.simulator.sampled_robot import RoomMap
 
 RETURNS: Mapping[str, type] = {"str": str, "bool": bool, "list[str]": list, "None": type(None)}
 
@@ -40,13 +42,22 @@ class LiveRobot:
     is_live = True
 
     def __init__(
-        self, robot: base.Robot, note: Note, *, place: str = "", clock_starts: datetime | None = None
+        self,
+        robot: base.Robot,
+        note: Note,
+        *,
+        place: str = "",
+        clock_starts: datetime | None = None,
+        guard: Guard | None = None,
+        room_map: RoomMap | None = None,
     ) -> None:
         self.robot, self.skills, self._note = robot, robot.skills, note
+        self._guard, self._room_map = guard, room_map
+        self.on_broken: Callable[[RuleViolationError], None] = lambda _: self.stop()
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
         self.rules = Rules(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # of the program, which calls a skill there
-        self._place = place
+        self._place, self._held = place, ""
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
@@ -86,19 +97,81 @@ class LiveRobot:
         """Execute one skill, or raise RobotError, StoppedError, RobotLostError, or OSError for its log."""
         self._check_end()
         row = self.skills[skill]
-        event = _event(row, arguments)
-        event = event and replace(event, place=self._place, time=self.now)
+        event = attempted(row, arguments, place=self._place, time=self.now, holding=self._held)
+        if event is not None and self._guard is not None:
+            self._judge(self._guard, event)
         if event and row.recording and row.recording.when_tried:
             self._events.append(event)
-        result = self._logged(row, [_text(argument) for argument in arguments], event)
+        try:
+            result = self._logged(row, [_text(argument) for argument in arguments], event)
+        except RobotError:
+            if event and row.recording and row.recording.when_tried:
+                self._happened(event)
+            raise
         if event is None or row.recording is None:
             return result
         if row.recording.when_tried:
             self._events.pop()
         self._events.append(replace(event, **_seen(row, result)))
-        if event.kind == "goto":
-            self._place = event.text
+        self._place_and_hold(event)
+        self._happened(self._events[-1])
         return _position(result, event) if event.options else result
+
+    def _place_and_hold(self, event: Event) -> None:
+        match event.kind:
+            case "goto":
+                self._place = event.text
+            case "pick":
+                self._held = event.text
+            case "place":
+                self._held = ""
+
+    # --- rules
+
+    def _judge(self, guard: Guard, event: Event) -> None:
+        """Refuse what a rule forbids, in whichever room it would happen; the robot is not told."""
+        seen = self._seen_from(event)
+        rooms = [event.text, *(self._meant(event.text) if event.kind == "goto" else ())]
+        try:
+            guard.judge(*(replace(seen, text=room) for room in rooms))
+        except RuleViolationError as broken:
+            self._end_by(broken)
+            raise
+
+    def _happened(self, event: Event) -> None:
+        """Tell the guard what has happened, which may break a rule that depends on an answer."""
+        if self._guard is None:
+            return
+        try:
+            self._guard.happened(self._seen_from(event))
+        except RuleViolationError as broken:
+            self._end_by(broken)
+            raise
+
+    def _end_by(self, broken: RuleViolationError) -> None:
+        """Stop the robot, and only then log which rule was broken, unless the program may go on."""
+        if broken.ends_run:
+            self.on_broken(broken)
+        at = {} if self.line is None else {"line": self.line}
+        self._note("rule", **at, **_told(broken))
+        self._check_end()
+
+    def report_unkept(self) -> str:
+        """Log the first rule that is not kept at the end, and return the sentence; empty if all are."""
+        broken = None if self._guard is None else self._guard.at_end()
+        if broken is None:
+            return ""
+        self._note("rule", **_told(broken))
+        return str(broken)
+
+    def _meant(self, request: str) -> list[str]:
+        return [] if self._room_map is None else self._room_map.rooms_meant(request)
+
+    def _seen_from(self, event: Event) -> Event:
+        """An event as rules see it: rooms by the names that the robot knows them by."""
+        place = next(iter(self._meant(event.place)), event.place)
+        room = next(iter(self._meant(event.text)), event.text) if event.kind == "goto" else event.text
+        return replace(event, text=room, place=place)
 
     def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, logged."""
@@ -161,18 +234,15 @@ def answered(skill: Skill, result: base.Result) -> base.Result:
     return result
 
 
+def _told(broken: RuleViolationError) -> dict[str, object]:
+    """What the log says of a rule that was broken, or would have been."""
+    rule, event = broken.rule, broken.event
+    what = {} if event is None else {"what": trace_data((event,))[0], "prevented": not broken.is_late}
+    return {"rule": rule.name, "says": rule.says, "formula": str(rule.formula), **what}
+
+
 def _text(argument: Argument) -> base.Argument:
     return argument if isinstance(argument, str) else tuple(option.text for option in argument)
-
-
-def _event(skill: Skill, arguments: Sequence[Argument]) -> Event | None:
-    if skill.recording is None:
-        return None
-    given = dict(zip((p.name for p in skill.parameters), arguments, strict=True))
-    text, options = given[skill.recording.text], given.get(skill.recording.options or "", ())
-    assert isinstance(text, str)
-    assert not isinstance(options, str)
-    return Event(skill.recording.kind, text.strip(), options)
 
 
 def _seen(skill: Skill, result: base.Result) -> dict[str, Any]:

@@ -30,6 +30,7 @@ HAS: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(("cancelled", "picture", "late"), frozenset({"number", "skill"})),
     "sleep": frozenset({"seconds"}),
     "stop": frozenset({"by"}),
+    "rule": frozenset({"rule", "says", "formula"}),
     "log": frozenset({"text"}),
 }
 """What belongs to each kind of event."""

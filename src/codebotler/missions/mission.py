@@ -20,6 +20,8 @@ from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event
 from codebotler.missions.pictures import Pictures
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
+from codebotler.simulator.guard import Guard, Rule
+from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
 GRACE = 10.0
@@ -194,7 +196,14 @@ class Mission:
             elif self.state is not State.STOPPING:
                 self._step(State.STOPPED, "be stopped", reason=f"stopped by {by} before it ran")
 
-    def run(self, reserved: Reservation, place: str = "") -> State:
+    def run(
+        self,
+        reserved: Reservation,
+        place: str = "",
+        *,
+        rules: Sequence[Rule] = (),
+        room_map: RoomMap | None = None,
+    ) -> State:
         """Run the program on a robot, and return when all has ended.
 
         If a robot that was stopped does not confirm it within `GRACE` seconds, the mission fails.
@@ -202,6 +211,8 @@ class Mission:
         Args:
             reserved: the robot.
             place: the room it is in, if known.
+            rules: what it must keep to; a call that breaks one stops the mission.
+            room_map: the rooms that the robot knows.
 
         Returns:
             done, failed or stopped.
@@ -211,7 +222,9 @@ class Mission:
             NotReadyError: the robot is on another mission, or was.
             OSError: an event could not be written or printed, so the robot was stopped.
         """
-        live = LiveRobot(reserved.robot, self._write, place=place)
+        guard = Guard(rules) if rules else None
+        live = LiveRobot(reserved.robot, self._write, place=place, guard=guard, room_map=room_map)
+        live.on_broken = lambda broken: self.stop(f"rule {broken.rule.name}")
         with self._writing:
             if self.state is State.APPROVED:
                 reserved.use()
@@ -243,7 +256,7 @@ class Mission:
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
-            reason = "" if done else f"{why.kind}: {visible(why.message)}"
+            reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"
             self._end(State.DONE if done else State.FAILED, reason, line=outcome.line)
 
     def _outcome(self, live: LiveRobot) -> Outcome:

@@ -26,6 +26,7 @@ from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
+from codebotler.simulator.guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError
 
@@ -36,7 +37,7 @@ EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSE
 class MissionSession:
     """Drives one mission on a thread of its own, with a robot that is connected while the session lasts.
 
-    `check` gets a program and the robot's rooms; `changed` is called at each change of the view and must
+    `check` gets a program, the robot's rooms and the rules in force; `changed` is called at each change of the view and must
     return at once; `before` is the session to wait for.
     """
 
@@ -47,7 +48,8 @@ class MissionSession:
         order: Order,
         *,
         open_model: Callable[[str], Model],
-        check: Callable[[str, RoomMap | None], Check],
+        check: Callable[[str, RoomMap | None, tuple[Rule, ...]], Check],
+        rules: tuple[Rule, ...] = (),
         changed: Callable[[], None] = lambda: None,
         number: int = 1,
         before: MissionSession | None = None,
@@ -63,6 +65,7 @@ class MissionSession:
             program=order.program,
             author=order.author,
             busy="waiting",
+            rules=rules,
             is_over=False,
         )
         self._events: list[Line] = []
@@ -105,6 +108,20 @@ class MissionSession:
                 raise MissionError("the program cannot be changed now")
             self._edited = program
             self._change(program=program, author="", busy=CHECKING, **UNCHECKED)
+
+    def switch_off(self, name: str, reason: str) -> None:
+        """Leave out a rule in this mission only, for a reason that is logged, and have the program checked."""
+        if not reason.strip():
+            raise MissionError("say why the rule does not count in this mission")
+        with self._editing, self._lock:
+            view, mission = self._view, self._mission
+            if mission is None or not view.may_be_approved:
+                raise MissionError("rules can be switched off only while a program waits for approval")
+            if name not in {rule.name for rule in view.rules_in_force}:
+                raise MissionError(f'there is no rule "{name}" in force')
+            mission.note(f'a person switched off the rule "{name}" in this mission: {reason.strip()}')
+            self._edited = view.program
+            self._change(off=(*view.off, name), busy=CHECKING, **UNCHECKED)
 
     def ask_again(self, *, repair: bool) -> None:
         """Have the model write another program; with `repair`, it is shown this one and its problems."""
@@ -202,7 +219,7 @@ class MissionSession:
                 self._wait_for_a_person(mission)
             if mission.state is State.APPROVED:
                 with suppress(MissionError):  # it was stopped before it could run
-                    mission.run(reserved, place)
+                    mission.run(reserved, place, rules=self._view.rules_in_force, room_map=room_map)
 
     def _is_stopped(self) -> bool:
         return self._stopped_by is not None
@@ -248,7 +265,8 @@ class MissionSession:
 
     async def _written(self, model: Model, before: str, problems: Sequence[str]) -> str:
         rooms = () if self._view.room_map is None else self._view.room_map.rooms
-        prompt = prompt_for(self._order.instruction, rooms=rooms)
+        rules = [rule.says for rule in self._view.rules_in_force]
+        prompt = prompt_for(self._order.instruction, rooms=rooms, rules=rules)
         if problems:
             prompt = prompt.after(before, problems)
 
@@ -278,7 +296,7 @@ class MissionSession:
             view = self._view
         try:
             mission.draft(program, view.author)
-            check = self._check(program, view.room_map)
+            check = self._check(program, view.room_map, view.rules_in_force)
             missing = tuple(missing_skills(program, self._robot))
             unknown = unknown_rooms(program, view.room_map) if view.room_map and not check.problems else ()
             checked = replace(

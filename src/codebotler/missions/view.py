@@ -10,6 +10,7 @@ from codebotler.checking.problems import Check
 from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
+from codebotler.simulator.guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 UNREADABLE = frozenset({"SyntaxError", "IndentationError", "TabError"})
@@ -65,6 +66,8 @@ class SessionView:
     unknown_rooms: tuple[str, ...] = ()  # that the program names and the robot does not know, in sentences
     room_map: RoomMap | None = None  # of the robot, as far as it says
     remarks: tuple[str, ...] = ()  # what is odd about the robot, in sentences
+    rules: tuple[Rule, ...] = ()  # of the house
+    off: tuple[str, ...] = ()  # names of those that a person has switched off in this mission
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True
 
@@ -73,6 +76,11 @@ class SessionView:
         """What speaks against running the program, in sentences."""
         found = () if self.check is None else self.check.problems
         return (*(problem.sentence for problem in found), *self.missing_skills)
+
+    @property
+    def rules_in_force(self) -> tuple[Rule, ...]:
+        """The rules that count in this mission."""
+        return tuple(rule for rule in self.rules if rule.name not in self.off)
 
     @property
     def can_run(self) -> bool:

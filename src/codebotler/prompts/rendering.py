@@ -97,12 +97,19 @@ def stated(instruction: str) -> str:
     return said
 
 
-def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTable = SKILLS) -> Prompt:
+def prompt_for(
+    instruction: str,
+    *,
+    rooms: Sequence[str] = (),
+    rules: Sequence[str] = (),
+    skills: SkillTable = SKILLS,
+) -> Prompt:
     """The request for a program that carries out an instruction.
 
     Args:
         instruction: what the robot is to do, in plain words.
         rooms: the names of all rooms, if they are known.
+        rules: what every program must keep to, in sentences.
         skills: the skills that a program may call.
 
     Raises:
@@ -111,7 +118,8 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
     expect_list(rooms, "the rooms")
     instruction = stated(instruction)
     about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
-    wish = "\n\n".join(filter(None, (instruction, about_rooms)))
+    about_rules = _filled("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
+    wish = "\n\n".join(filter(None, (instruction, about_rooms, about_rules)))
     stubs = [f'def {skill.signature}:\n    """{skill.doc}"""' for skill in skills.values()]
     shown = examples()
     messages = [Message("system", _filled("system", skills="\n\n".join(stubs)))]
@@ -127,7 +135,7 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
             for e in shown
         ),
         instruction=_comment(instruction.strip()).removeprefix("# "),
-        rooms=_comment(about_rooms) + "\n" if rooms else "",
+        rooms="".join(_comment(about) + "\n" for about in (about_rooms, about_rules) if about),
         opening=OPENING,
     )
     return Prompt(instruction, tuple(messages), text + "\n", STOP, OPENING)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from _blake2 import blake2b  # of `hashlib`, which would bring OpenSSL into every child
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 EIGHTS = 8
@@ -17,6 +17,7 @@ class FactSampler:
     sample: int = 0  # the number of this world among those of the same seed
     strict: bool = False  # draws also what the program never looked for; else that is as the program assumes
     lucky: bool = False  # what is looked for is there, and who is asked agrees, in seven of eight cases
+    forced: tuple[Draw, ...] = ()  # facts that are so, and are not drawn
 
     def draw(self, count: int, *fact: str) -> int:
         """One of the numbers from 0 to `count - 1` for a fact."""
@@ -26,12 +27,18 @@ class FactSampler:
 
     def answer(self, count: int, agreeing: int, *question: str) -> int:
         """Which of `count` options somebody chooses, of which `agreeing` is the one that agrees most."""
+        for fact in self.forced:
+            if fact.method == "answer" and fact.arguments == (count, agreeing, *question):
+                return fact.result
         if self.lucky and self.draw(EIGHTS, "agrees", *question) < EIGHTS - 1:
             return agreeing
         return self.draw(count, "answer", *question)
 
     def is_there(self, room: str, name: str) -> bool:
         """Whether somebody or something is in a room."""
+        for fact in self.forced:
+            if fact.method == "is_there" and fact.arguments == (room, name):
+                return bool(fact.result)
         return self.draw(EIGHTS, "is there", room, name) < (EIGHTS - 1 if self.lucky else EIGHTS // 2)
 
 
@@ -42,6 +49,12 @@ class Draw:
     method: Literal["answer", "is_there"]
     arguments: tuple[Any, ...]
     result: int
+
+    @property
+    def others(self) -> list[Draw]:
+        """The same fact as it might have been."""
+        results = range(self.arguments[0]) if self.method == "answer" else (True, False)
+        return [replace(self, result=result) for result in results if result != self.result]
 
     def is_drawn_by(self, sampler: FactSampler) -> bool:
         """Whether the same would be drawn in another world."""

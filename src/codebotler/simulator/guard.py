@@ -47,7 +47,8 @@ class RuleViolationError(RobotError):
             what = f'the rule "{rule.name}" is not kept at the end'
         else:
             what = f'the rule "{rule.name}" {"is broken" if is_late else "forbids this"}'
-        super().__init__(VIOLATION, f"{what}: {rule.says}")
+        says = rule.says.rstrip(".")
+        super().__init__(VIOLATION, f"{what}: {says}")
         self.rule, self.event, self.is_late = rule, event, is_late
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -20,7 +20,6 @@ from codebotler.simulator.robot import (
     Behaviour,
     SimulatedRobot,
     Thing,
-    found_in,
     own_skills,
 )
 from codebotler.simulator.rules import Rules
@@ -59,11 +58,18 @@ class RoomMap:
     def room(self, request: str) -> str | None:
         """The room that a request finds; None if there is no such room."""
         if not (self.guessed or self.plain):
-            return next((room for room in self.rooms if found_in(room, request)), None)
+            return next(iter(self.rooms_meant(request)), None)
         wanted = request.strip()
         same = [room for room in self.rooms if room.strip().casefold() == wanted.casefold()]
         within = (room for room in self.rooms if room.casefold() in wanted.casefold())
         return same[0] if same else next(within, (wanted or None) if self.guessed else None)
+
+    def rooms_meant(self, request: str) -> list[str]:
+        """All known rooms that a request may mean."""
+        if self.guessed or self.plain:
+            wanted = request.casefold()
+            return [room for room in self.rooms if room.strip().casefold() in wanted]
+        return [room for room in self.rooms if real.finds(request, room, "label-in-request")]
 
 
 # --- facts
@@ -182,8 +188,7 @@ class SampledRobot(SimulatedRobot):
 
     def meant_rooms(self, request: str) -> Sequence[str]:
         """All rooms that a request may mean."""
-        room = self.room_map.room(request)
-        return [*super().meant_rooms(request), *([] if room is None else [room])]
+        return self.room_map.rooms_meant(request)
 
     @property
     def here(self) -> ExploredRoom:

@@ -23,6 +23,7 @@ from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
+from codebotler.simulator.guard import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -48,9 +49,10 @@ class Console:
         models: Sequence[str] = ("recorded:careful", "recorded:hasty"),
         world: World | None = None,
         face: Face | None = None,
+        rules: tuple[Rule, ...] = (),
     ) -> None:
         self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
-        self.notifier, self.face = Notifier(), face
+        self.notifier, self.face, self.rules = Notifier(), face, rules
         if face is not None:
             face.changed = self.notifier.change
         self.interrupted: tuple[Summary, ...] = ()
@@ -110,6 +112,7 @@ class Console:
                 order,
                 open_model=self._open_model,
                 check=self.check,
+                rules=self.rules,
                 changed=self.notifier.change,
                 number=before.view.number + 1 if before else 1,
                 before=before,
@@ -152,12 +155,12 @@ class Console:
         threading.Thread(target=self.stop, args=(by,), daemon=True).start()
         return True
 
-    def check(self, program: str, room_map: RoomMap | None = None) -> Check:
+    def check(self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()) -> Check:
         """Check a program, one at a time; without a map of the robot's rooms they are taken from it."""
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
-            return check(program, room_map=room_map, pool=self._pool)
+            return check(program, room_map=room_map, pool=self._pool, house_rules=rules)
 
 
 class Notifier:

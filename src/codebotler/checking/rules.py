@@ -1,0 +1,73 @@
+"""House rules in a file: reads them, and says what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from codebotler.core.world_file import Text
+from codebotler.core.yaml_files import Place, YamlFile
+from codebotler.rtl import Formula, RtlSyntaxError, holds, parse
+from codebotler.simulator.guard import Rule
+
+
+class RuleFile(BaseModel):
+    """One rule in a file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: Annotated[str, Field(strict=True, pattern=r"^[a-z][a-z0-9-]*$")]
+    says: Annotated[Text, Field(min_length=1)]
+    always: Text | None = None
+    finally_: Annotated[Text | None, Field(alias="finally")] = None
+    refuse: Annotated[bool, Field(strict=True)] = False
+
+    def rule(self, file: YamlFile, at: Place) -> Rule:
+        """The rule that it describes, or a UserError."""
+        if (self.always is None) == (self.finally_ is None):
+            raise file.wrong(f'the rule "{self.name}" needs either "always" or "finally", a formula', *at)
+        if self.always is None:
+            if self.refuse:
+                sentence = 'what holds "finally" cannot be refused; remove "refuse", or write "always"'
+                raise file.wrong(sentence, *at, "refuse")
+            formula = _parsed(self.finally_ or "", file, (*at, "finally"))
+            return Rule(self.name, self.says, formula, "finally")
+        formula = _parsed(self.always, file, (*at, "always"))
+        if not holds(formula, ()):
+            whenever = f"not tr.Last(...) or {_bracketed(formula)}"
+            sentence = f'"{self.name}" is broken before anything has happened; say when it counts: {whenever}'
+            raise file.wrong(f"the rule {sentence}", *at, "always")
+        return Rule(self.name, self.says, formula, "always", self.refuse)
+
+
+class RulesFile(BaseModel):
+    """A file of rules."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    rules: Annotated[list[RuleFile], Field(min_length=1)]
+
+
+def read_rules(path: Path) -> tuple[Rule, ...]:
+    """Read a file of rules; a UserError names the line of what is wrong, and how to mend it."""
+    file = YamlFile.read(path)
+    forms = file.validate(RulesFile).rules
+    names = [form.name for form in forms]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise file.wrong(f'the rule "{name}" is listed twice; rename one', "rules", number, "name")
+    return tuple(form.rule(file, ("rules", number)) for number, form in enumerate(forms))
+
+
+def _parsed(text: str, file: YamlFile, at: Place) -> Formula:
+    try:
+        return parse(text)
+    except RtlSyntaxError as error:
+        raise file.wrong(f"this is not a formula: {error}", *at) from None
+
+
+def _bracketed(formula: Formula) -> str:
+    text = str(formula)
+    return f"({text})" if " and " in text or " or " in text else text
