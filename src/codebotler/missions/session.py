@@ -37,8 +37,8 @@ EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSE
 class MissionSession:
     """Drives one mission on a thread of its own, with a robot that is connected while the session lasts.
 
-    `check` gets a program, the robot's rooms and the rules in force; `changed` is called at each change of the view and must
-    return at once; `before` is the session to wait for.
+    `check` gets a program, the robot's rooms and the rules in force; `changed` is called at each change of
+    the view and must return at once; `before` is the session to wait for.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class MissionSession:
             self._change(program=program, author="", busy=CHECKING, **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
-        """Leave out a rule in this mission only, for a reason that is logged, and have the program checked."""
+        """Leave out a rule in this mission only, for a reason that is logged, and check the program again."""
         if not reason.strip():
             raise MissionError("say why the rule does not count in this mission")
         with self._editing, self._lock:
