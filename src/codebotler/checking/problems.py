@@ -48,6 +48,7 @@ class Sample:
     facts: tuple[Fact, ...] = field(default=(), repr=False)  # about the world, in the order of the run
     draws: tuple[Draw, ...] = field(default=(), repr=False)  # that settled them, in order
     in_vain: bool = False  # it waited or searched in vain, so that its end says little
+    is_chosen: bool = False  # the world was no random one, but chosen for a fact that had not been met
 
     def is_as_in(self, sampler: FactSampler) -> bool:
         """Whether a run in another world would meet the same facts, and so be the same."""

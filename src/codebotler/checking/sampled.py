@@ -119,7 +119,7 @@ def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: in
             known.extend(run(room_map, [s for s in these if not any(one.is_as_in(s) for one in known)]))
             for sampler in these:
                 same = next(one for one in known if one.is_as_in(sampler))
-                ran.append(replace(same, number=len(ran)))
+                ran.append(replace(same, number=len(ran), is_chosen=bool(sampler.forced)))
 
     first = FactSampler(settings.seed, 0, settings.strict)
     add(first_samplers(settings))
@@ -129,7 +129,7 @@ def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: in
         # A program that waits in many places needs luck to end; a search, that not all is full of things.
         add([replace(first, sample=len(ran), lucky=more % 2 == 1)])
     most = len(ran) + EXPLORED * settings.samples
-    while len(ran) < most and (new := unexplored(ran, drew)):
+    while len(ran) < most and not all(map(_only_computed, ran)) and (new := unexplored(ran, drew)):
         add(new[: most - len(ran)])
     return ran
 
@@ -188,7 +188,9 @@ def _message(same: Sequence[Sample], ran: Sequence[Sample], room_map: RoomMap) -
 
 
 def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:
-    """What some runs have in common that the others have not."""
+    """What some runs have in common that the others have not; by random worlds, if they show it."""
+    if not all(sample.is_chosen for sample in same):
+        same, ran = ([sample for sample in those if not sample.is_chosen] for those in (same, ran))
     others = [sample for sample in ran if sample not in same]
     shared = [fact for fact in same[0].drawn if all(fact in sample.drawn for sample in same)]
     telling = [fact for fact in shared if not others or not all(fact in other.drawn for other in others)]

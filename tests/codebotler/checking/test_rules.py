@@ -1,0 +1,127 @@
+"""Files of house rules, what is wrong with them, and the check of programs by them."""
+
+from pathlib import Path
+
+import pytest
+
+from codebotler.checking.check import check
+from codebotler.checking.rules import read_rules
+from codebotler.core.errors import UserError
+
+RULES = r"""
+rules:
+  - name: server-room
+    says: Never go into the server room.
+    always: not tr.Exists(goto(r"\bserver room\b"))
+  - name: knock
+    says: Knock before you enter an office.
+    always: >-
+      not tr.Last(goto("office"))
+      or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))
+  - name: report
+    says: At the end, tell the start location what came of it.
+    finally: tr.AfterLast(goto(without("start_loc"))).Exists(at("start_loc", say(".+")))
+"""
+ROOMS = ["start_loc", "kitchen", "server room", "alice's office"]
+HOLDS = 'not tr.Exists(goto("attic"))'
+TWICE = f"  - name: a\n    says: b\n    always: '{HOLDS}'\n"
+
+
+def rules_in(folder: Path, text: str = RULES) -> Path:
+    path = folder / "rules.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_rules_are_read_in_order(tmp_path: Path) -> None:
+    rules = read_rules(rules_in(tmp_path))
+    assert [(rule.name, rule.when, rule.refuse) for rule in rules] == [
+        ("server-room", "always", False),
+        ("knock", "always", False),
+        ("report", "finally", False),
+    ]
+    assert rules[0].says == "Never go into the server room."
+    (refusing,) = read_rules(
+        rules_in(tmp_path, f"rules: [{{name: a, says: b, always: '{HOLDS}', refuse: true}}]")
+    )
+    assert refusing.refuse
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "named"),
+    [
+        ("- a\n", 1, ["a list", "a mapping"]),
+        ("rules: []\n", 1, ['"rules"']),
+        ("rules:\n  - name: a\n    says: b\n", 2, ['"a"', '"always"', '"finally"']),
+        (f"rules:\n  - name: a\n    says: b\n    always: '{HOLDS}'\n    finally: '{HOLDS}'\n", 2, ["either"]),
+        (f"rules:\n  - name: Big\n    says: b\n    always: '{HOLDS}'\n", 2, ['"name"']),
+        (f"rules:\n  - name: a\n    always: '{HOLDS}'\n", 2, ['"says"', "missing"]),
+        (f"rules:\n  - name: a\n    says: b\n    whenever: '{HOLDS}'\n", 4, ['"whenever"']),
+        (
+            "rules:\n  - name: a\n    says: b\n    always: not tr.Exist(goto('x'))\n",
+            4,
+            ["column 8", "Exists?"],
+        ),
+        ("rules:\n  - name: a\n    says: b\n    always: tr.Exists(fly('x'))\n", 4, ["unknown element fly"]),
+        (
+            "rules:\n  - name: a\n    says: b\n    always: tr.Exists(say('hello'))\n",
+            4,
+            ["before anything", 'not tr.Last(...) or tr.Exists(say("hello"))'],
+        ),
+        (f"rules:\n  - name: a\n    says: b\n    finally: '{HOLDS}'\n    refuse: true\n", 5, ['"refuse"']),
+        (f"rules:\n{TWICE}{TWICE}", 5, ['"a"', "twice"]),
+    ],
+)
+def test_each_fault_is_one_sentence_with_file_and_line(
+    tmp_path: Path, text: str, line: int, named: list[str]
+) -> None:
+    path = rules_in(tmp_path, text)
+    with pytest.raises(UserError) as caught:
+        read_rules(path)
+    assert (caught.value.file, caught.value.line) == (path, line)
+    assert "\n" not in caught.value.sentence
+    assert [name for name in named if name not in caught.value.sentence] == []
+
+
+# --- programs
+
+
+def problems(tmp_path: Path, *body: str) -> list[str]:
+    program = "def task_program():\n" + "".join(f"    {line}\n" for line in body)
+    found = check(program, rooms=ROOMS, house_rules=read_rules(rules_in(tmp_path)))
+    return [problem.sentence for problem in found.problems]
+
+
+RETURNS = ("go_to('start_loc')", "say('done')")
+
+
+def test_a_program_that_keeps_all_rules_is_accepted(tmp_path: Path) -> None:
+    assert problems(tmp_path, "go_to('kitchen')", "say('knock')", 'go_to("alice\'s office")', *RETURNS) == []
+
+
+def test_a_rule_that_is_broken_somewhere_is_a_problem_with_line_rule_and_world(tmp_path: Path) -> None:
+    (problem,) = problems(
+        tmp_path, "go_to('kitchen')", "if is_in_room('mug'):", "    go_to('server room')", *RETURNS
+    )
+    assert problem == (
+        'line 4: RuleViolation: the rule "server-room" forbids this: Never go into the server room, '
+        'where "mug" is in "kitchen"'
+    )
+
+
+def test_a_rule_that_is_not_kept_at_the_end_is_a_problem_without_a_line(tmp_path: Path) -> None:
+    (problem,) = problems(tmp_path, "go_to('kitchen')")
+    assert problem.startswith('RuleViolation: the rule "report" is not kept at the end: At the end, tell')
+
+
+def test_worlds_are_looked_for_that_lead_into_every_branch(tmp_path: Path) -> None:
+    """Nested questions, each of which goes on with the last of four options only."""
+    options = "['a', 'b', 'c', 'd']"
+    (problem,) = problems(
+        tmp_path,
+        f"if ask('', 'First?', {options}) == 'd':",
+        f"    if ask('', 'Second?', {options}) == 'd':",
+        "        go_to('server room')",
+        *RETURNS,
+    )
+    assert problem.startswith("line 4: RuleViolation")

@@ -1,0 +1,243 @@
+"""The guard of house rules: what it forbids, and that no program gets past it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from codebotler.core.errors import RobotError
+from codebotler.core.trace import Event, Option, Outcome, Status
+from codebotler.core.world import Person, Room, World
+from codebotler.rtl import holds, parse
+from codebotler.simulator.guard import Guard, Rule, RuleViolationError
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import Rules
+from codebotler.simulator.worker import Worker
+
+WORLD = World(
+    (
+        Room("hall", ("mug", "glass"), (Person("ann", ("yes",)),)),
+        Room("office", (), (Person("carol", ("no",)),)),
+        Room("vault"),
+        Room("vault room 2"),
+    ),
+    "hall",
+)
+AS_WRITTEN = Rules(literals="as-written")
+
+
+def rule(formula: str, *, refuse: bool = False, name: str = "house") -> Rule:
+    return Rule(name, "Do as the house wants.", parse(formula), refuse=refuse)
+
+
+VAULT = rule(r'not tr.Exists(goto("vault"))', name="vault")
+QUIET = rule('not tr.AtLeast(say(".*"), 3)', name="quiet")
+KNOCK = rule(
+    'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))'
+)
+
+
+def robot(*rules: Rule) -> SimulatedRobot:
+    return SimulatedRobot(WORLD, AS_WRITTEN, guard=Guard(rules))
+
+
+def refused(guarded: SimulatedRobot, skill: str, *arguments: str | tuple[Option, ...]) -> RuleViolationError:
+    before = guarded.trace
+    with pytest.raises(RuleViolationError) as caught:
+        guarded.perform(skill, arguments)
+    assert guarded.trace == before or caught.value.is_late
+    return caught.value
+
+
+# --- what is judged
+
+
+def test_what_a_rule_forbids_is_not_done() -> None:
+    one = robot(VAULT)
+    one.perform("go_to", ["office"])
+    error = refused(one, "go_to", "the vault")
+    assert (one.room, error.kind, error.ends_run) == ("office", "RuleViolation", True)
+    assert str(error) == 'the rule "vault" forbids this: Do as the house wants'
+
+
+def test_every_room_that_a_request_may_mean_counts() -> None:
+    one = robot(rule('not tr.Exists(goto("room 2"))'))
+    one.perform("go_to", ["vault"])
+    refused(one, "go_to", "vault room 2")  # though the simulated robot would go to the first of both
+    refused(robot(VAULT), "go_to", "the office, not the vault")
+
+
+def test_an_attempt_that_would_fail_is_judged_before() -> None:
+    one = robot(rule('not tr.Exists(pick("crown"))'))
+    refused(one, "pick", "crown")
+    with pytest.raises(RobotError, match='no "cup"'):
+        one.perform("pick", ["cup"])
+
+
+def test_whenever_something_happens_something_else_came_before() -> None:
+    one = robot(KNOCK)
+    refused(one, "go_to", "office")
+    one.perform("say", ["knock knock"])
+    one.perform("go_to", ["office"])
+    one.perform("go_to", ["hall"])
+    refused(one, "go_to", "office")
+
+
+def test_what_is_held_and_who_is_asked() -> None:
+    one = robot(rule('not tr.Exists(holding("glass", goto(without("hall"))))'))
+    one.perform("go_to", ["hall"])
+    one.perform("pick", ["glass"])
+    refused(one, "go_to", "office")
+    one.perform("place", ["glass"])
+    one.perform("go_to", ["office"])
+    other = robot(rule('not tr.Exists(to("carol", ask(".*", ".*")))'))
+    other.perform("ask", ["ann", "Tea?", (Option("yes"),)])
+    refused(other, "ask", "Carol", "Tea?", (Option("yes"),))
+
+
+def test_what_depends_on_a_result_is_noticed_when_it_is_known() -> None:
+    one = robot(rule('not tr.Exists(missed("mug"))'))
+    assert one.perform("is_in_room", ["mug"]) is True
+    one.perform("go_to", ["vault"])
+    error = refused(one, "is_in_room", "mug")
+    assert error.is_late
+    assert error.ends_run
+    both = rule('not tr.Exists(missed("mug")) and not tr.Exists(found("mug"))')
+    assert not refused(robot(both), "is_in_room", "mug").is_late  # whichever it is
+    answered = robot(rule('not tr.Exists(answered("yes"))'))
+    assert refused(answered, "ask", "ann", "Tea?", (Option("yes"), Option("no"))).is_late
+    assert not refused(
+        robot(rule('not tr.Exists(answered("yes"))')), "ask", "ann", "?", (Option("yes"),)
+    ).is_late
+
+
+def test_an_option_that_is_no_text_is_refused() -> None:
+    one = robot(rule('not tr.Exists(ask("tea", "^no$"))'))
+    refused(one, "ask", "ann", "tea?", (Option("1", is_text=False),))
+
+
+def test_rules_of_the_end() -> None:
+    report = Rule("report", "Report.", parse('tr.Exists(say("done"))'), "finally")
+    guard = Guard([report])
+    assert str(guard.at_end()) == 'the rule "report" is not kept at the end: Report'
+    guard.happened(Event("say", "done"))
+    assert guard.at_end() is None
+
+
+# --- in the engine
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["batches", "one process per run"])
+def worker(request: pytest.FixtureRequest) -> Iterator[Worker]:
+    worker = Worker(one_process_per_run=request.param)
+    yield worker
+    worker.close()
+
+
+def ran(worker: Worker, program: str, rules: Sequence[Rule]) -> Outcome:
+    return worker.run(program, partial(robot, *rules))
+
+
+def test_a_rule_ends_a_run(worker: Worker) -> None:
+    program = "def task_program():\n    go_to('office')\n    go_to('vault')\n    say('there')\n"
+    outcome = ran(worker, program, [VAULT])
+    assert outcome.error is not None
+    assert (outcome.status, outcome.error.kind, outcome.line) == (Status.ROBOT_ERROR, "RuleViolation", 3)
+    assert [event.text for event in outcome.trace] == ["office"]
+
+
+def test_a_refusal_may_be_caught(worker: Worker) -> None:
+    program = "def task_program():\n    try: go_to('vault')\n    except Exception as e: say(str(e))\n"
+    outcome = ran(worker, program, [rule('not tr.Exists(goto("vault"))', refuse=True)])
+    assert outcome.status is Status.FINISHED
+    assert [event.kind for event in outcome.trace] == ["say"]
+    assert "forbids this" in outcome.trace[0].text
+
+
+def test_a_rule_of_the_end_is_reported(worker: Worker) -> None:
+    report = Rule("report", "Report.", parse('tr.Exists(say("done"))'), "finally")
+    for said, kind in (("done", None), ("hello", "RuleViolation")):
+        outcome = ran(worker, f"def task_program():\n    say('{said}')\n", [report])
+        assert (outcome.error and outcome.error.kind) == kind
+        assert len(outcome.trace) == 1
+
+
+def test_what_is_remembered_of_idle_calls_is_judged_all_the_same(worker: Worker) -> None:
+    program = "def task_program():\n    for _ in range(300): say('a')\n"
+    outcome = ran(worker, program, [rule('not tr.AtLeast(say("a"), 200)')])
+    assert len(outcome.trace) == 199
+
+
+SKILLS = {
+    "go_to": st.sampled_from(["hall", "office", "vault"]).map(lambda room: f"go_to({room!r})"),
+    "say": st.sampled_from(["knock", "done"]).map(lambda text: f"say({text!r})"),
+    "pick": st.sampled_from(["mug", "glass", "crown"]).map(lambda thing: f"pick({thing!r})"),
+    "look": st.sampled_from(["mug", "ann"]).map(lambda thing: f"is_in_room({thing!r})"),
+    "ask": st.sampled_from(["ann", "carol"]).map(lambda who: f"ask({who!r}, 'Tea?', ['yes', 'no'])"),
+}
+FORMULAS = (
+    r'not tr.Exists(goto("vault"))',
+    'not tr.AtLeast(say(".*"), 2)',
+    'not tr.Exists(holding("glass", goto("office")))',
+    'not tr.Exists(to("carol", ask(".*", ".*")))',
+    'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))',
+    'tr.OnlyAfterFirst(pick("mug")).Exists(say("done")) or not tr.Last(goto("office"))',
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    calls=st.lists(st.one_of(*SKILLS.values()), max_size=8),
+    formula=st.sampled_from(FORMULAS),
+    caught=st.booleans(),
+)
+def test_a_run_is_cut_exactly_where_a_prefix_breaks_the_rule(
+    worker: Worker, calls: list[str], formula: str, *, caught: bool
+) -> None:
+    body = [f"try: {call}\n    except Exception: pass" if caught else call for call in calls] or ["pass"]
+    program = "def task_program():\n" + "".join(f"    {line}\n" for line in body)
+    free = worker.run(program, partial(SimulatedRobot, WORLD, AS_WRITTEN))
+    kept = parse(formula)
+    broken = next((n for n in range(len(free.trace) + 1) if not holds(kept, free.trace[:n])), None)
+    outcome = ran(worker, program, [rule(formula)])
+    if broken is None and not (outcome.error and outcome.error.kind == "RuleViolation"):
+        assert (outcome, outcome.trace) == (free, free.trace)
+    else:  # an attempt that leaves no event counts, too
+        assert outcome.error is not None
+        assert outcome.error.kind == "RuleViolation"
+        assert outcome.trace == free.trace[: len(outcome.trace)]
+        assert broken is None or len(outcome.trace) < broken
+
+
+# --- programs that want to go on all the same
+
+HOSTILE: dict[str, str] = yaml.safe_load(Path(__file__).with_name("rule_breakers.yaml").read_text())
+
+
+@pytest.mark.parametrize("body", HOSTILE.values(), ids=HOSTILE)
+@pytest.mark.parametrize("refuse", [False, True], ids=["ends", "refuses"])
+def test_no_program_breaks_a_rule(worker: Worker, body: str, *, refuse: bool) -> None:
+    lines = "".join(f"    {line}\n" for line in body.splitlines())
+    forbidden = rule('not tr.Exists(goto("vault"))', refuse=refuse)
+    outcome = ran(worker, f"def task_program():\n{lines}", [forbidden, QUIET])
+    assert not [event for event in outcome.trace if event.kind == "goto" and "vault" in event.text.lower()]
+    assert refuse or outcome.error is not None or "atexit" in body  # which nothing runs
+
+
+@pytest.mark.parametrize(
+    "path", sorted((Path(__file__).parents[2] / "hostile").glob("backdoors_*.py")), ids=lambda path: path.stem
+)
+def test_no_backdoor_gets_past_a_rule(path: Path) -> None:
+    program = path.read_text().replace("@", "x")
+    shut = Worker(one_process_per_run=True)
+    try:
+        outcome = ran(shut, program, [rule('not tr.Exists(goto(".*")) and not tr.Exists(say(".*"))')])
+    finally:
+        shut.close()
+    assert not [event for event in outcome.trace if event.kind in {"goto", "say"}]
