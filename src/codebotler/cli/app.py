@@ -152,6 +152,32 @@ def check(
 
 
 @app.command()
+def rules(
+    file: Annotated[Path, typer.Argument(help="A file of house rules.")],
+    world: options.WorldOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Show house rules with examples, and what is odd about them.
+
+    For each rule, it finds a shortest example that keeps it and one that breaks it.
+    """
+    from codebotler.checking.rule_review import reviewed
+    from codebotler.checking.rules import read_rules
+    from codebotler.cli.rules import review_data, review_view
+    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.world import World
+
+    house_rules = read_rules(file)
+    known = None if world is None else World.read(world)
+    with busy("looking for examples"):
+        found = reviewed(house_rules, known)
+    if json:
+        print_json(review_data(found))
+    else:
+        print_rich(review_view(found))
+
+
+@app.command()
 def run(
     program: Annotated[
         str,

@@ -118,11 +118,6 @@ def _would_hold(monitor: Monitor, event: Event) -> bool:
         return False
 
 
-def depends_on_results(rule: Rule) -> bool:
-    """Whether a rule is about what a look finds or a person answers, which nobody knows before."""
-    return any(one.found is not None or one.answer is not None for one in elements(rule.formula))
-
-
 def _results(rule: Rule, attempt: Event) -> Iterator[Event]:
     """An event as it may turn out."""
     wanted = [one for one in elements(rule.formula) if one.kind == attempt.kind]

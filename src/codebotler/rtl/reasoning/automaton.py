@@ -61,6 +61,15 @@ class Automaton:
         )
 
     @cached_property
+    def always(self) -> Automaton:
+        """The automaton of the traces on all of whose prefixes the formula holds."""
+        rows = tuple(
+            row if accepted else (state,) * len(row)
+            for state, (row, accepted) in enumerate(zip(self.rows, self.accepts, strict=True))
+        )
+        return Automaton(rows, self.accepts)
+
+    @cached_property
     def distances(self) -> tuple[int | None, ...]:
         """For each state, the fewest events to an accepting one; None if none can be reached."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]

@@ -83,17 +83,21 @@ class Reasoner:
                 chosen = fewer
         return [one for one in formulas if one in chosen]
 
-    def trace(self, formulas: Iterable[Formula], *, shortest: bool = False) -> Trace | None:
+    def trace(
+        self, formulas: Iterable[Formula], *, always: Iterable[Formula] = (), shortest: bool = False
+    ) -> Trace | None:
         """A trace of events of the alphabet on which formulas hold, or None if there is none.
 
         Args:
             formulas: what must hold.
+            always: what must hold on every prefix as well.
             shortest: whether it must be one of the shortest, which takes longer to find.
 
         Raises:
             Undecided: the search would take too long.
         """
         readings = [self._reading(one) for one in formulas]
+        readings += [(machine.always, read) for machine, read in map(self._reading, always)]
         if self._driving is not None:
             readings.append(self._driving)
         letters: dict[States, Event] = {}  # of events that no automaton tells apart, the first

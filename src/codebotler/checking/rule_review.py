@@ -1,0 +1,163 @@
+"""A review of house rules: an example that keeps each and one that breaks it, and what is odd about them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+from codebotler.core.skills import SKILLS
+from codebotler.core.trace import Trace
+from codebotler.core.world import World
+from codebotler.rtl import EventPattern, Exists, Formula, Not, Or, Regex, Text
+from codebotler.rtl.reasoning import Reasoner, Undecided, samples
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.simulator.guard import Guard, Rule, RuleViolationError
+from codebotler.simulator.robot import finds
+
+NEVER_BROKEN = "nothing can break it"
+ALWAYS_BROKEN = "all that a robot can do breaks it"
+IMPOSSIBLE = "nothing can keep it"
+UNDECIDED = "it would take too long to find out what it allows"
+DETECTED = (
+    "it depends on what a look finds or a person answers, so it can only be noticed: "
+    "the mission stops right after that"
+)
+ANYTHING = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
+
+
+@dataclass(frozen=True)
+class Review:
+    """What there is to say about one rule."""
+
+    rule: Rule
+    keeps: Trace | None  # a shortest example; if possible, something happens that the rule speaks of
+    breaks: Trace | None  # a shortest one
+    warnings: tuple[str, ...]  # in sentences
+
+
+def reviewed(rules: Sequence[Rule], world: World | None = None) -> list[Review]:
+    """Review rules, by all that a robot can do, or by what it can do in the rooms of a world."""
+    found = {rule.name: _review(rule, world) for rule in rules}
+    for one, other in combinations(rules, 2):
+        for rule, warning in _of_pair(one, other, world):
+            review = found[rule.name]
+            found[rule.name] = replace(review, warnings=(*review.warnings, warning))
+    return list(found.values())
+
+
+def _review(rule: Rule, world: World | None) -> Review:
+    warnings = [*_unknown_names(rule, world)]
+    try:
+        breaks = _trace([Not(rule.formula)], [], world)
+        keeps = _kept(rule, world)
+    except Undecided:
+        return Review(rule, None, None, (*warnings, UNDECIDED))
+    if breaks is None:
+        warnings.append(NEVER_BROKEN)
+    elif rule.when == "always" and _is_by_result(rule, breaks):
+        warnings.append(DETECTED)
+    if keeps is None:
+        warnings.append(ALWAYS_BROKEN if rule.when == "always" else IMPOSSIBLE)
+    return Review(rule, keeps, breaks, tuple(warnings))
+
+
+def _is_by_result(rule: Rule, breaks: Trace) -> bool:
+    """Whether the last step would not break a rule if it turned out otherwise."""
+    guard = Guard([rule])
+    for event in breaks[:-1]:
+        guard.happened(event)
+    try:
+        guard.judge(replace(breaks[-1], found=None, answer=None))
+    except RuleViolationError:
+        return False
+    return True
+
+
+def _kept(rule: Rule, world: World | None) -> Trace | None:
+    spoken_of = [*dict.fromkeys(elements(rule.formula))]
+    kinds = [EventPattern(kind, Regex(".*")) for kind in dict.fromkeys(one.kind for one in spoken_of)]
+    happenings: list[Formula] = [*map(Exists, (*spoken_of, *kinds)), ANYTHING]
+    for happens in happenings:
+        trace = _trace([happens], [rule], world)
+        if trace is not None:
+            return trace
+    return _trace([rule.formula], [], world) if rule.when == "finally" else None
+
+
+def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None) -> Trace | None:
+    """A shortest trace on which formulas hold and rules are kept, if there is one."""
+    always = [rule.formula for rule in kept if rule.when == "always"]
+    finally_ = [rule.formula for rule in kept if rule.when == "finally"]
+    moves = None if world is None else {room.name: room.name for room in world.rooms}
+    start = "" if world is None else world.robot
+    reasoner = Reasoner([*wanted, *always, *finally_], moves, start)
+    return reasoner.trace([*wanted, *finally_], always=always, shortest=True)
+
+
+# --- two rules
+
+
+def _of_pair(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule, str]]:
+    """What is odd about two rules together, and about which of them."""
+    kinds = [{element.kind for element in elements(rule.formula)} for rule in (one, other)]
+    if not kinds[0] & kinds[1]:
+        return
+    try:
+        if _conflict(one, other, world):
+            yield other, f'it cannot be kept together with "{one.name}"'
+            return
+        follows = [_follows(one, other, world), _follows(other, one, world)]
+    except Undecided:
+        return
+    if all(follows):
+        yield other, f'it says the same as "{one.name}"'
+    elif follows[0]:
+        yield one, f'it follows from "{other.name}"'
+    elif follows[1]:
+        yield other, f'it follows from "{one.name}"'
+
+
+def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
+    happens = [ANYTHING] if one.when == other.when == "always" else []
+    alone = all(_trace(happens, [rule], world) is not None for rule in (one, other))
+    return alone and _trace(happens, [one, other], world) is None
+
+
+def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
+    """Whether a rule is kept wherever another one is, which can be broken."""
+    if rule.when == "always" and other.when == "finally":
+        return False
+    return (
+        _trace([Not(rule.formula)], [], world) is not None
+        and _trace([Not(rule.formula)], [other], world) is None
+    )
+
+
+# --- names
+
+
+def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
+    """Rooms, things and people that a rule names, and its world lacks."""
+    if world is None:
+        return
+    rooms = [room.name for room in world.rooms]
+    things = [label for room in world.rooms for label in room.objects]
+    people = [person.name for room in world.rooms for person in room.people]
+    for element in dict.fromkeys(elements(rule.formula)):
+        named: list[tuple[str, Text | None, list[str]]] = [("thing", element.holding, things)]
+        named.append(("person", element.to, people))
+        named.append(("room", None if element.place is None else Regex(element.place), rooms))
+        sort = {"goto": "room", "pick": "thing", "place": "thing"}.get(element.kind)
+        named.append((sort or "", element.text if sort else None, rooms if sort == "room" else things))
+        for what, text, known in named:
+            if isinstance(text, Regex) and not _is_among(text, known):
+                yield f'it names the {what} "{text.pattern}", which is not in this world'
+
+
+def _is_among(text: Regex, known: Sequence[str]) -> bool:
+    """Whether a regex may mean one of these names; one that matches anything does."""
+    spelled = samples(text.pattern)
+    return text.matches("") or any(
+        text.matches(name) or any(finds(one, name, "label-in-request") for one in spelled) for name in known
+    )

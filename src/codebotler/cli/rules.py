@@ -1,0 +1,82 @@
+"""`codebotler rules`: shows each house rule with examples, and warns of what is odd."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from codebotler.checking.rule_review import Review
+from codebotler.checking.storyboard import grid, steps_of
+from codebotler.core.skills import SKILLS
+from codebotler.core.terminal import visible
+from codebotler.core.trace import Event, Trace
+from codebotler.core.words import listed
+
+MADE_UP = ("", "x")  # texts in examples that stand for any other
+ASPECTS = {"always": "at any time", "finally": "at the end"}
+
+
+def review_view(found: Sequence[Review]) -> RenderableType:
+    """The rules, each with its examples and warnings."""
+    parts: list[RenderableType] = []
+    for one in found:
+        parts += [*_rule(one), Text()]
+    return Group(*parts[:-1])
+
+
+def _rule(one: Review) -> Iterator[RenderableType]:
+    rule = one.rule
+    refused = "; a program may catch the refusal" if rule.refuse else ""
+    yield Text.assemble((rule.name, "bold"), f"  {visible(rule.says)}")
+    yield Text(f"  {ASPECTS[rule.when]}{refused}: {rule.formula}", "dim")
+    for title, style, trace in (("keeps it", "green", one.keeps), ("breaks it", "red", one.breaks)):
+        if trace is not None:
+            yield Text(f"  {title}", style)
+            yield Padding(_steps(trace), (0, 0, 0, 4))
+    for warning in one.warnings:
+        yield Text(f"  note: {warning}", "yellow")
+
+
+def _steps(trace: Trace) -> RenderableType:
+    table = grid("right", "left")
+    if not trace:
+        table.add_row(Text(), Text("the robot does nothing", "dim"))
+    for number, event in enumerate(trace, 1):
+        table.add_row(Text(str(number), "dim"), Text(step_sentence(event)))
+    return table
+
+
+def step_sentence(event: Event) -> str:
+    """A step of an example, with all that a rule may speak of; any text will do where it is made up."""
+    recording, verb = SKILLS.recordings[event.kind], SKILLS.verbs[event.kind]
+    made_up = "another room" if recording.is_drive else "something"
+    told = [verb.third, made_up if event.text in MADE_UP else f'"{visible(event.text)}"']
+    offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
+    told += [f"offering {listed(offered)}"] if offered else []
+    told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []
+    told += [f"in {visible(event.place)}"] if event.place not in MADE_UP and not recording.is_drive else []
+    told += [f'holding "{visible(event.holding)}"'] if event.holding else []
+    if event.found is not None:
+        told.append(f"and {'finds it' if event.found else 'does not find it'}")
+    told += [f'and hears "{visible(event.answer)}"'] if event.answer is not None else []
+    return " ".join(told)
+
+
+def review_data(found: Sequence[Review]) -> list[dict[str, object]]:
+    """The same as plain data."""
+    return [
+        {
+            "name": one.rule.name,
+            "says": one.rule.says,
+            "when": one.rule.when,
+            "formula": str(one.rule.formula),
+            "refuse": one.rule.refuse,
+            "keeps": None if one.keeps is None else steps_of(one.keeps),
+            "breaks": None if one.breaks is None else steps_of(one.breaks),
+            "warnings": list(one.warnings),
+        }
+        for one in found
+    ]

@@ -1,0 +1,159 @@
+"""The review of house rules: examples that are right, and what it warns of."""
+
+from __future__ import annotations
+
+import pytest
+
+from codebotler.checking.rule_review import (
+    ALWAYS_BROKEN,
+    DETECTED,
+    IMPOSSIBLE,
+    NEVER_BROKEN,
+    reviewed,
+)
+from codebotler.cli.rules import step_sentence
+from codebotler.core.trace import Event, Option
+from codebotler.core.world import Person, Room, World
+from codebotler.rtl import Monitor, holds, parse
+from codebotler.simulator.guard import Rule
+
+WORLD = World(
+    (Room("hall"), Room("kitchen", ("glass",)), Room("office", (), (Person("carol"),))),
+    "hall",
+)
+NO_VAULT = 'not tr.Exists(goto("vault"))'
+NO_OFFICE = 'not tr.Exists(goto("office"))'
+KNOCK = (
+    'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))'
+)
+NOTHING = " and ".join(
+    f'not tr.Exists({kind}(".*"))' for kind in ("goto", "say", "check", "pick", "place", "mention")
+)
+FORMULAS = (
+    NO_OFFICE,
+    KNOCK,
+    'not tr.AtLeast(goto("kitchen"), 2)',
+    'not tr.Exists(at("kitchen", holding("glass", goto(without("kitchen")))))',
+    'not tr.Exists(to("carol", ask(".*", ".*")))',
+    'not tr.Exists(missed("glass"))',
+    'not tr.OnlyAfterLast(missed("glass")).Exists(say(".*"))',
+    'not tr.Last(say("done")) or tr.OnlyAfterLast(goto("kitchen")).Exists(found("glass"))',
+)
+
+
+def rules(*formulas: str, when: str = "always") -> list[Rule]:
+    return [
+        Rule(f"r{n}", "A rule.", parse(text), "always" if when == "always" else "finally")
+        for n, text in enumerate(formulas)
+    ]
+
+
+@pytest.mark.parametrize("world", [None, WORLD], ids=["anywhere", "in a world"])
+@pytest.mark.parametrize("text", FORMULAS)
+def test_examples_keep_and_break(text: str, world: World | None) -> None:
+    (review,) = reviewed(rules(text), world)
+    formula = parse(text)
+    assert review.keeps
+    assert all(holds(formula, review.keeps[:end]) for end in range(len(review.keeps) + 1))
+    assert review.breaks
+    assert not holds(formula, review.breaks)
+    assert all(holds(formula, review.breaks[:end]) for end in range(len(review.breaks)))
+    assert set(review.warnings) <= {DETECTED}
+
+
+def test_an_example_shows_when_a_rule_counts() -> None:
+    (review,) = reviewed(rules(KNOCK), WORLD)
+    assert review.keeps is not None
+    assert [(event.kind, event.text) for event in review.keeps] == [("say", "knock"), ("goto", "office")]
+
+
+def test_examples_of_a_world_are_of_its_rooms() -> None:
+    (review,) = reviewed(rules('not tr.Exists(at("kitchen", say("hush")))'), WORLD)
+    assert review.breaks is not None
+    assert [(event.kind, event.text, event.place) for event in review.breaks] == [
+        ("goto", "kitchen", ""),
+        ("say", "hush", "kitchen"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "when", "warning"),
+    [
+        ('tr.AtLeast(goto("hall"), 0)', "always", NEVER_BROKEN),
+        ('not tr.Exists(goto("hall")) or tr.Exists(goto("hall"))', "always", NEVER_BROKEN),
+        (
+            " and ".join(f'not tr.Exists({k}(".*"))' for k in ("goto", "say", "check", "pick", "place")),
+            "",
+            "",
+        ),
+        ('tr.Exists(goto("hall")) and not tr.Exists(goto("hall"))', "finally", IMPOSSIBLE),
+        ('not tr.Exists(missed("glass"))', "always", DETECTED),
+        ('not tr.Exists(answered("yes"))', "always", DETECTED),
+    ],
+)
+def test_an_odd_rule_is_told(text: str, when: str, warning: str) -> None:
+    (review,) = reviewed(rules(text, when=when))
+    assert warning in review.warnings
+
+
+def test_a_name_that_the_world_lacks_is_told() -> None:
+    texts = (
+        NO_VAULT,
+        'not tr.Exists(at("cellar", say(".*")))',
+        'not tr.Exists(pick("crown"))',
+        'not tr.Exists(holding("crown", goto("hall")))',
+        'not tr.Exists(to("bob", ask(".*", ".*")))',
+    )
+    named = (
+        'the room "vault"',
+        'the room "cellar"',
+        'the thing "crown"',
+        'the thing "crown"',
+        'person "bob"',
+    )
+    for text, name in zip(texts, named, strict=True):
+        (review,) = reviewed(rules(text), WORLD)
+        assert any(name in warning for warning in review.warnings), text
+        (anywhere,) = reviewed(rules(text))
+        assert not any("world" in warning for warning in anywhere.warnings)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "told"),
+    [
+        ('not tr.AtLeast(goto("hall"), 2)', 'not tr.AtLeast(goto("hall"), 3)', ["", 'it follows from "r0"']),
+        ('not tr.AtLeast(goto("hall"), 3)', 'not tr.AtLeast(goto("hall"), 2)', ['it follows from "r1"', ""]),
+        (NO_OFFICE, 'tr.Count(goto("office"), 0)', ["", 'it says the same as "r0"']),
+        (NO_OFFICE, KNOCK, ["", 'it follows from "r0"']),
+        (NO_OFFICE, 'not tr.Exists(say("hush"))', ["", ""]),
+    ],
+)
+def test_rules_that_follow_from_others_are_told(one: str, other: str, told: list[str]) -> None:
+    found = reviewed(rules(one, other))
+    assert [next(iter(review.warnings), "") for review in found] == told
+
+
+def test_rules_that_cannot_be_kept_together_are_told() -> None:
+    (always,) = rules(NO_OFFICE)
+    (end,) = rules('tr.Exists(goto("office"))', when="finally")
+    _, review = reviewed([always, Rule("end", "Go there.", end.formula, "finally")])
+    assert review.warnings == ('it cannot be kept together with "r0"',)
+    several = rules('tr.Exists(say("a"))', 'not tr.Exists(say("a"))', when="finally")
+    assert reviewed(several)[1].warnings == ('it cannot be kept together with "r0"',)
+
+
+def test_steps_are_told_with_all_that_rules_speak_of() -> None:
+    asked = Event("ask", "x", (Option("tea"),), "tea", place="hall", holding="mug", to="carol")
+    assert (
+        step_sentence(asked)
+        == 'asks something offering "tea" of "carol" in hall holding "mug" and hears "tea"'
+    )
+    assert step_sentence(Event("check", "mug", found=False)) == 'looks for "mug" and does not find it'
+    assert step_sentence(Event("goto", "")) == "drives to another room"
+
+
+def test_the_monitor_agrees_with_every_example() -> None:
+    for review in reviewed(rules(*FORMULAS), WORLD):
+        monitor = Monitor(review.rule.formula)
+        assert review.breaks is not None
+        assert [monitor.feed(event) for event in review.breaks][-1] is False

@@ -1,0 +1,134 @@
+"""House rules while a robot moves: what they forbid is never told to it, and the mission stops."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.world import Room, World
+from codebotler.missions.log import EVENTS, Line, State
+from codebotler.missions.mission import Mission
+from codebotler.robots.base import Result, Robot
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.simulated import Simulated
+from codebotler.rtl import parse
+from codebotler.simulator.guard import Rule
+from codebotler.simulator.sampled_robot import RoomMap
+from doubles import Answering
+
+VAULT = Rule("vault", "Never go into the vault.", parse('not tr.Exists(goto("vault"))'))
+REPORT = Rule("report", "Say that it is done.", parse('tr.Exists(say("done"))'), "finally")
+ROOMS = RoomMap(("hall", "kitchen", "the vault"), "hall", plain=True)
+STUBBORN = """
+def task_program():
+    go_to("kitchen")
+    while True:
+        try:
+            go_to("vault")
+        except BaseException:
+            pass
+        finally:
+            say("I go on")
+"""
+
+
+def answering(answer: Callable[[str, str], Result] = lambda *_: None) -> Answering:
+    return Answering(answer)
+
+
+def ran(folder: Path, robot: Robot, program: str, rules: Sequence[Rule]) -> tuple[Mission, list[Line]]:
+    mission = Mission(folder, robot.name)
+    mission.draft(program)
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, folder) as reserved, mission:
+        mission.run(reserved, "hall", rules=rules, room_map=ROOMS)
+    lines = (mission.folder / EVENTS).read_text().splitlines()
+    return mission, [json.loads(line) for line in lines]
+
+
+def test_the_robot_is_not_told_what_a_rule_forbids_and_the_mission_stops(tmp_path: Path) -> None:
+    robot = answering()
+    mission, lines = ran(tmp_path, robot, STUBBORN, [VAULT])
+    assert (mission.state, mission.summary.reason) == (State.STOPPED, "stopped by rule vault")
+    assert robot.done == ["kitchen"]
+    assert robot.cancels
+    (told,) = [line for line in lines if line["event"] == "rule"]
+    assert told["rule"] == "vault"
+    assert told["says"] == VAULT.says
+    assert told["formula"] == str(VAULT.formula)
+    assert (told["what"], told["prevented"], told["line"]) == (["goto", "vault"], True, 6)
+
+
+def test_the_robot_is_stopped_before_anything_is_logged(tmp_path: Path) -> None:
+    seen: list[str] = []
+
+    class Noting(Answering):
+        def cancel(self) -> None:
+            super().cancel()
+            seen.append("cancel")
+
+    robot = Noting()
+    mission = Mission(tmp_path, robot.name, told=lambda line: seen.append(line["event"]))
+    mission.draft(STUBBORN)
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, tmp_path) as reserved, mission:
+        mission.run(reserved, rules=[VAULT])
+    assert seen.index("cancel") < seen.index("rule")
+    assert seen.index("cancel") < seen.index("stop")
+
+
+def test_a_refusal_is_logged_and_the_program_may_go_on(tmp_path: Path) -> None:
+    refusing = Rule("vault", VAULT.says, VAULT.formula, refuse=True)
+    program = (
+        "def task_program():\n    try: go_to('vault')\n    except Exception as e: say(type(e).__name__)\n"
+        "    go_to('kitchen')\n"
+    )
+    robot = answering()
+    mission, lines = ran(tmp_path, robot, program, [refusing])
+    assert mission.state is State.DONE
+    assert robot.done == ["RuleViolation", "kitchen"]
+    assert [line["prevented"] for line in lines if line["event"] == "rule"] == [True]
+
+
+def test_what_an_answer_breaks_stops_the_mission_right_after_it(tmp_path: Path) -> None:
+    rule = Rule("stay", "Stop where nobody is.", parse('not tr.Exists(missed("person"))'))
+    robot = answering(lambda skill, _: False if skill == "is_in_room" else None)
+    program = "def task_program():\n    is_in_room('person')\n    say('hello?')\n"
+    mission, lines = ran(tmp_path, robot, program, [rule])
+    assert mission.state is State.STOPPED
+    assert robot.done == ["person"]
+    assert [line["prevented"] for line in lines if line["event"] == "rule"] == [False]
+
+
+@pytest.mark.parametrize("said", ["done", "bye"])
+def test_a_rule_of_the_end_is_reported_and_changes_nothing(tmp_path: Path, said: str) -> None:
+    program = f"def task_program():\n    say('{said}')\n"
+    mission, lines = ran(tmp_path, answering(), program, [REPORT])
+    assert mission.state is State.DONE
+    unkept = 'the rule "report" is not kept at the end: Say that it is done'
+    assert mission.summary.reason == ("" if said == "done" else unkept)
+    assert [line["rule"] for line in lines if line["event"] == "rule"] == ["report"] * (said != "done")
+
+
+@pytest.mark.parametrize("request_", ["vault", "THE VAULT", "kitchen, not the vault"])
+def test_every_room_that_a_request_may_mean_counts(tmp_path: Path, request_: str) -> None:
+    robot = answering()
+    rule = Rule("vault", VAULT.says, parse('not tr.Exists(goto("^the vault$"))'))
+    rooms = [rule] if "the vault" in request_.lower() else [VAULT]
+    mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", rooms)
+    assert mission.state is State.STOPPED
+    assert robot.done == []
+
+
+def test_what_is_carried_counts_on_the_simulated_robot(tmp_path: Path) -> None:
+    world = World((Room("hall", ("glass",)), Room("kitchen")), "hall")
+    rule = Rule("glass", "No glass leaves the hall.", parse('not tr.Exists(holding("glass", goto(".*")))'))
+    program = "def task_program():\n    go_to('hall')\n    pick('glass')\n    go_to('kitchen')\n"
+    mission, lines = ran(tmp_path, Simulated(world, speed=None), program, [rule])
+    assert mission.state is State.STOPPED
+    assert [line["arguments"] for line in lines if line["event"] == "skill"][-1] == {"obj": "glass"}
