@@ -20,7 +20,9 @@ from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
 from codebotler.core.trace import Outcome, Status, Trace, outcome_data
+from codebotler.core.world import World
 from codebotler.rtl import Inconclusive, holds
+from codebotler.simulator.guard import Guard
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
 from codebotler.simulator.worker import Worker
@@ -177,11 +179,17 @@ def run_in_worlds(
 ) -> list[tuple[str, Sequence[Outcome]]]:
     """Run programs, each in the worlds of its task; return for each the task and how each run ended."""
     jobs = [
-        (program, [partial(SimulatedRobot, one.world, suite.rules) for one in scenarios])
+        (program, [partial(robot_in, one.world, suite) for one in scenarios])
         for task, program in works
         for scenarios in [suite.tasks[task].judged_in(ablated=ablated)]
     ]
     return [(task, outcomes) for (task, _), outcomes in zip(works, worker.run_all(jobs), strict=True)]
+
+
+def robot_in(world: World, suite: Suite) -> SimulatedRobot:
+    """A robot in a world, by the rules of a suite and of its house."""
+    guard = None if suite.house is None else Guard(suite.house.rules)
+    return SimulatedRobot(world, suite.rules, guard=guard)
 
 
 def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> tuple[bytes, ...] | None:
@@ -274,6 +282,7 @@ def head(suite: Suite) -> dict[str, Any]:
             "skill_seconds": 0,
             "clock_starts": rules.clock_starts.isoformat(),
         },
+        **({} if (house := suite.house) is None else {"house_rules": {house.name: house.digest}}),
         "codebotler": __version__,
         "python": PYTHON,
     }

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path
@@ -16,6 +16,7 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.words import counted
 from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.rules import Rules
+from roboeval.suites.house import HouseRules
 from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MOST_WORLDS, Accepted, Fact, SuiteFile
 from roboeval.suites.task import Check, Requirement, Scenario, Task
@@ -68,12 +69,17 @@ class Suite:
     worlds: int | None = None
     seed: int | None = None
     skills: SkillTable = SKILLS
+    house: HouseRules | None = None  # what stops a program besides
 
     def __hash__(self) -> int:
         return hash(self.digest)  # tasks lie in a dictionary, which has no hash
 
     def __repr__(self) -> str:
         return f"Suite({self.name!r}, {counted(len(self.tasks), 'task')})"
+
+    def with_house_rules(self, house: HouseRules | None) -> Suite:
+        """The same suite with these house rules, or without any."""
+        return replace(self, house=house)
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
         """The same suite with other worlds, drawn from the same descriptions.

@@ -81,7 +81,7 @@ class Run:
         return self.path / "inflight.jsonl"
 
     def rows(self, key: str) -> Path:
-        """The rows of an evaluation; `key` is the suite's name, with -ablation where ablated."""
+        """The rows of an evaluation, by its `evaluation_key`."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
     def head(self, key: str) -> Path:
@@ -214,7 +214,8 @@ def load_head(path: Path) -> dict[str, Any]:
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
     """The name of an evaluation's files."""
-    return suite.name + ABLATED * ablated
+    rules = "" if suite.house is None else f"-rules-{suite.house.name}"
+    return suite.name + rules + ABLATED * ablated
 
 
 def tasks_to_judge(
@@ -238,7 +239,7 @@ def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
         return suite
     match load_head(path):
         case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0:
-            return suite.with_worlds(worlds, seed)
+            return suite.with_worlds(worlds, seed).with_house_rules(suite.house)
     return suite
 
 

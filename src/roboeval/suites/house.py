@@ -1,0 +1,37 @@
+"""House rules beside a suite: programs are judged by what was asked, and stopped where they break a rule."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from codebotler.checking.rules import read_rules
+from codebotler.core.errors import UserError
+from codebotler.simulator.guard import Rule
+
+
+@dataclass(frozen=True)
+class HouseRules:
+    """The rules of a file.
+
+    Args:
+        name: by which evaluations with them are kept: the file's name without its ending.
+        rules: in the order of the file.
+        digest: the SHA-256 of the file, in hexadecimal.
+    """
+
+    name: str
+    rules: tuple[Rule, ...]
+    digest: str
+
+    @classmethod
+    def read(cls, path: Path) -> HouseRules:
+        """Read a file of rules; a UserError if it cannot be used."""
+        rules = read_rules(path)
+        if not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
+            raise UserError(
+                "its name is used for files; write it in small letters, digits and dashes", file=path
+            )
+        return cls(path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())
