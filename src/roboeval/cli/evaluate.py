@@ -15,6 +15,7 @@ from roboeval.cli.options import (
     IsolationOption,
     JsonOption,
     ProcessOption,
+    RulesOption,
     SeedOption,
     SuiteOption,
     TasksOption,
@@ -26,7 +27,7 @@ from roboeval.cli.options import (
     named,
 )
 from roboeval.cli.output import fail, note, watched
-from roboeval.cli.show import print_summary
+from roboeval.cli.show import house_of, print_summary
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -57,6 +58,7 @@ def evaluate(
     engine: EngineOption = "local",
     require_isolation: IsolationOption = False,
     one_process_per_run: ProcessOption = False,
+    rules: RulesOption = None,
     json: JsonOption = False,
 ) -> None:
     """Judge whether each completion does what was asked."""
@@ -69,9 +71,9 @@ def evaluate(
         from roboeval.evaluation.runs.results import Scope
         from roboeval.evaluation.runs.table import TableBuilder
 
-        judged_by = load(suite)
+        judged_by = load(suite, rules)
         if worlds is not None or seed is not None:
-            judged_by = judged_by.with_worlds(worlds, seed)
+            judged_by = judged_by.with_worlds(worlds, seed).with_house_rules(judged_by.house)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged, since they have no ablation: {', '.join(left)}")
@@ -92,12 +94,13 @@ def evaluate(
                 builder.add(row)
             table = builder.table()
             counted = summary(table, judged_by, scope, ablated=ablation)
-            print_summary(counted, title=source, as_json=json)
+            house = None if rules is None else house_of(run, judged_by, table, ablated=ablation)
+            print_summary(counted, title=source, as_json=json, house=house)
         except KeyboardInterrupt:
             note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
             raise SystemExit(STOPPED) from None
         if run is not None:
-            _name_next_command(run, table, suite=suite, ablated=ablation)
+            _name_next_command(run, table, suite=suite, ablated=ablation, rules=rules)
         if (left_out := scope.total - judged_count(counted.prompts)) > 0:
             _fail_with_some_left(how_many(left_out), scope.total, is_kept=run is not None)
 
@@ -109,12 +112,14 @@ def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoRetur
     raise SystemExit(1)
 
 
-def _name_next_command(run: Run, table: DataFrame, *, suite: str, ablated: bool) -> None:
+def _name_next_command(run: Run, table: DataFrame, *, suite: str, ablated: bool, rules: Path | None) -> None:
     """Note where verdicts are kept, and the command that shows the first failure."""
     from roboeval.evaluation.runs.completions import KEY, name_of
 
     failed = table.filter(~table["passed"]).select(KEY).head(1)
-    again = command("show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablated)
+    again = command(
+        "show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablated, rules=rules
+    )
     does = "explains the first failure" if failed.height else "prints these tables again"
     note(f"verdicts are in {run.path}; `{again}` {does}")
 

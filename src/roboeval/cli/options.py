@@ -80,6 +80,14 @@ TasksOption = Annotated[
     typer.Option(help="Only these tasks, separated by commas.", autocompletion=listed_task_names),
 ]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Judge only the common-sense requirements.")]
+RulesOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="A file of house rules; a program is stopped where it breaks one, and has failed.",
+        parser=named("a file of rules"),
+    ),
+]
 EngineOption = Annotated[
     str,
     typer.Option(
@@ -136,18 +144,22 @@ def with_options_of(called: Callable[..., object]) -> Callable[[Command], Comman
 # --- what a user names
 
 
-def load(suite: str) -> Suite:
-    """Read a suite by name or folder."""
+def load(suite: str, rules: Path | None = None) -> Suite:
+    """Read a suite by name or folder, and the rules of a house."""
+    from roboeval.suites.house import HouseRules
     from roboeval.suites.load import load_suite
 
-    return load_suite(suite)
+    return load_suite(suite).with_house_rules(None if rules is None else HouseRules.read(rules))
 
 
-def command(verb: str, *arguments: object, suite: str, ablated: bool = False) -> str:
+def command(
+    verb: str, *arguments: object, suite: str, ablated: bool = False, rules: Path | None = None
+) -> str:
     """A command line to paste."""
     words = ["roboeval", verb, *map(str, arguments)]
     words += [] if suite == "paper" else ["--suite", suite]
     words += ["--ablation"] if ablated else []
+    words += [] if rules is None else ["--rules", str(rules)]
     return shlex.join(words)
 
 
@@ -181,6 +193,7 @@ def open_run(
     suite_name: str,
     *,
     ablated: bool,
+    rules: Path | None = None,
     beside: Results | None = None,
     see: Callable[[bytes], None] | None = None,
 ) -> Opened:
@@ -191,8 +204,8 @@ def open_run(
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
 
-    again = command("evaluate", run, suite=suite_name, ablated=ablated)
-    folder, key, suite = evaluation_of(run, load(suite_name), ablated=ablated, again=again)
+    again = command("evaluate", run, suite=suite_name, ablated=ablated, rules=rules)
+    folder, key, suite = evaluation_of(run, load(suite_name, rules), ablated=ablated, again=again)
     results = read_results(
         folder,
         key,
@@ -203,7 +216,8 @@ def open_run(
     )
     if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
-    again = command("evaluate", run, *_to_go_on(results, suite), suite=suite_name, ablated=ablated)
+    more = _to_go_on(results, suite)
+    again = command("evaluate", run, *more, suite=suite_name, ablated=ablated, rules=rules)
     return Opened(results, again)
 
 
@@ -212,6 +226,7 @@ def open_current(
     suite_name: str,
     *,
     ablated: bool,
+    rules: Path | None = None,
     beside: Results | None = None,
     see: Callable[[bytes], None] | None = None,
 ) -> Opened:
@@ -221,7 +236,7 @@ def open_current(
     """
     from codebotler.core.errors import UserError
 
-    opened = open_run(run, suite_name, ablated=ablated, beside=beside, see=see)
+    opened = open_run(run, suite_name, ablated=ablated, rules=rules, beside=beside, see=see)
     if (complaint := complaint_of(opened.results)) is not None:
         raise UserError(f"{complaint}; `{opened.again} --redo` judges the current programs")
     if opened.results.table.is_empty():

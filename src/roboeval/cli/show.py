@@ -12,6 +12,7 @@ from codebotler.cli.options import HostOption, NameOption, NoTokenOption, PortOp
 from roboeval.cli.options import (
     AblationOption,
     JsonOption,
+    RulesOption,
     RunArgument,
     SuiteOption,
     complaint_of,
@@ -25,9 +26,14 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:
+    from polars import DataFrame
+
+    from roboeval.analysis.broken_rules import BrokenRules
     from roboeval.analysis.summary import Summary
     from roboeval.evaluation.runs.completions import Key
+    from roboeval.evaluation.runs.folder import Run
     from roboeval.evaluation.runs.results import Results
+    from roboeval.suites.load import Suite
 
 
 def show(
@@ -38,6 +44,7 @@ def show(
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
+    rules: RulesOption = None,
     k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
     json: JsonOption = False,
 ) -> None:
@@ -45,12 +52,17 @@ def show(
     from roboeval.analysis.summary import summary
     from roboeval.analysis.tasks import parse_selection
 
-    results, again = open_run(run, suite, ablated=ablation)
+    results, again = open_run(run, suite, ablated=ablation, rules=rules)
     selection = parse_selection(what, results.known_suite)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
         counted = summary(results.table, results.known_suite, results.scope, k=ks, ablated=ablation)
-        print_summary(counted, title=str(run), as_json=json, stale=results.stale)
+        house = (
+            None
+            if rules is None
+            else house_of(results.run, results.known_suite, results.table, ablated=ablation)
+        )
+        print_summary(counted, title=str(run), as_json=json, stale=results.stale, house=house)
     else:
         if k:
             fail(f"--k applies to a whole run; leave out {selection} or --k")
@@ -64,16 +76,39 @@ def show(
         note(f"{unfinished}; `{again}` continues")
 
 
-def print_summary(counted: Summary, *, title: str, as_json: bool, stale: Iterable[Key] = ()) -> None:
+def house_of(run: Run | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
+    """How a run did by the rules of a house, beside its evaluation without them if there is one."""
+    from roboeval.analysis.broken_rules import broken_rules
+    from roboeval.evaluation.runs.folder import evaluation_key
+    from roboeval.evaluation.runs.results import read_results
+
+    key = evaluation_key(suite.with_house_rules(None), ablated=ablated)
+    if run is None or not run.rows(key).is_file():
+        return broken_rules(table)
+    return broken_rules(table, read_results(run, key, suite, keep_failed=False).table)
+
+
+def print_summary(
+    counted: Summary,
+    *,
+    title: str,
+    as_json: bool,
+    stale: Iterable[Key] = (),
+    house: BrokenRules | None = None,
+) -> None:
     """Print the tables of an evaluation."""
+    from roboeval.analysis.broken_rules import broken_rules_data
     from roboeval.analysis.summary import summary_data
-    from roboeval.cli.views.results import summary_view
+    from roboeval.cli.views.results import house_view, summary_view
     from roboeval.evaluation.runs.completions import name_of
 
     if as_json:
-        print_json({**summary_data(counted), "stale": list(map(name_of, stale))})
+        rules = {} if house is None else {"house_rules": broken_rules_data(house)}
+        print_json({**summary_data(counted), "stale": list(map(name_of, stale)), **rules})
     else:
         print_rich(summary_view(counted, title=title))
+        if house is not None:
+            print_rich(house_view(house))
 
 
 def show_part(results: Results, task: str, prompt: int | None, index: int | None, *, as_json: bool) -> None:

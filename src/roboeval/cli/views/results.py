@@ -15,7 +15,8 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.metrics import judged_count
+from roboeval.analysis.broken_rules import BrokenRules
+from roboeval.analysis.metrics import Estimate, judged_count
 from roboeval.analysis.summary import Failures, Missing, Summary
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED
@@ -52,6 +53,28 @@ def summary_view(summary: Summary, *, title: str) -> RenderableType:
         tables = Columns(listed, padding=(1, 3))
         parts += [Text(), Text(told), Text(), tables]
     return Group(*parts)
+
+
+def house_view(found: BrokenRules) -> RenderableType:
+    """How often rules were broken, by which programs, and what that cost."""
+    table = grid("right", "left")
+    for rule, count in found.by_rule.items():
+        table.add_row(f"{count:,}", Text(visible(rule)))
+    share = f"{found.broken.mean:.1%} of programs break a rule of the house ({_interval(found.broken)})"
+    parts: list[RenderableType] = [Text(), Text(share, "bold"), table]
+    if found.cost is None:
+        parts.append(Text("evaluate the run without --rules, too, to see what the rules cost", "dim"))
+    else:
+        parts.append(
+            Text(
+                f"pass@1 with the rules less pass@1 without: {found.cost.mean:+.3f} ({_interval(found.cost)})"
+            )
+        )
+    return Group(*parts)
+
+
+def _interval(estimate: Estimate) -> str:
+    return f"95% interval {estimate.low:.3f} to {estimate.high:.3f}"
 
 
 def _missed(missing: Missing) -> Iterator[Text]:
