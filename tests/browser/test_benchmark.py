@@ -114,12 +114,17 @@ def test_from_all_runs_to_one_failed_check(served: PageServer, opened: OpenPage)
     expect(page.locator(".failed-check").first).to_contain_text("at step")
     expect(page.locator(".world-of")).not_to_have_count(0)
     expect(page.locator(".wrong").first).to_be_visible()
+    step = page.locator(".failed-check a").first
+    number = step.inner_text().removeprefix("step ")
+    step.click()
+    expect(page.locator(":target")).to_have_attribute("data-step", number)
+    expect(page.locator(":target")).to_have_class(re.compile("wrong"))
     page.locator("summary", has_text="Every step").first.click()
     expect(page.locator(".unfolded pre").first).to_contain_text("→")
     page.locator("summary", has_text="The world").first.click()
     expect(page.locator(".unfolded .floorplan").first).to_be_visible()
     before = page.locator("h1").inner_text()
-    page.get_by_role("link", name="Next").click()
+    page.get_by_role("link", name="Next completion").click()
     expect(page.locator("h1")).not_to_have_text(before)
     page.get_by_role("link", name="hasty").click()
     expect(page.locator("#count")).to_have_text("18 completions")
@@ -303,7 +308,7 @@ def test_an_address_of_nothing_says_so(served: PageServer, opened: OpenPage) -> 
         ("runs/hasty/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
         ("runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
     ):
-        page = opened(served)
+        page = opened(served, expecting="404")
         page.goto(f"http://localhost:{served.port}/{path}")
         expect(page.get_by_role("alert")).to_have_text(sentence)
 
@@ -412,7 +417,41 @@ def test_nothing_runs_in_a_report_that_comes_with_a_run(
     shutil.rmtree(report)
 
 
+def test_three_runs_are_compared_pair_by_pair(few: Path, tmp_path: Path, opened: OpenPage) -> None:
+    folder = tmp_path / "runs"
+    for name in ("a", "b"):
+        shutil.copytree(few, folder / name)
+    made(folder, "careful", "--tasks", "SayGoodDay", count=1)
+    with serving(folder) as server:
+        page = opened(server)
+        page.goto(f"http://localhost:{server.port}/side-by-side?run=a&run=b&run=careful")
+        expect(page.locator(".pairs li")).to_have_count(3)
+        expect(page.locator(".heat td", has_text="not asked")).to_have_count(2)
+        page.locator(".pairs a").nth(1).click()
+        rows = page.locator(".differences tbody tr")
+        expect(rows.locator("th")).to_have_text(["All tasks", "SayGoodDay"])
+        expect(page.locator(".differences thead")).to_contain_text("careful \N{MINUS SIGN} a")
+        page.context.close()
+
+
 # --- looks
+
+
+@pytest.mark.parametrize("size", [(1366, 900), PHONE])
+def test_nothing_is_squeezed_or_hidden(served: PageServer, opened: OpenPage, size: tuple[int, int]) -> None:
+    page = opened(served, size=size)
+    expect(page.locator(".bar .pages")).to_be_visible(visible=size != PHONE)
+    page.goto(f"http://localhost:{served.port}/runs/hasty")
+    expect(page.locator(".kind", has_text="failed checks")).to_be_visible()
+    assert page.locator(".ends").evaluate("e => e.scrollHeight <= e.clientHeight")
+    page.goto(f"http://localhost:{served.port}/side-by-side?run=careful&run=hasty")
+    expect(page.locator(".differences tbody tr").first).to_be_visible()
+    heights = page.locator(".differences tbody tr").evaluate_all("rows => rows.map(row => row.clientHeight)")
+    assert max(heights) < 60
+    lines = page.locator(".heat thead th span").evaluate_all(
+        "heads => heads.map(e => [e.textContent, e.getClientRects().length])"
+    )
+    assert all(count <= len(text.split()) for text, count in lines)
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])

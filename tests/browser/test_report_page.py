@@ -113,7 +113,7 @@ def test_sorting_filtering_and_printing(chromium: str, page: Path, tmp_path: Pat
         "up: weak,&lt;scr,stro ascending",
         "missing down: 0.500,0.400,-,-",
         "missing up: 0.400,0.500,-,-",
-        "filtered: true 10 of 46 groups, 10 completions",
+        "filtered: true 10 of 47 groups shown here, 10 completions",
         "none: 0",
         "open: 0",
         "closed: 0",

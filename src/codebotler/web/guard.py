@@ -57,9 +57,9 @@ OTHER_SITE = "this request came from another site, which is not allowed"
 TOO_LARGE = f"at most {MOST_BYTES:,} bytes are accepted"
 
 REFUSAL = """<!doctype html><html lang="en"><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1"><title>CodeBotler</title>
+<meta name="viewport" content="width=device-width, initial-scale=1"><title>{brand}</title>
 <style>body{{font:18px/1.5 system-ui,sans-serif;color-scheme:light dark;max-width:34rem;margin:20vh auto;
-padding:0 1.5rem}}h1{{font-size:1.4rem}}</style><h1>CodeBotler</h1><p>{sentence}</p></html>"""
+padding:0 1.5rem}}h1{{font-size:1.4rem}}</style><h1>{brand}</h1><p>{sentence}</p></html>"""
 
 
 class RefusedError(Exception):
@@ -268,9 +268,13 @@ def _refusal(request: HTTPConnection, error: RefusedError) -> Response:
 
 
 def refusal(
-    request: HTTPConnection, status: HTTPStatus, sentence: str, headers: Mapping[str, str]
+    request: HTTPConnection,
+    status: HTTPStatus,
+    sentence: str,
+    headers: Mapping[str, str],
+    brand: str = "CodeBotler",
 ) -> Response:
     """An answer with one sentence: a page for browsers, else JSON."""
     if "text/html" in request.headers.get("accept", ""):
-        return HTMLResponse(REFUSAL.format(sentence=sentence), status, headers)
+        return HTMLResponse(REFUSAL.format(sentence=sentence, brand=brand), status, headers)
     return JSONResponse({"detail": sentence}, status, headers)

@@ -125,7 +125,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
     app.mount("/static", StaticFiles(directory=STATIC))
     core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard allows ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]
-    nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app))
+    nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app, frame.brand))
     ui.run_with(
         app,
         title="CodeBotler",
@@ -140,14 +140,14 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
     return app
 
 
-def _not_found(app: FastAPI, request: Request, _error: Exception) -> Response:
+def _not_found(app: FastAPI, brand: str, request: Request, _error: Exception) -> Response:
     """404, or 405 where NiceGUI took an address that the API has for another method."""
     status, sentence, headers = HTTPStatus.NOT_FOUND, NO_PAGE, {}
     allowed = [method for method in METHODS if _is_taken(app.routes, method, request.scope["path"])]
     if allowed:
         status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address accepts only {listed(allowed)}"
         headers = {"allow": ", ".join(allowed)}
-    return refusal(request, status, sentence, headers)
+    return refusal(request, status, sentence, headers, brand)
 
 
 def _has_page(app: FastAPI, path: str) -> bool:

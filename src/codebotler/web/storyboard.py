@@ -105,19 +105,30 @@ def scenes_reached(strip: Strip, reached: Reached) -> int | None:
     return len(reached.visited)
 
 
-def draw_scene(scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False) -> None:
-    """Draw a stay in a room, and mark the steps whose numbers are wrong."""
+def draw_scene(
+    scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False, anchor: str = ""
+) -> None:
+    """Draw a stay in a room, and mark the steps whose numbers are wrong.
+
+    With an `anchor`, each step has it and its number as an id, to which links lead.
+    """
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
     with ui.element("li").classes(" ".join(kinds)):
-        PlainText("b", room_name(scene.room), "room")
+        _number(PlainText("b", room_name(scene.room), "room"), scene.step, anchor)
         if is_reached:
             PlainText("span", "✓", "tick").props('role=img aria-label="reached"')
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:
             look = f"deed deed-{deed.kind}" if deed.kind in SPOKEN else "deed"
-            PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
+            shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
+            _number(shown, deed.step, anchor)
+
+
+def _number(element: PlainText, step: int, anchor: str) -> None:
+    if anchor and step:
+        element.props(f"id={anchor}{step} data-step={step}")
 
 
 # --- which strips and scenes

@@ -8,6 +8,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Se
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cache
+from itertools import count
 from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK, names_bound, parsed
@@ -60,14 +61,17 @@ class Cluster:
 
 
 def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[RowData]]:
-    """Put failing completions together, the largest groups first."""
+    """Put failing completions together, the largest groups first; of one size, tasks take turns."""
     grounds: defaultdict[Ground, list[RowData]] = defaultdict(list)
     for row in failed:
         why = row["failure"]
         grounds[row["task"], why["class"], why["kind"], why["check"]].append(row)
     shape_of = cache(shape)
     found = (group for rows in grounds.values() for group in _grouped(rows, programs, shape_of))
-    return sorted(found, key=lambda rows: (-len(rows), key_of(rows[0])))
+    turns: defaultdict[tuple[int, str], Iterator[int]] = defaultdict(count)
+    ordered = sorted(found, key=lambda rows: key_of(rows[0]))
+    placed = [(-len(rows), next(turns[len(rows), rows[0]["task"]]), rows) for rows in ordered]
+    return [rows for _, _, rows in sorted(placed, key=lambda one: one[:2])]
 
 
 def clusters(groups: Iterable[Sequence[RowData]], results: Results) -> Iterator[Cluster]:
@@ -92,6 +96,15 @@ def clusters(groups: Iterable[Sequence[RowData]], results: Results) -> Iterator[
             told=reason(row, results.suite, ablated=results.is_ablated),
             fix=None if program is None else shortest_fix(program, candidates.get(row["task"], [])),
         )
+
+
+def nearest_fix(results: Results, key: Key) -> Fix | None:
+    """What turns one completion into one that passes; None if its program is gone or no other passes."""
+    programs = results.programs
+    if key not in programs:
+        return None
+    right = (other for other in sorted(results.passed) if other[0] == key[0] and other in programs)
+    return shortest_fix(programs[key], passing((name_of(other), programs[other]) for other in right))
 
 
 def _grouped(

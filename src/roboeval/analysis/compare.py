@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from itertools import combinations
+from typing import Any, TypeVar
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
+from codebotler.core.words import counted
 from roboeval.analysis.metrics import Estimate, by_formula, mean_of
 from roboeval.analysis.statistics import (
     DIFFERENCE,
@@ -22,7 +24,10 @@ from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
 
 LEVEL = 0.05  # a larger p may well be chance
+SMALLEST_P = 0.001  # that is shown with its digits
+MOST_PAIRS = 10  # beyond which each run is compared with the best only
 PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
+RunLike = TypeVar("RunLike")
 
 
 @dataclass(frozen=True)
@@ -92,21 +97,49 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
         yield TaskDifference(task, first, second, (second - first) * n / total, n)
 
 
+def pairs_to_compare(
+    runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
+) -> list[tuple[RunLike, RunLike]]:
+    """All pairs of runs; of many runs, each with the best."""
+    pairs = list(combinations(runs, 2))
+    if len(pairs) <= MOST_PAIRS:
+        return pairs
+    best = max(runs, key=pass_at_1)
+    return [(run, best) for run in runs if run is not best]
+
+
+def p_text(p: float) -> str:
+    """A p for people."""
+    return f"p = {p:.3f}" if p >= SMALLEST_P else f"p < {SMALLEST_P}"
+
+
 def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
-    """In a sentence, which is better, as far as these prompts can tell."""
+    """Which is better, as far as the prompts of both can tell, and how many prompts were left out."""
+    sentence = _better(comparison, names)
+    if not comparison.left_out:
+        return sentence
+    left = counted(comparison.left_out, "prompt")
+    both = counted(comparison.prompts, "prompt")
+    return f"{sentence} Compared on the {both} that both have; {left} that only one has are left out."
+
+
+def _better(comparison: Comparison, names: tuple[str, str]) -> str:
     difference = comparison.over_tasks.mean
     if abs(difference) < ROUNDING:
         return f"{names[0]} and {names[1]} pass equally often."
     better, other = (names[1], names[0]) if difference > 0 else names
     by = f"{100 * abs(difference):.1f} points"
     if comparison.p_tasks <= LEVEL:
-        return f"{better} is better than {other} by {by} (p ≤ {LEVEL} over tasks)."
+        return f"{better} is better than {other} by {by} ({p_text(comparison.p_tasks)} over tasks)."
     if comparison.p_prompts <= LEVEL:
+        tasks = counted(len(comparison.tasks), "task")
+        told = f"{p_text(comparison.p_prompts)} over prompts"
         return (
-            f"{better} is better than {other} by {by} on prompts of these tasks; "
-            f"{len(comparison.tasks)} tasks are too few to tell for other tasks."
+            f"{better} is better than {other} by {by} on prompts like these ({told}); "
+            f"{tasks} cannot speak for others."
         )
-    return f"{better} passes more often than {other} by {by}, which may well be chance."
+    told = f"{p_text(comparison.p_tasks)} over tasks"
+    return f"{better} passes more often than {other} by {by}, which may well be chance ({told})."
 
 
 def unlike(first: Results, second: Results) -> list[str]:
@@ -166,7 +199,7 @@ def to_tell(comparison: Comparison) -> list[str]:
     """How much it would take to tell the two apart, in sentences."""
     much = comparison.needed
     if much.completions is None:
-        return ["They do not differ, so no number of completions would show a difference."]
+        return ["Without a difference, the sample size needed to detect it cannot be computed."]
     each = how_many(much.completions)
     here = (
         f"Detecting a difference of this size on these prompts, four times in five, takes {each} of each "

@@ -54,6 +54,17 @@ class Estimate:
     low: float
     high: float
 
+    @property
+    def is_known(self) -> bool:
+        """Whether the interval says anything: that of equal values has no width."""
+        return self.high - self.low > ROUNDING
+
+    def ends(self, form: str = ".3f") -> str:
+        """The interval over prompts for people, in a number format."""
+        if not self.is_known:
+            return "unknown: all prompts are alike"
+        return f"{self.low:{form}} to {self.high:{form}}"
+
 
 @dataclass(frozen=True)
 class PromptScore:

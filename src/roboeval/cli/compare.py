@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.core.words import counted
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -77,8 +76,6 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     warnings = unlike(*(one.results for one in opened))
     for warning in warnings:
         note(f"warning: {warning}")
-    if result.left_out:
-        note(f"left out, since only one of the runs has them: {counted(result.left_out, 'prompt')}")
     names = str(paths[0]), str(paths[1])
     if as_json:
         print_json({**comparison_data(result, names), "warnings": warnings})

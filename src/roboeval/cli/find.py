@@ -85,7 +85,8 @@ def find(
         print_json({**data, "groups": list(map(cluster_data, told))})
     else:
         counts = found_by_task(found, results.table)
-        print_rich(found_view(found, counts, total, told, groups=len(together)))
+        is_search = formula is not None
+        print_rich(found_view(found, counts, total, told, groups=len(together), is_search=is_search))
 
 
 def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:

@@ -15,6 +15,7 @@ from roboeval.cli.options import (
     RulesOption,
     RunArgument,
     SuiteOption,
+    command,
     complaint_of,
     load,
     named,
@@ -70,6 +71,8 @@ def show(
             note("ablation: only common sense was required")
         selection.expect_judged(results)
         show_part(results, selection.task, selection.prompt, selection.index, as_json=json)
+        if selection.prompt is not None and selection.index is not None:
+            _note_nearest(results, (selection.task, selection.prompt, selection.index), suite)
     if (complaint := complaint_of(results)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
     if (unfinished := unfinished_of(results)) is not None:
@@ -131,6 +134,16 @@ def show_part(results: Results, task: str, prompt: int | None, index: int | None
         print_json({**data, "ablation": results.is_ablated})
     else:
         print_rich(view(data))
+
+
+def _note_nearest(results: Results, key: Key, suite: str) -> None:
+    """Note the command that shows the program nearest to one that fails."""
+    from codebotler.core.words import counted
+    from roboeval.analysis.cluster import nearest_fix
+
+    if key in results.failed and (fix := nearest_fix(results, key)) is not None:
+        again = command("show", results.run.path, fix.name, suite=suite, ablated=results.is_ablated)
+        note(f"the nearest program that passes differs in {counted(fix.changed, 'line')}: `{again}`")
 
 
 def export(

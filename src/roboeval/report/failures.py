@@ -8,12 +8,12 @@ from roboeval.analysis.cluster import Cluster, clusters, groups
 from roboeval.analysis.summary import ALL, Causes, causes
 from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
-from roboeval.evaluation.runs.completions import how_many, name_of
+from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Groups, Picture, Prose, Section, Sheet, note, section, sheet
 
-MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups to show of a run, and of all runs
+MOST, FEWEST, ALTOGETHER = 100, 4, 200  # groups to show of a run, and of all runs
 MOST_REVERSALS = 100  # groups of each run
 
 
@@ -73,25 +73,27 @@ def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def alike(runs: Sequence[JudgedRun]) -> Section:
-    """The largest groups of failures of all runs."""
+    """Groups of failures of all runs; of each run, the page shows the largest with their programs."""
     most = max(FEWEST, min(MOST, ALTOGETHER // len(runs)))
+    every: list[tuple[str, Cluster]] = []
     shown: list[tuple[str, Cluster]] = []
     notes: list[str] = []
     for run in runs:
         together = groups(map(run.results.failed_row, run.results.failed), run.results.programs)
-        shown += [(run.name, one) for one in clusters(together[:most], run.results)]
-        if left := together[most:]:
-            those = f"{len(left):,} smaller groups with {how_many(sum(map(len, left)))}"
-            notes.append(f"{run.name}: {those} are left out; `roboeval find` shows as many as --groups says.")
-    about = Prose([note("groups")] if shown else [])
-    return section("failures", about, Groups(shown), Prose(notes), groups_sheet(shown))
+        named = [(run.name, one) for one in clusters(together, run.results)]
+        every += named
+        shown += named[:most]
+        if len(named) > most:
+            notes.append(f"{run.name}: {most:,} of {len(named):,} groups are shown; the table below has all.")
+    about = Prose([note("groups"), *notes] if shown else [])
+    return section("failures", about, Groups(shown), groups_sheet(every))
 
 
-def groups_sheet(shown: Sequence[tuple[str, Cluster]]) -> Sheet:
+def groups_sheet(every: Sequence[tuple[str, Cluster]]) -> Sheet:
     """The groups as numbers."""
     rows = [
         [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
-        for name, one in shown
+        for name, one in every
     ]
     return sheet("failures", rows)
 
@@ -144,6 +146,6 @@ def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
         for suite, group in those[:MOST_REVERSALS]:
             rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
         if (left := len(those) - MOST_REVERSALS) > 0:
-            more = f"{left:,} smaller groups are left out; `roboeval compare --suites` shows them."
+            more = f"{left:,} more groups are left out; `roboeval compare --suites` shows them."
             notes.append(f"{one.name}: {more}")
     return sheet("reversals", rows, notes=notes)

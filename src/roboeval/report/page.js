@@ -37,7 +37,7 @@ for (const list of document.querySelectorAll(".clusters")) {
   });
   const search = document.createElement("input");
   search.type = "search";
-  for (const [name, field] of [...fields, ["words in the program or the reason", search]]) {
+  for (const [name, field] of [...fields, ["words in program or reason", search]]) {
     const label = document.createElement("label");
     label.append(name, field);
     controls.append(label);
@@ -55,7 +55,7 @@ for (const list of document.querySelectorAll(".clusters")) {
       shown += fits;
       completions += fits ? Number(item.dataset.size) : 0;
     }
-    told.textContent = `${shown} of ${items.length} groups, ${completions} completions`;
+    told.textContent = `${shown} of ${items.length} groups shown here, ${completions} completion${completions === 1 ? "" : "s"}`;
   }
   filter();
 }

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import name_of
@@ -29,6 +30,7 @@ from roboeval.report.sheets import (
 )
 
 WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
+MOST_ROWS = 1_000  # of a table on the page; its file has all
 LONG = 24  # rows from which a table is folded
 LONG_TEXT = 70  # characters from which a cell takes several lines
 STYLE = Path(__file__).with_name("page.css")
@@ -75,6 +77,11 @@ def _text(words: str) -> str:
     return escape(plain, quote=True)
 
 
+def _prose(words: str) -> str:
+    """Escape a sentence for HTML; commands in it stand between backticks."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", _text(words))
+
+
 def _section(section: Section, drawn: Mapping[str, Drawn]) -> str:
     parts = "".join(_part(part, drawn) for part in section.parts)
     name = _text(section.name)
@@ -89,7 +96,7 @@ def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
         case Picture():
             return _picture(part, drawn)
         case Prose(paragraphs):
-            return "".join(f"<p>{_text(words)}</p>\n" for words in paragraphs)
+            return "".join(f"<p>{_prose(words)}</p>\n" for words in paragraphs)
         case Code(text):
             return f"<pre>{_text(text)}</pre>\n"
         case Cards(cards):
@@ -108,7 +115,7 @@ def _card(card: Card) -> str:
     return (
         f'<article class="card"><h3>{_text(card.name)}</h3><p><b>{estimate.mean:.3f}</b> pass@1</p>'
         f'<div class="bar" aria-hidden="true">{bar}</div>'
-        f"<p>95% interval {estimate.low:.3f} to {estimate.high:.3f}</p><p>{failure}</p>{cost}</article>"
+        f"<p>95% interval {_text(estimate.ends())}</p><p>{failure}</p>{cost}</article>"
     )
 
 
@@ -120,12 +127,13 @@ def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
         return ""
     links = (base64.b64encode(svg).decode() for svg in drawn[picture.name])
     light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
-    caption = _text(described("figures", picture.name))
+    caption, name = _text(described("figures", picture.name)), _text(picture.name)
     return (
-        f'<figure id="figure-{_text(picture.name)}"><picture>'
+        f'<figure id="figure-{name}">'
+        f'<div class="wide" tabindex="0" role="region" aria-label="Figure: {name}"><picture>'
         f'<source media="screen and (prefers-color-scheme: dark)" srcset="{dark}">'
-        f'<img src="{light}" alt="{caption}"></picture>'
-        f'<figcaption>{caption} <span class="files">figures/{_text(picture.name)}.pdf, .png</span>'
+        f'<img src="{light}" alt="{caption}"></picture></div>'
+        f'<figcaption>{caption} <span class="files">figures/{name}.pdf, .png</span>'
         "</figcaption></figure>\n"
     )
 
@@ -134,12 +142,16 @@ def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
 
 
 def _table(sheet: Sheet) -> str:
-    heads = "".join(f'<th scope="col" class="{_css(c)}">{_text(c.head)}</th>' for c in sheet.columns)
-    rows = "".join(_row(row, sheet.columns) for row in sheet.rows)
+    filled = [n for n in range(len(sheet.columns)) if any(row[n] is not None for row in sheet.rows)]
+    columns = [sheet.columns[n] for n in filled]
+    heads = "".join(f'<th scope="col" class="{_css(c)}">{_text(c.head)}</th>' for c in columns)
+    rows = "".join(_row([row[n] for n in filled], columns) for row in sheet.rows[:MOST_ROWS])
     told_of = described("tables", sheet.name)
     title, about = (_text(told_of.get(name, "")) for name in ("title", "about"))
     about = f"<p>{about}</p>" if about else ""
-    notes = "".join(f'<p class="note">{_text(note)}</p>' for note in sheet.notes)
+    left = len(sheet.rows) - MOST_ROWS
+    more = [f"{counted(left, 'more row')} in the file."] if left > 0 else []
+    notes = "".join(f'<p class="note">{_prose(note)}</p>' for note in (*sheet.notes, *more))
     table = (
         f'<div class="wide" tabindex="0" role="region" aria-label="{title}"><table>'
         f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
@@ -190,10 +202,10 @@ def _cluster(model: str, cluster: Cluster) -> str:
 
 
 def _inside(cluster: Cluster) -> str:
-    prompts = ", ".join(map(str, cluster.prompts))
+    prompts = f"Prompt{'s' * (len(cluster.prompts) > 1)} {', '.join(map(str, cluster.prompts))}"
     world = _text(str(cluster.told["world"]))
     name = _text(name_of(cluster.representative))
-    head = f"<p>Prompts {prompts}. Such as {name}, in \u201c{world}\u201d.</p>"
+    head = f"<p>{prompts}. Such as {name}, in \u201c{world}\u201d.</p>"
     if cluster.program is None:
         return f"{head}<p>The program that was judged is gone.</p>"
     program = f"<pre>{_text(_cut(cluster.program, CHARACTERS))}</pre>"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain, combinations
+from itertools import chain
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.compare import compared, unlike, verdict
+from roboeval.analysis.compare import MOST_PAIRS, compared, pairs_to_compare, unlike, verdict
 from roboeval.analysis.metrics import (
     by_formula,
     judged_count,
@@ -20,7 +20,7 @@ from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun, tasks_of
 from roboeval.report.sheets import Cell, Picture, Prose, Section, Sheet, note, section, sheet
 
-MOST_PAIRS = 10  # beyond which each run is compared with the best only
+NO_SPREAD = "all prompts differ equally, so the interval over prompts is unknown"
 
 
 def results(runs: Sequence[JudgedRun]) -> Section:
@@ -39,7 +39,16 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         prompts = prompts_of(run.scores)
         counts = judged_count(prompts), len(prompts), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
-    return sheet("overall", rows, notes=[*_few_tasks(runs), *_unfinished(runs)])
+    return sheet("overall", rows, notes=[*_alike(runs), *_few_tasks(runs), *_unfinished(runs)])
+
+
+def _alike(runs: Sequence[JudgedRun]) -> list[str]:
+    found = ((run.name, overall(run.scores, 1)) for run in runs)
+    return [
+        f"{name}: the interval over prompts is {passed.ends()}."
+        for name, passed in found
+        if not passed.is_known
+    ]
 
 
 def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
@@ -94,13 +103,15 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     rows: list[list[Cell]] = []
     said: list[str] = []
     notes: list[str] = []
-    for first, second in _pairs(runs):
+    for first, second in pairs_to_compare(runs, lambda run: run.mean):
         try:
             found = compared(first.by_prompt, second.by_prompt)
         except UserError:  # no prompt in common
             continue
         if len(said) < MOST_PAIRS:
             said.append(verdict(found, (first.name, second.name)))
+            if not found.over_prompts.is_known:
+                notes.append(f"{first.name} and {second.name}: {NO_SPREAD}.")
             if apart := unlike(first.results, second.results):
                 notes.append(f"{first.name} and {second.name}: {'; '.join(apart)}.")
         over = found.over_prompts, found.over_tasks
@@ -120,14 +131,6 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return [verdict(compared(second.by_prompt, best.by_prompt), (second.name, best.name))]
     except UserError:  # no prompt in common
         return []
-
-
-def _pairs(runs: Sequence[JudgedRun]) -> list[tuple[JudgedRun, JudgedRun]]:
-    pairs = list(combinations(runs, 2))
-    if len(pairs) <= MOST_PAIRS:
-        return pairs
-    best = max(runs, key=lambda run: run.mean)
-    return [(run, best) for run in runs if run is not best]
 
 
 def prompts(runs: Sequence[JudgedRun]) -> Section:

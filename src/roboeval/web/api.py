@@ -13,7 +13,7 @@ from fastapi.responses import HTMLResponse, Response
 
 from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.completions import name_of
-from roboeval.web.run_store import RunGoneError, RunStore
+from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import RunList, completion_details, entry_data, run_details
 from roboeval.web.snapshot import Filter
 
@@ -114,7 +114,7 @@ def _json(data: object) -> Response:
 def _refusing() -> Iterator[None]:
     try:
         yield
-    except RunGoneError as error:
+    except MissingError as error:
         raise HTTPException(404, error.sentence) from None
     except UserError as error:
         raise HTTPException(422, str(error).encode(errors="replace").decode()) from None

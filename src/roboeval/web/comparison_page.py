@@ -11,15 +11,15 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText
-from roboeval.web.difference import Difference, difference_of, draw_difference
+from roboeval.web.difference import PAIR, Difference, differences_of, draw_differences
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import Filter, Snapshot
-from roboeval.web.widgets import EVERY, HeatMap, count_text, score_text, show_state
+from roboeval.web.widgets import EVERY, HeatMap, completions_text, score_text, show_state
 
 MOST = 12  # runs side by side; more are no comparison
-MOST_NAME, PAIR = 60, 2
+MOST_NAME = 60
 NOT_ALIKE = "These runs were judged by different suites or versions of a suite. Compare with care."
 
 
@@ -63,8 +63,8 @@ class _Comparison:
         if versions != self._versions:
             self._versions = versions
             judged = [run for run in runs if run.judged]
-            difference = await asyncio.to_thread(difference_of, *judged) if len(judged) == PAIR else None
-            self._show(runs, troubles, difference)
+            found = await asyncio.to_thread(differences_of, judged) if len(judged) >= PAIR else []
+            self._show(runs, troubles, found)
 
     def _read(self) -> tuple[list[Snapshot], list[str]]:
         runs, troubles = [], []
@@ -77,7 +77,7 @@ class _Comparison:
         judged_by = {tuple(str(head.get(part)) for part in ("suite", "digest", "ablation")) for head in heads}
         return runs, [*troubles, *[NOT_ALIKE] * (len(judged_by) > 1)]
 
-    def _show(self, runs: Sequence[Snapshot], troubles: Sequence[str], difference: Difference | None) -> None:
+    def _show(self, runs: Sequence[Snapshot], troubles: Sequence[str], found: Sequence[Difference]) -> None:
         self._troubles.clear()
         with self._troubles:
             for sentence in troubles:
@@ -96,11 +96,11 @@ class _Comparison:
         self._tasks.show(groups=groups, rows=rows)
         judged = [run for run in runs if run.judged]
         self._difference.clear()
-        self._difference.set_visibility(difference is not None)
-        if difference is not None:
+        self._difference.set_visibility(bool(found))
+        if found:
             with self._difference:
                 PlainText("h2", "Which is better")
-                draw_difference(difference)
+                draw_differences(found)
         columns = [_head(run) for run in judged]
         self._kinds.show(groups=[{"name": "", "columns": columns}], rows=failure_rows(judged))
 
@@ -115,4 +115,4 @@ def _draw_run(run: Snapshot) -> None:
         html.a(shortened(run.name, MOST_NAME), href=address(run.name)).props("dir=auto")
         show_state(data, PlainText("small"))
         PlainText("b", score_text(data))
-        PlainText("span", f"{count_text(data)} completions, {models_of(run)}", "quiet")
+        PlainText("span", f"{completions_text(data)}, {models_of(run)}", "quiet")

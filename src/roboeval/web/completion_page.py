@@ -10,24 +10,27 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.checking.storyboard import step_text
-from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
+from codebotler.core.words import counted
 from codebotler.core.world import World
 from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText
 from codebotler.web.storyboard import draw_scene, scenes
+from roboeval.analysis.cluster import Fix, nearest_fix
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, as_written, cut_told, error_sentence
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import Key, name_of
 from roboeval.suites.task import describe_person, world_title
 from roboeval.web.heat_map import address
-from roboeval.web.run_store import RunStore
+from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import Filter, Snapshot
 from roboeval.web.widgets import ProgramView
 
 MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION = 80, 2_000, 5_000
+RED = "Red: the step at which a check failed."
+NEIGHBOURS = ("Previous completion", "Next completion")
 CHANGED = "The program was changed or removed after it was judged; the verdicts are about the earlier one."
 
 
@@ -35,19 +38,25 @@ async def draw_completion(
     store: RunStore, run: str, name: str, chosen: Filter, evaluation: str | None
 ) -> None:
     """Draw a completion, with links to its neighbours among those that were chosen."""
-    snapshot, data = await asyncio.to_thread(_read, store, run, name, evaluation)
-    _draw_head(snapshot, data, chosen, chosen.query(evaluation))
+    snapshot, data, fix = await asyncio.to_thread(_read, store, run, name, evaluation)
+    _draw_head(snapshot, data, fix, chosen, chosen.query(evaluation))
     with ui.element("div").classes("one-program"):
         _draw_program(data)
         _draw_worlds(data, _worlds(snapshot, data["task"]))
 
 
-def _read(store: RunStore, run: str, name: str, evaluation: str | None) -> tuple[Snapshot, dict[str, Any]]:
+def _read(
+    store: RunStore, run: str, name: str, evaluation: str | None
+) -> tuple[Snapshot, dict[str, Any], Fix | None]:
+    """A run, a completion of it, and if that failed, what would turn it into the nearest one that passes."""
     snapshot = store.open(run, evaluation)
     row = snapshot.row(name)
     if row is None:
-        raise UserError(f'this run has no completion "{shortened(name, MOST_NAME)}"')
-    return snapshot, completion_details(snapshot, row)
+        raise MissingError(f'this run has no completion "{shortened(name, MOST_NAME)}"')
+    data = completion_details(snapshot, row)
+    key: Key = data["task"], data["prompt"], data["index"]
+    fix = nearest_fix(snapshot.results, key) if data["passed"] is False else None
+    return snapshot, data, fix
 
 
 def _worlds(run: Snapshot, task: str) -> dict[str, World]:
@@ -58,13 +67,13 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
     return {scenario.world.about: scenario.world for scenario in scenarios}
 
 
-def _draw_head(run: Snapshot, data: Mapping[str, Any], chosen: Filter, query: str) -> None:
+def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: Filter, query: str) -> None:
     key: Key = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
         html.a(shortened(run.name, MOST_NAME), href=f"{address(run.name)}{query}#completions").props(
             "dir=auto"
         )
-        for text, other in zip(("Previous", "Next"), run.neighbours(key, chosen), strict=True):
+        for text, other in zip(NEIGHBOURS, run.neighbours(key, chosen), strict=True):
             if other is not None:
                 task, prompt, index = other
                 href = f"{address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
@@ -78,6 +87,9 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], chosen: Filter, query: st
         PlainText("small", verdict, f"state state-{state}")
         if data["model"] is not None:
             PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
+        if fix is not None:
+            text = f"Nearest program that passes: {counted(fix.changed, 'line')} changed"
+            html.a(text, href=f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}")
     if data["stale"]:
         PlainText("p", CHANGED, "trouble")
     instruction = data["instruction"]
@@ -113,10 +125,11 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
                     PlainText("h2", title).props(f"id=h-world-{number}")
                     state = ("satisfied", "done") if data["satisfied"] else ("not satisfied", "failed")
                     PlainText("small", state[0], f"state state-{state[1]}")
-                _draw_world(data, worlds.get(data["world"]))
+                _draw_world(data, worlds.get(data["world"]), f"world-{number}-step-")
 
 
-def _draw_world(data: Mapping[str, Any], world: World | None) -> None:
+def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
+    """Draw what happened in a world; its steps have the `anchor` and their number as an id."""
     steps, cut = data["steps"], data.get("cut")
     wrong = {check["step"] for check in data["failed_checks"]} - {None}
     if data["error"] is not None:
@@ -125,13 +138,15 @@ def _draw_world(data: Mapping[str, Any], world: World | None) -> None:
         PlainText("p", told, "quiet" if data["satisfied"] else "trouble")
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
-            _draw_check(check)
+            _draw_check(check, anchor)
     if not steps and cut is None:
         PlainText("p", "The robot did nothing.", "quiet")
     elif steps and "place" in steps[0]:
         with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
             for scene in scenes(steps, steps[0]["place"], wrong):
-                draw_scene(scene, wrong)
+                draw_scene(scene, wrong, anchor=anchor)
+        if wrong:
+            PlainText("p", RED, "quiet")
     if cut is not None:
         PlainText("p", f"{cut_told(cut)}.", "quiet")
     if steps:
@@ -141,13 +156,13 @@ def _draw_world(data: Mapping[str, Any], world: World | None) -> None:
         _draw_folded("The world", lambda: _draw_rooms(world))
 
 
-def _draw_check(check: Mapping[str, Any]) -> None:
+def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
     with ui.element("li").classes("failed-check"):
         PlainText("code", shortened(check["check"]))
         if check["explanation"] is not None:
             PlainText("span", shortened(check["explanation"], MOST_SENTENCE))
         if check["step"] is not None:
-            PlainText("small", f"step {check['step']}", "quiet")
+            html.a(f"step {check['step']}", href=f"#{anchor}{check['step']}")
 
 
 def _draw_folded(title: str, draw: Callable[[], None]) -> None:

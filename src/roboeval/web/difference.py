@@ -1,24 +1,30 @@
-"""By how much the second of two runs is better, task by task, and the completions that tell them apart."""
+"""By how much one of two runs is better, task by task, and the completions that tell them apart."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from urllib.parse import urlencode
 
 import polars as pl
 from nicegui import html, ui
 
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText
-from roboeval.analysis.compare import compared, verdict
+from roboeval.analysis.compare import compared, pairs_to_compare, verdict
 from roboeval.analysis.metrics import Estimate, by_formula, pass_at_1
 from roboeval.analysis.statistics import DIFFERENCE
 from roboeval.evaluation.runs.completions import KEY, Key, name_of
 from roboeval.web.heat_map import address
 from roboeval.web.snapshot import Snapshot
+from roboeval.web.widgets import interval_text
 
 MOST_NAME, MOST_TASKS, MOST_KEYS = 60, 100, 30
-HEADS = ("Task", "Difference", "95% interval", "Different verdicts")
+PAIR = 2
+HEADS = ("95% interval", "Different verdicts")
+ABOUT = "Intervals take prompts as drawn at random."
+UNKNOWN = " Where all prompts of a task differ equally, the interval is unknown."
 
 
 @dataclass(frozen=True)
@@ -67,35 +73,59 @@ class Difference:
     """How two judged runs differ."""
 
     runs: tuple[Snapshot, Snapshot]
-    rows: tuple[TaskRow, ...]
     told: str  # which is better, and how sure that is
+    overall: TaskRow | None = None  # over all tasks; None where they have no prompt in common
+    rows: tuple[TaskRow, ...] = ()
 
 
-def difference_of(first: Snapshot, second: Snapshot) -> Difference:
-    """Compare two judged runs, which may take seconds for large ones."""
-    rows = task_rows(first, second)
-    told = "They have no prompt in common."
-    if rows:
-        names = shortened(first.name, MOST_NAME), shortened(second.name, MOST_NAME)
-        told = verdict(compared(pass_at_1(first.scores), pass_at_1(second.scores)), names)
-    return Difference((first, second), tuple(rows[:MOST_TASKS]), told)
+def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
+    """Compare judged runs pair by pair, which may take seconds for large ones; two also task by task."""
+    pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
+    return [_difference(*pair, by_task=len(runs) == PAIR) for pair in pairs]
 
 
-def draw_difference(difference: Difference) -> None:
-    """Draw how two judged runs differ."""
-    runs, rows = difference.runs, difference.rows
+def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Difference:
+    names = shortened(first.name, MOST_NAME), shortened(second.name, MOST_NAME)
+    try:
+        found = compared(pass_at_1(first.scores), pass_at_1(second.scores))
+    except UserError:
+        return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
+    told = verdict(found, names)
+    if not by_task:
+        return Difference((first, second), told)
+    overall = TaskRow("All tasks", (found.first, found.second), found.over_prompts, ())
+    return Difference((first, second), told, overall, tuple(task_rows(first, second)[:MOST_TASKS]))
+
+
+def draw_differences(found: Sequence[Difference]) -> None:
+    """Draw which run of each pair is better; of a single pair also the tasks."""
+    if len(found) == 1:
+        _draw_difference(found[0])
+        return
+    with ui.element("ul").classes("pairs"):
+        for one in found:
+            with ui.element("li"):
+                PlainText("span", one.told)
+                query = urlencode([("run", run.name) for run in one.runs], errors="replace")
+                html.a("Task by task", href=f"/side-by-side?{query}")
+
+
+def _draw_difference(difference: Difference) -> None:
+    runs, rows, overall = difference.runs, difference.rows, difference.overall
     names = [shortened(run.name, MOST_NAME) for run in runs]
     PlainText("p", difference.told)
-    if not rows:
+    if overall is None:
         return
     region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
     with region, html.table().classes("differences"):
         with html.thead(), html.tr():
-            for head in (HEADS[0], *names, *HEADS[1:]):
+            for head in ("Task", *names, f"{names[1]} \N{MINUS SIGN} {names[0]}", *HEADS):
                 PlainText("th", head).props("scope=col")
         with html.tbody():
-            for row in rows:
+            for row in (overall, *rows):
                 _draw_row(row, runs)
+    is_unknown = any(not row.difference.is_known for row in rows)
+    PlainText("p", ABOUT + UNKNOWN * is_unknown, "quiet")
 
 
 def _draw_row(row: TaskRow, runs: Sequence[Snapshot]) -> None:
@@ -105,7 +135,7 @@ def _draw_row(row: TaskRow, runs: Sequence[Snapshot]) -> None:
         for share in row.shares:
             PlainText("td", f"{share:.2f}", "number")
         PlainText("td", f"{estimate.mean:+.2f}", "number strong")
-        PlainText("td", f"{estimate.low:+.2f} to {estimate.high:+.2f}", "number")
+        PlainText("td", interval_text(estimate, "+.2f"), "number")
         with html.td():
             if row.differing:
                 _draw_differing(row, runs)

@@ -78,9 +78,11 @@ class TaskCells:
 
     def row(self, task: str) -> list[dict[str, Any]]:
         """The cells of a task."""
-        prompts = self.tasks.get(task, {})
+        prompts = self.tasks.get(task)
+        if prompts is None:
+            return [{**EMPTY, "text": "not asked", "span": 1 + self._prompts}]
         shares = [each["share"] for each in prompts.values() if each["share"] is not None]
-        mean = self._mean(task, mean_of([shares]) if shares else None) if prompts else EMPTY
+        mean = self._mean(task, mean_of([shares]) if shares else None)
         return [mean, *(self._cell(prompts[n]) if n in prompts else EMPTY for n in range(self._prompts))]
 
     def _mean(self, task: str, mean: float | None) -> dict[str, Any]:

@@ -13,10 +13,10 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText
 from roboeval.evaluation.failures import plural_of
 from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models_of, percent
-from roboeval.web.run_store import RunGoneError, RunStore
+from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import Filter, Snapshot
-from roboeval.web.widgets import EVERY, CompletionList, HeatMap, count_text, score_text, show_state
+from roboeval.web.widgets import EVERY, CompletionList, HeatMap, completions_text, score_text, show_state
 
 MOST_NAME = 80
 SCROLL = "document.getElementById('completions').scrollIntoView()"
@@ -62,7 +62,7 @@ class _RunPage:
         """Show the run as it is now; once it is gone, it is not looked for any more."""
         try:
             run = await asyncio.to_thread(self._store.open, self._run.name, self._evaluation)
-        except RunGoneError:
+        except MissingError:
             self._trouble.say(GONE)
             self.timer.deactivate()
             return
@@ -144,7 +144,7 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
         state = PlainText("small")
         PlainText("span", models_of(run) + (f", judged by {shortened(key, MOST_NAME)}" if key else ""))
         PlainText("b", score_text(data))
-        PlainText("span", f"{count_text(data)} completions")
+        PlainText("span", completions_text(data))
     bar = html.progress(max="1").classes("long")
     show_state(data, state, bar)
     with ui.element("ul").classes("notes"):

@@ -27,8 +27,8 @@ OUTSIDE = "leads outside the folder of runs, so it is not read"
 Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
 
-class RunGoneError(UserError):
-    """A run that is not there any more."""
+class MissingError(UserError):
+    """A run or a completion that is not there, or not any more."""
 
 
 class RunStore:
@@ -96,7 +96,7 @@ class RunStore:
     def _reader(self, name: str, key: str | None) -> _Reader:
         path = self._folders().get(name)  # letter by letter, so that no name leads anywhere else
         if path is None or not _is_run(path):
-            raise RunGoneError(f'there is no run "{shortened(name)}" in this folder; perhaps it was deleted')
+            raise MissingError(f'there is no run "{shortened(name)}" in this folder; perhaps it was deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):
             raise UserError(f'"{shortened(name)}" {OUTSIDE}')
         run = Run(path)

@@ -12,9 +12,10 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText
+from roboeval.analysis.metrics import Estimate
 from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList
-from roboeval.web.widgets import EVERY, count_text, show_state
+from roboeval.web.widgets import EVERY, count_text, interval_text, show_state
 
 READ_FOR = 0.5  # seconds after which runs are shown that were not read yet
 
@@ -134,6 +135,6 @@ class _Row:
         self._count.say(count_text(run))
         mean = run.get("pass@1")
         self._score.say(NONE if mean is None else f"{mean['mean']:.3f}")
-        self._interval.say("" if mean is None else f"{mean['low']:.2f} to {mean['high']:.2f}")
+        self._interval.say("" if mean is None else interval_text(Estimate(**mean)))
         self._meter.set_visibility(mean is not None)
         self._meter.style(f"--share: {0 if mean is None else mean['mean']:.3f}")

@@ -35,6 +35,15 @@ SIGN = (
     .then(pl.lit("-"))
     .otherwise(pl.lit("!"))
 )
+# What decided: the failed check, the limit that stopped the program, or its error.
+ERROR = pl.col("error_message")
+WHY = (
+    pl.when(pl.col("failure_check").is_not_null())
+    .then("failure_check")
+    .when((pl.col("status") == "timeout") & ERROR.str.contains(r"^\d"))
+    .then(pl.format("stopped after {} (limit)", ERROR))
+    .otherwise(ERROR)
+)
 MOST = 2**63
 
 
@@ -104,10 +113,7 @@ class Snapshot:
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
             SIGN.str.join("").alias("worlds"),
-            pl.coalesce("failure_check", "error_message")
-            .filter(pl.col("world_number") == pl.col("failure_world"))
-            .first()
-            .alias("why"),
+            WHY.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
         )
         keys = [(storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
         schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64, "written": pl.Boolean}

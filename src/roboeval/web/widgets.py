@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from http import HTTPStatus
 from keyword import kwlist
 from typing import Any
 
@@ -14,8 +15,10 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame, PlainText
+from roboeval.analysis.metrics import Estimate
 from roboeval.evaluation.explanation import shown_lines
 from roboeval.web.heat_map import NONE
+from roboeval.web.run_store import MissingError
 from roboeval.web.serializers import State
 
 STYLE = '<link rel="stylesheet" href="/static/benchmark/benchmark.css">'
@@ -32,6 +35,8 @@ def page_of(frame: Frame, title: str) -> Iterator[None]:
         try:
             yield
         except UserError as error:
+            if isinstance(error, MissingError):
+                ui.context.client.status_code = HTTPStatus.NOT_FOUND
             PlainText("p", error.sentence, "trouble").props("role=alert")
             html.a("All runs", href="/runs")
 
@@ -104,9 +109,20 @@ def count_text(data: Mapping[str, Any]) -> str:
     return f"{judged or written:,}"
 
 
+def completions_text(data: Mapping[str, Any]) -> str:
+    """How many completions a run has, with the noun."""
+    count = count_text(data)
+    return f"{count} completion{'s' * (count != '1')}"
+
+
+def interval_text(estimate: Estimate, form: str = ".2f") -> str:
+    """An interval where there is little room."""
+    return estimate.ends(form) if estimate.is_known else "interval unknown"
+
+
 def score_text(data: Mapping[str, Any]) -> str:
     """How often a run's programs pass; empty where nothing was judged."""
     mean = data.get("pass@1")
     if mean is None:
         return ""
-    return f"pass@1 {mean['mean']:.3f} (95% interval {mean['low']:.2f} to {mean['high']:.2f})"
+    return f"pass@1 {mean['mean']:.3f} (95% interval {Estimate(**mean).ends('.2f')})"

@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 from made_results import results_of
-from roboeval.analysis.cluster import cluster_data, clusters, groups
+from roboeval.analysis.cluster import cluster_data, clusters, groups, nearest_fix
 from roboeval.cli.views.groups import cluster_view
 from roboeval.evaluation.runs.completions import Key
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
@@ -63,6 +63,26 @@ def test_same_task_same_check_similar_program() -> None:
         [("Visit", 0, 2)],
         [("Visit", 0, 3)],
     ]
+
+
+def test_groups_of_one_size_take_turns_by_task() -> None:
+    rows = [failed(n, 0, task=task, check=f"{n}()") for task in ("Visit", "FindBook") for n in range(3)]
+    rows += [failed(9, n, check="nine()") for n in range(2)]
+    found = [(those[0]["task"], those[0]["prompt"]) for those in groups(rows, {})]
+    tasks = ("FindBook", "Visit")
+    assert found == [("Visit", 9), *((task, n) for n in range(3) for task in tasks)]
+
+
+def test_the_nearest_program_that_passes() -> None:
+    programs = {("Visit", 0, 0): GOES.format("lab"), ("Visit", 4, 0): RIGHT, ("Visit", 5, 0): "pass"}
+    programs["FindBook", 0, 0] = GOES.format("lab")
+    right = [{**row(prompt, 0), "passed": True} for prompt in (4, 5)]
+    right.append({**row(0, 0), "task": "FindBook", "passed": True})
+    results = results_of([failed(0, 0), failed(1, 0), *right], SUITE, programs)
+    fix = nearest_fix(results, ("Visit", 0, 0))
+    assert fix is not None
+    assert (fix.name, fix.changed) == ("Visit/4/0", 4)
+    assert nearest_fix(results, ("Visit", 1, 0)) is None
 
 
 def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group

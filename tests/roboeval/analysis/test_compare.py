@@ -12,7 +12,7 @@ import pytest
 from codebotler.core.errors import UserError
 from command_line import refused, roboeval
 from made_results import results_of
-from roboeval.analysis.compare import compared, comparison_data, to_tell, unlike, verdict
+from roboeval.analysis.compare import compared, comparison_data, pairs_to_compare, to_tell, unlike, verdict
 from roboeval.cli.options import Opened, expect_same_suite
 from roboeval.cli.views.comparison import comparison_view
 from roboeval.evaluation.runs.folder import Run
@@ -54,10 +54,24 @@ def test_verdicts() -> None:
         return verdict(compared(a, b), ("one", "two"))
 
     assert "equally" in said([0.0] * 4, 4)
-    assert "two is better than one by 10.0 points (p ≤" in said([0.1] * 10, 10)
-    assert "one is better than two by 10.0 points on prompts of these tasks" in said([-0.1] * 10, 2)
-    assert "chance" in said([0.3, -0.2], 2)
+    assert "two is better than one by 10.0 points (p = 0.002 over tasks)." in said([0.1] * 10, 10)
+    assert "one is better than two by 10.0 points on prompts like these (p = 0.002" in said([-0.1] * 10, 2)
+    assert "may well be chance (p = 1.000 over tasks)" in said([0.3, -0.2], 2)
+    assert "(p < 0.001" in said([0.1] * 12, 12)
     assert said([0.1, 0.2, -0.3], 3) == said([0.0] * 4, 4)  # but for the last digit
+
+
+def test_prompts_that_only_one_has_are_left_out_in_words() -> None:
+    assert "2 prompts that both have" in verdict(compared(FIRST, {("A", 0): 1.0, ("B", 0): 0.0}), ("x", "y"))
+    assert re.search(r"\b3 prompts that both have; 2 prompts\b", verdict(compared(FIRST, SECOND), ("x", "y")))
+    assert "left out" not in verdict(compared(FIRST, FIRST), ("x", "y"))
+
+
+def test_of_many_runs_each_is_compared_with_the_best() -> None:
+    scores = {"a": 0.1, "b": 0.9, "c": 0.5}
+    assert pairs_to_compare("abc", scores.__getitem__) == [("a", "b"), ("a", "c"), ("b", "c")]
+    many = pairs_to_compare("abcdef", lambda run: scores.get(run, 0.0))
+    assert many == [(run, "b") for run in "acdef"]
 
 
 def test_how_much_it_takes_is_said() -> None:
@@ -118,10 +132,19 @@ def test_other_suites_are_refused() -> None:
 def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
     def shown(tasks: int) -> str:
         a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
-        return printed(comparison_view(compared(a, {key: value / 2 for key, value in a.items()}), ("a", "b")))
+        found = compared(a, {key: value / 2 for key, value in a.items()})
+        return printed(comparison_view(found, ("a", "b")), width=120)
 
-    assert re.search(r"by bootstrap .* too narrow", shown(7))
+    assert re.search(r"bootstrap.* too narrow", shown(7))
     assert "too narrow" not in shown(8)
+    assert "too narrow" not in shown(1)
+    assert "one task says nothing about others" in shown(1)
+
+
+def test_equal_differences_have_no_interval() -> None:
+    shown = printed(comparison_view(compared(FIRST, FIRST), ("a", "b")), width=120)
+    assert re.search(r"prompts drawn at random +unknown +all prompts are alike", shown)
+    assert "+0.000 to" not in shown
 
 
 def test_one_prompt_is_not_many() -> None:

@@ -102,11 +102,14 @@ def test_the_command(runs: Path) -> None:
     failed = sum(not one["passed"] for one in data["found"])
     assert sum(group["size"] for group in data["groups"]) == failed > 0
     assert all(group["why"] for group in data["groups"])
-    counts = [row.split()[1:3] for row in roboeval("find", runs).out.splitlines() if "world 1" in row]
-    assert [sum(map(int, column)) for column in zip(*counts, strict=True)] == [
-        len(data["found"]),
-        len(data["found"]) - failed,
-    ]
+    every = roboeval("find", runs).out
+    assert every.startswith(f"{failed} completions of {data['looked_at']} failed, in ")
+    assert "passed" not in every.splitlines()[2]
+    there = json.loads(roboeval("find", runs, 'tr.Exists(goto("lab"))', "--json").out)["found"]
+    said = roboeval("find", runs, 'tr.Exists(goto("lab"))').out.partition("failed, in")[0]
+    counts = [row.split()[1:3] for row in said.splitlines() if ", world " in row]
+    passed = sum(one["passed"] for one in there)
+    assert [sum(map(int, column)) for column in zip(*counts, strict=True)] == [len(there), passed]
     few = roboeval("find", runs, "--groups", "1").out
     assert "--groups" in few
 

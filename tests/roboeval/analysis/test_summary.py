@@ -92,7 +92,7 @@ def test_the_tables_fit_and_break_no_number(width: int) -> None:
     assert "runs/one" in text
     assert "Visit" in text
     assert "4,000 of 4,000 completions failed (100.0%)" in text
-    assert "pass@2 over all prompts: 0.000 (95% interval 0.000 to 0.000, 2 prompts)" in text
+    assert "pass@2 over all prompts: 0.000 (95% interval unknown: all 2 prompts are alike)" in text
     assert "no completions of Wait" in text
     assert re.search(r"\n  NameError +4,000  100\.0%", text)
     assert re.search(r"failed checks +0 +0.0%", text)

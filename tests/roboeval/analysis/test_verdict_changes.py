@@ -163,8 +163,8 @@ def test_what_a_model_wrote_and_is_called_does_no_harm() -> None:
 
 def test_the_largest_groups_are_shown() -> None:
     found = changed({"Visit": (10,)}, {"Visit": (0,)})
-    assert re.search(r"\b6 smaller groups\b.* --groups\b", printed(changes_view([found], most=1)))
-    assert "smaller groups" not in printed(changes_view([found], most=7))
+    assert re.search(r"\b6 more groups\b.* --groups\b", printed(changes_view([found], most=1)))
+    assert "more groups" not in printed(changes_view([found], most=7))
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import pytest
 from made_up_runs import HOSTILE, UNCHECKED, cases, made_up
 from roboeval.report.page import page
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Picture, Section, told
+from roboeval.report.sheets import Picture, Prose, Section, sheet, told
 from roboeval.report.writing import expect_no_others, pieces, sections, write_report
 
 
@@ -98,6 +98,34 @@ def test_the_first_screen_says_who_is_ahead_and_what_fails_most() -> None:
 
 def test_a_p_that_is_nothing_is_said_to_be_small() -> None:
     assert [told(p, "p") for p in (0.00002, 0.001, 0.25, None)] == ["< 0.001", "0.001", "0.250", "-"]
+
+
+def test_a_card_says_where_an_interval_is_unknown() -> None:
+    assert "95% interval unknown: all prompts are alike" in shown([made_up("a", {"Visit": (5, 5)})])
+
+
+def test_empty_columns_are_left_out_and_long_tables_are_cut(usual: Path) -> None:
+    text = page(
+        "t", [], [Section("origin", [sheet("phrasings", [["Visit", 0, 0.1, None, None, "x"]] * 1_001)])], {}
+    )
+    assert "<thead><tr>" in text
+    assert ">hurts<" not in text
+    assert text.count("<tr>") == 1 + 1_000
+    assert "1 more row in the file." in text
+    budget = (usual / "tables" / "budget.csv").read_text().splitlines()[0]
+    assert "passes per unit of money" in budget
+    assert ">passes per unit of money<" not in (usual / "index.html").read_text()
+
+
+def test_commands_in_sentences_are_code() -> None:
+    text = page("t", [], [Section("origin", [Prose(["`a <b>` shows it"])])], {})
+    assert "<p><code>a &lt;b&gt;</code> shows it</p>" in text
+
+
+def test_one_prompt_is_one(usual: Path) -> None:
+    text = (usual / "index.html").read_text()
+    assert re.search(r"<p>Prompt \d+\. Such as", text)
+    assert not re.search(r"<p>Prompts \d+\.", text)
 
 
 def test_names_of_models_are_text() -> None:

@@ -176,9 +176,13 @@ def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch
     assert (rows[0]["passes"], rows[0]["lines apart"]) == ("Visit/0/0", 0)
     monkeypatch.setattr("roboeval.report.failures.MOST", 2)
     monkeypatch.setattr("roboeval.report.failures.FEWEST", 2)
-    _, _, left_out, _ = alike([run]).parts
-    assert isinstance(left_out, Prose)
-    assert re.search(r"^a: 5 smaller groups with 5 completions .*`roboeval find`", left_out.paragraphs[0])
+    about, groups, table = alike([run]).parts
+    assert isinstance(about, Prose)
+    assert re.search(r"^a: 2 of 7 groups are shown", about.paragraphs[-1])
+    assert isinstance(groups, Groups)
+    assert len(groups.shown) == 2
+    assert isinstance(table, Sheet)
+    assert as_dicts(table) == rows
     assert alike([made_up("a", {"Visit": (10,)})]).parts == []
 
 

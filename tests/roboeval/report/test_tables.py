@@ -56,12 +56,21 @@ def test_an_unfinished_run_says_so() -> None:
 
 
 def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
-    few, enough = (made_up(name, {f"T{n}": (1,) for n in range(of)}) for name, of in (("a", 7), ("b", 8)))
+    few, enough = (made_up(name, {f"T{n}": (n,) for n in range(of)}) for name, of in (("a", 7), ("b", 8)))
     assert overall_sheet([enough]).notes == []
     (note,) = overall_sheet([few]).notes
     assert re.search(r"bootstrap .*\b8 tasks\b.* narrow", note)
     (note,) = overall_sheet([few, enough]).notes
     assert "bootstrap of a " in note
+
+
+def test_an_interval_without_width_is_called_unknown() -> None:
+    alike, others = made_up("a", {"Visit": (5, 5)}), made_up("b", {"Visit": (4, 5)})
+    table = overall_sheet([alike, others])
+    assert [note for note in table.notes if "unknown" in note] == [
+        "a: the interval over prompts is unknown: all prompts are alike."
+    ]
+    assert table.rows[0][5:7] == [0.5, 0.5]  # in the file it stays
 
 
 def test_retries_as_they_are_elsewhere() -> None:

@@ -170,6 +170,18 @@ def test_what_is_not_there_is_said_in_a_sentence(server: PageServer) -> None:
         assert answer.data["detail"] == sentence
 
 
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [("/runs/none", 404), ("/runs/hasty/LunchBreak/0/99", 404), ("/runs/hasty", 200), ("/none/at/all", 404)],
+)
+def test_pages_of_nothing_are_not_found(server: PageServer, path: str, status: int) -> None:
+    authorization = f"Bearer {server.token}"
+    page = server.ask("GET", path, accept="text/html", authorization=authorization)
+    assert page.status == status
+    assert "RoboEval" in page.text
+    assert "CodeBotler" not in page.text
+
+
 def test_a_run_that_is_deleted_is_not_found_any_more(runs: Path) -> None:
     with serving(runs) as server:
         assert told(server, "/api/runs/hasty")["judged"] == 45

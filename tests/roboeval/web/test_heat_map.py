@@ -52,7 +52,7 @@ def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) 
             assert cell["here"] is ((task, number) == (chosen.task, chosen.prompt))
             assert f"task={task}&prompt={number}" in cell["href"]
         assert mean["text"] == (percent(sum(shares) / len(shares)) if shares else "-")
-    assert cells.row("NoTask") == [{"text": "", "shade": "none"}] * 6
+    assert cells.row("NoTask") == [{"text": "not asked", "shade": "none", "span": 6}]
 
 
 def test_what_a_filter_counts_is_said_in_words() -> None:

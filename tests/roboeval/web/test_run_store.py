@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import load_suite
 from roboeval.web import run_store
-from roboeval.web.run_store import MOST_HELD, RunGoneError, RunStore
+from roboeval.web.run_store import MOST_HELD, MissingError, RunStore
 from seals import unseal
 
 
@@ -148,7 +148,7 @@ def test_a_run_that_is_deleted_is_gone(runs: Path) -> None:
     store = RunStore(runs)
     store.open("hasty")
     shutil.rmtree(runs / "hasty")
-    with pytest.raises(RunGoneError):
+    with pytest.raises(MissingError):
         store.open("hasty")
 
 

@@ -13,6 +13,7 @@ from roboeval.evaluation.runs.folder import Run
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import State, state_of
 from roboeval.web.snapshot import Filter, Snapshot
+from seals import unseal
 
 
 def opened(folder: Path) -> Snapshot:
@@ -45,9 +46,24 @@ def test_a_row_for_each_completion(runs: Path) -> None:
                 row["failure"]["kind"],
             )
             error = row["verdicts"][row["failure"]["world"]]["error"]
-            assert shown["why"] == (row["failure"]["check"] or error["message"])
+            assert (row["failure"]["check"] or error["message"]) in shown["why"]
     assert sum(each.count for each in run.failures) == sum(not row["passed"] for row in rows)
     assert run.row("LunchBreak/0/99") is None
+
+
+def test_a_limit_that_ended_a_program_is_called_one(runs: Path) -> None:
+    rows = Run(runs / "hasty").rows("paper")
+    lines = [json.loads(line) for line in lines_of(rows)]
+    at = next(n for n, row in enumerate(lines) if row["failure"] and row["failure"]["check"] is None)
+    for message, why in (
+        ("1,000 skill calls", "stopped after 1,000 skill calls (limit)"),
+        ("it waits for ever", "it waits for ever"),
+    ):
+        for verdict in lines[at]["verdicts"]:
+            verdict |= {"status": "timeout", "error": {"kind": "TimeoutError", "message": message}}
+        rows.write_bytes(b"".join(map(to_line, lines)))
+        unseal(runs / "hasty")
+        assert opened(runs / "hasty").completions["why"][at] == why
 
 
 def test_what_is_not_judged_yet_or_judged_and_gone_is_there_too(runs: Path) -> None:

@@ -12,13 +12,11 @@ from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.compare import Comparison, to_tell, verdict
+from roboeval.analysis.compare import Comparison, p_text, to_tell, verdict
 from roboeval.analysis.statistics import FEW
 from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences
 from roboeval.cli.views.groups import cluster_view
 from roboeval.cli.views.results import ruled
-
-SMALL = 0.0001
 
 
 def comparison_view(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
@@ -28,24 +26,26 @@ def comparison_view(comparison: Comparison, names: tuple[str, str]) -> Renderabl
     rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")
     rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}")
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
-    rows.add_row("difference", f"{comparison.over_tasks.mean:+.3f}", over)
-    few = "too narrow for so few tasks" if len(comparison.tasks) < FEW else ""
-    for name, estimate, told in (
-        ("95% interval, prompts drawn at random", comparison.over_prompts, _p(comparison.p_prompts)),
-        ("95% interval, tasks drawn at random", comparison.over_tasks, _p(comparison.p_tasks)),
-        ("the same by bootstrap", comparison.bootstrap, few),
+    rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
+    tasks = len(comparison.tasks)
+    few = (
+        "one task says nothing about others" if tasks == 1 else "too narrow for so few tasks" * (tasks < FEW)
+    )
+    for name, estimate, of, told in (
+        ("prompts drawn at random", comparison.over_prompts, "prompts", p_text(comparison.p_prompts)),
+        ("tasks drawn at random", comparison.over_tasks, "tasks", p_text(comparison.p_tasks)),
+        ("tasks drawn again (bootstrap)", comparison.bootstrap, "tasks", few),
     ):
-        rows.add_row(name, f"{estimate.low:+.3f} to {estimate.high:+.3f}", told)
+        row = estimate.ends("+.3f"), told
+        if not estimate.is_known:
+            row = "unknown", f"all {of} are alike; {told}"
+        rows.add_row(f"95% interval, {name}", *row)
     table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
         cells = (f"{task.first:.3f}", f"{task.second:.3f}", f"{task.difference:+.3f}", f"{task.share:+.3f}")
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
     sentence = Text(verdict(comparison, (a, b)), "bold")
     return Group(sentence, Text(), rows, Text(), *map(Text, to_tell(comparison)), Text(), table)
-
-
-def _p(value: float) -> str:
-    return f"p = {value:.4f}" if value >= SMALL else f"p < {SMALL}"
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
@@ -68,7 +68,7 @@ def _scores(found: Sequence[VerdictChanges]) -> Table:
         before, after = one.pass_at_1
         ends = one.comparison.over_prompts
         numbers = f"{before:.3f}", f"{after:.3f}", f"{after - before:+.3f}"
-        interval = f"{ends.low:+.3f} to {ends.high:+.3f}"
+        interval = ends.ends("+.3f")
         places = " -> ".join(dict.fromkeys(str(place(one.name, of)) for of in scores))
         table.add_row(Text(visible(one.name)), *numbers, interval, places)
     return table
@@ -88,5 +88,5 @@ def _groups(every: Sequence[Cluster], most: int, what: str) -> list[RenderableTy
         return []
     head = f"pass under {what}, in {len(every):,} group{'s' * (len(every) != 1)}:"
     left = len(every) - most
-    more = [Text(f"{left:,} smaller groups; --groups shows more", "dim")] if left > 0 else []
+    more = [Text(f"{left:,} more groups; --groups shows more of them", "dim")] if left > 0 else []
     return [Text(), Text(head, "bold"), Text(), *map(cluster_view, every[:most]), *more]

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.core.terminal import shortened, visible
+from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found
@@ -22,17 +23,28 @@ MOST_LINES = 60  # of a difference between programs
 
 
 def found_view(
-    found: Sequence[Found], counts: pl.DataFrame, total: int, told: Sequence[Cluster], *, groups: int
+    found: Sequence[Found],
+    counts: pl.DataFrame,
+    total: int,
+    told: Sequence[Cluster],
+    *,
+    groups: int,
+    is_search: bool,
 ) -> RenderableType:
-    """The completions found, with counts by task, and some groups of those that failed."""
+    """Some groups of failures; if something was looked for, below the completions found, task by task."""
     failed = len(found) - int(counts["passed"].sum())
-    parts: list[RenderableType] = [Text(f"found {len(found):,} of {how_many(total)}", "bold")]
-    parts += [Text(), _by_task(found, counts)] if found else []
+    parts: list[RenderableType] = []
+    if is_search:
+        parts += [Text(f"found {len(found):,} of {how_many(total)}", "bold"), Text()]
+        parts += [_by_task(found, counts), Text()] if found else []
+    if failed or not is_search:
+        of = "these" if is_search else f"{total:,}"
+        grouped = f", in {counted(groups, 'group')}" * (groups > 0)
+        parts.append(Text(f"{how_many(failed)} of {of} failed{grouped}{':' * bool(told)}", "bold"))
     if told:
-        what = f"{how_many(failed)} of these failed, in {groups:,} group{'s' * (groups != 1)}:"
-        parts += [Text(), Text(what, "bold"), Text(), *map(cluster_view, told)]
+        parts += [Text(), *map(cluster_view, told)]
         if groups > len(told):
-            parts.append(Text(f"{groups - len(told):,} smaller groups; --groups shows more", "dim"))
+            parts.append(Text(f"{groups - len(told):,} more groups; --groups shows more of them", "dim"))
     return Group(*parts)
 
 

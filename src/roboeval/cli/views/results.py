@@ -127,7 +127,10 @@ def _overall(summary: Summary) -> list[Text]:
     for k, estimate in zip(summary.k, summary.overall, strict=True):
         line = Text.assemble(f"pass@{k} over all prompts: ", (f"{estimate.mean:.3f}", "bold"))
         if prompts > 1:
-            line.append(f" (95% interval {estimate.low:.3f} to {estimate.high:.3f}, {prompts} prompts)")
+            ends = f"{estimate.ends()}, {prompts} prompts"
+            if not estimate.is_known:
+                ends = f"unknown: all {prompts} prompts are alike"
+            line.append(f" (95% interval {ends})")
         lines.append(line)
     return lines
 

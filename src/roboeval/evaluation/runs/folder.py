@@ -171,7 +171,10 @@ class Run:
                 with self.completions.open("rb") as file:
                     same = all(file.read(len(line)) == line for line in lines)
                     if not same or file.read(1):
-                        other = "this run holds other completions; name another folder"
+                        other = (
+                            "this run holds other completions; name another folder, or copy the new ones to "
+                            f"{self.completions} and run `roboeval evaluate {self.path} --redo`"
+                        )
                         raise UserError(other, file=self.path)
                 return
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}

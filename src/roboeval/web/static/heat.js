@@ -26,7 +26,7 @@ export default {
         <tbody>
           <tr v-for="(row, at) in rows" :key="at">
             <th scope="row" :class="['name', row.look]" dir="auto"><template v-for="piece in pieces(row.name)">{{ piece }}<wbr></template></th>
-            <td v-for="cell in row.cells" :class="[cell.shade, row.look]">
+            <td v-for="cell in row.cells" :class="[cell.shade, row.look]" :colspan="cell.span">
               <a v-if="cell.href" :href="cell.href" :title="cell.title" :aria-label="cell.title"
                 :aria-current="cell.here ? 'true' : null" @click="choose($event, cell)">{{ cell.text }}</a>
               <span v-else>{{ cell.text }}</span>
