@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache, partial
 from typing import Any
 
@@ -129,28 +129,51 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
 
 def as_written(worlds: Sequence[Mapping[str, Any]], program: str | None) -> list[dict[str, Any]]:
     """What is told of worlds whose texts were lowered, with the program's capitals where they are clear."""
-    spellings = _spellings(program or "")
-    pattern = re.compile("|".join(map(_whole, spellings)))
+    capitals = _Capitals(_spellings(program or ""))
+    return [capitals.world(world) for world in worlds]
 
-    def spelled(value: object) -> object:
-        if isinstance(value, list):
-            return [spelled(one) for one in value]
-        return pattern.sub(lambda match: spellings[match[0]], value) if isinstance(value, str) else value
 
-    def told(those: Sequence[Mapping[str, Any]], *names: str) -> list[dict[str, Any]]:
-        return [
-            {name: spelled(value) if name in names else value for name, value in one.items()} for one in those
-        ]
+class _Capitals:
+    """Puts the capitals of a program into what is told of it, given its texts by how they are lowered."""
 
-    def world_told(world: Mapping[str, Any]) -> dict[str, Any]:
+    def __init__(self, spellings: Mapping[str, str]) -> None:
+        self._spellings = spellings
+        self._texts = _any_of(spellings)
+        self._names = _any_of(text for text in spellings if not text.isalpha())
+
+    def world(self, world: Mapping[str, Any]) -> dict[str, Any]:
+        """What is told of a world."""
+        error = world["error"]
         return {
             **world,
-            "error": told([world["error"]], "message")[0] if world["error"] else None,
-            "steps": told(world["steps"], "text", "options", "answer"),
-            "failed_checks": told(world["failed_checks"], "explanation"),
+            "error": error and {**error, "message": self._sentence(error["message"])},
+            "steps": [self._step(step) for step in world["steps"]],
+            "failed_checks": [
+                {**check, "explanation": self._sentence(check["explanation"])}
+                for check in world["failed_checks"]
+            ],
         }
 
-    return [world_told(world) if spellings else dict(world) for world in worlds]
+    def _step(self, step: Mapping[str, Any]) -> dict[str, Any]:
+        texts = ("text", "options", "answer")
+        return {name: self._spelled(value) if name in texts else value for name, value in step.items()}
+
+    def _spelled(self, value: object) -> object:
+        if isinstance(value, list):
+            return [self._spelled(one) for one in value]
+        return self._put(self._texts, value) if isinstance(value, str) else value
+
+    def _sentence(self, sentence: str) -> str:
+        """A sentence of ours, in which single words are from the program only where they are quoted."""
+        parts = sentence.split('"')
+        return '"'.join(self._put(self._texts if at % 2 else self._names, p) for at, p in enumerate(parts))
+
+    def _put(self, pattern: re.Pattern[str], text: str) -> str:
+        return pattern.sub(lambda match: self._spellings[match[0]], text)
+
+
+def _any_of(texts: Iterable[str]) -> re.Pattern[str]:
+    return re.compile("|".join(map(_whole, texts)) or r"(?!)")
 
 
 def _whole(text: str) -> str:

@@ -367,7 +367,7 @@ def test_texts_have_the_capitals_of_the_program_where_they_are_clear(
         return {
             "error": {"kind": "GoToInvalidLocation", "message": f'there is no room "{text}"'},
             "steps": [{"step": 1, "kind": "say", "text": text}],
-            "failed_checks": [{"check": "polite", "explanation": f'it said "{text}"', "step": 1}],
+            "failed_checks": [{"check": "polite", "explanation": f'it said "{text}", no more', "step": 1}],
         }
 
     assert as_written([told(text)], program) == [told(shown)]
