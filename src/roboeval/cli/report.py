@@ -9,6 +9,7 @@ import typer
 
 from roboeval.cli.compare import checked
 from roboeval.cli.options import (
+    RulesOption,
     SuiteOption,
     WorkersOption,
     command,
@@ -42,6 +43,7 @@ def report(
         bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
     ] = True,
     workers: WorkersOption = None,
+    rules: RulesOption = None,
 ) -> None:
     """Write a report: the paper's figures, tables and one page.
 
@@ -66,10 +68,13 @@ def report(
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened)
     engine = Local(workers or cores()) if check else None
-    read = named_apart([judged_run(one.results, suite, beside=beside, engine=engine) for one in opened])
+    read = named_apart(
+        [judged_run(one.results, suite, beside=beside, rules=rules, engine=engine) for one in opened]
+    )
     expect_known(prices, read)
     options: list[object] = ["--out", out, *["--published"] * published]
     options += [] if beside is None else ["--beside", beside]
+    options += [] if rules is None else ["--rules", rules]
     options += ["--no-check"] * (not check)
     options += [word for text in price or () for word in ("--price", text)]
     again = command("report", *runs, *options, suite=suite)
@@ -81,8 +86,10 @@ def report(
     note(f"the report is in {out / 'index.html'}")
 
 
-def judged_run(results: Results, suite: str, *, beside: str | None, engine: OpenEngine | None) -> JudgedRun:
-    """A run with its ablation, if that was judged, and its verdicts by the suite `beside`.
+def judged_run(
+    results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
+) -> JudgedRun:
+    """A run with its ablation, if that was judged, and its verdicts by the suite `beside` and with rules.
 
     Programs are checked on `engine`; without one, earlier answers of the check are left out, too.
     """
@@ -92,7 +99,7 @@ def judged_run(results: Results, suite: str, *, beside: str | None, engine: Open
     from roboeval.report.runs import JudgedRun
 
     run = results.run
-    ablated = other = None
+    ablated = other = house = None
     if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
         ablated = open_current(run.path, suite, ablated=True, beside=results).results
     if engine is None:
@@ -101,4 +108,6 @@ def judged_run(results: Results, suite: str, *, beside: str | None, engine: Open
         table = checked(results, engine=engine)
     if beside is not None:
         other = open_current(run.path, beside, ablated=False, beside=results).results
-    return JudgedRun(results, table, ablated=ablated, beside=other)
+    if rules is not None:
+        house = open_current(run.path, suite, ablated=False, rules=rules, beside=results).results
+    return JudgedRun(results, table, ablated=ablated, beside=other, house=house)

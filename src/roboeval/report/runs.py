@@ -26,6 +26,7 @@ class JudgedRun:
     table: pl.DataFrame  # `accepted` is null where programs were not checked
     ablated: Results | None = None  # where common sense only was judged
     beside: Results | None = None  # as another suite judges it
+    house: Results | None = None  # as the same suite judges it with house rules
     name: str = ""  # in figures and tables; no two runs of a report share it
 
     @property

@@ -12,7 +12,7 @@ from codebotler.core.files import write_whole
 from roboeval.analysis.metrics import overall
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.table import Price
-from roboeval.report import breakdown, cost, failures, scores
+from roboeval.report import breakdown, cost, failures, house, scores
 from roboeval.report.drawing import darkened, styled, written
 from roboeval.report.page import GENERATOR, Drawn, page
 from roboeval.report.runs import JudgedRun
@@ -62,6 +62,7 @@ def sections(
         scores.results(runs),
         scores.differences(runs),
         failures.beside(runs),
+        house.house(runs),
         scores.thresholds(runs),
         failures.why(runs, with_published=with_published),
         failures.alike(runs),

@@ -1,0 +1,39 @@
+"""The section on house rules: how often programs break them, and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from roboeval.analysis.broken_rules import BrokenRules, broken_rules
+from roboeval.analysis.metrics import overall, task_scores
+from roboeval.report.runs import JudgedRun
+from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
+
+
+def house(runs: Sequence[JudgedRun]) -> Section:
+    """What house rules change, for runs that were judged with them, too."""
+    found = [(run, broken_rules(run.house.table, run.results.table)) for run in runs if run.house is not None]
+    return section("house", rules_sheet(found), broken_sheet(found))
+
+
+def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
+    """How many programs break a rule, and how many tasks are done without and with the rules."""
+    rows: list[list[Cell]] = []
+    for run, one in found:
+        assert run.house is not None
+        assert one.cost is not None
+        broken = one.broken
+        scores = overall(run.scores, 1).mean, overall(task_scores(run.house.table), 1).mean
+        rows.append(
+            [
+                *(run.name, broken.mean, broken.low, broken.high),
+                *(*scores, one.cost.mean, one.cost.low, one.cost.high),
+            ]
+        )
+    return sheet("house", rows)
+
+
+def broken_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
+    """How many programs each rule ends in some world."""
+    rows = [[rule, run.name, count] for run, one in found for rule, count in one.by_rule.items()]
+    return sheet("broken-rules", rows)
