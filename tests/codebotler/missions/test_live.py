@@ -85,7 +85,7 @@ def test_a_question_without_options_is_named_wherever_its_text_stands() -> None:
         ("go_to('cellar')", "GoToInvalidLocation"),
         ("ask('ann', 'Tea?', ['Yes', 'No'])", "AskNoPerson"),
         ("ask('ann', 'Tea?', [])", "AskEmptyOptions"),
-        ("ask('bob', 'Tea?', ['Never', 'Always'])", "AskInvalidOptions"),
+        ("ask('ann', 'Tea?', ['Never', 'Always'])", "AskInvalidOptions"),
         ("pick('cup')", "PickInvalidObject"),
         ("place('mug')", "PlaceNoObject"),
         ("[pick('mug') for _ in 'ab']", "PickWhileHolding"),
