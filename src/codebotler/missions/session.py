@@ -19,7 +19,7 @@ from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import write_program
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
-from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
+from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms, with_closest_here
 from codebotler.missions.view import CHECKING, Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
@@ -156,10 +156,12 @@ class MissionSession:
                 self._before = None
             self._show(busy="connecting the robot")
             self._through()
+        except UnknownInstructionError as error:
+            self.error = with_closest_here(error, self._view.room_map)
+            self._show(trouble=f"{error.model} has no program for this instruction", known=self.error.closest)
         except EXPECTED as error:
             self.error = error
-            known = error.closest if isinstance(error, UnknownInstructionError) else ()
-            self._show(trouble=_sentence(error), known=known)
+            self._show(trouble=_sentence(error))
         except Exception as error:
             self.error = error
             LOG.exception("a mission failed unexpectedly")
