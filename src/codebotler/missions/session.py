@@ -158,7 +158,7 @@ class MissionSession:
             self._through()
         except UnknownInstructionError as error:
             self.error = with_closest_here(error, self._view.room_map)
-            self._show(trouble=f"{error.model} has no program for this instruction", known=self.error.closest)
+            self._show(trouble=_unknown(error), known=self.error.closest)
         except EXPECTED as error:
             self.error = error
             self._show(trouble=_sentence(error))
@@ -234,6 +234,9 @@ class MissionSession:
             if before.program:
                 self._restore(before)
             return
+        except UnknownInstructionError as error:
+            mission.fail(_unknown(error))
+            raise
         except (UserError, ModelError) as error:
             if not before.program:
                 raise
@@ -331,6 +334,10 @@ class MissionSession:
 
 
 UNCHECKED: dict[str, object] = {"check": None, "missing_skills": (), "unknown_rooms": ()}
+
+
+def _unknown(error: UnknownInstructionError) -> str:
+    return f"{error.model} has no program for this instruction"
 
 
 def _sentence(error: Exception) -> str:

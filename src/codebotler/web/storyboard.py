@@ -77,7 +77,7 @@ def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
     if shown and all(number is None for number in numbers):
-        PlainText("p", NONE_FITS, "unsure")
+        PlainText("p", NONE_FITS, "quiet unsure")
     for strip, number_reached, is_folded in zip(shown, numbers, folded(numbers), strict=True):
         with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:

@@ -138,8 +138,10 @@ def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: P
         robot = Simulated(world, speed=None)
         with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
             console.begin(Order("Go to the lobby, and tell me how many people are there."))
-            known = until(console, lambda view: view.is_over).known
+            view = until(console, lambda view: view.is_over)
+            known = view.known
             assert known is not None
+            assert view.reason == view.trouble == "recorded:careful has no program for this instruction"
             assert len(known) == count
             assert set(known) <= set(known_instructions(RoomMap.of(world)))
 

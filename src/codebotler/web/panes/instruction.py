@@ -22,8 +22,8 @@ from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
 
 UNKNOWN = "There is no recorded program for this instruction."
 NO_MODEL = (
-    f"For other instructions, {SETUP}, and start codebotler serve with --model NAME; "
-    "the command codebotler models lists the names."
+    f"For other instructions, {SETUP}, and add --model NAME to codebotler serve; "
+    "codebotler models lists the names."
 )
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 ABOUT_RECORDED = (
