@@ -49,7 +49,7 @@ demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
 	@echo "  $(INSTRUCTION)"
 	@echo
-	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler run "$(INSTRUCTION)" --world examples/office.yaml --speed 40 --yes
+	@$(BIN)/codebotler run "$(INSTRUCTION)" --model recorded --world examples/office.yaml --speed 40 --yes
 	@echo
 	@echo "The benchmark, on programs that ship with it:"
 	@$(BIN)/roboeval evaluate recorded:careful
@@ -59,7 +59,7 @@ demo: $(VENV)/installed
 	@echo "To see why a program fails, keep the verdicts: $(BIN)/roboeval evaluate recorded:hasty --out runs/hasty"
 
 serve: $(VENV)/installed
-	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler serve --world examples/office.yaml --speed 5
+	@$(BIN)/codebotler serve --world examples/office.yaml --speed 5
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)

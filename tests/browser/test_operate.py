@@ -26,6 +26,7 @@ TEA = """def task_program():
 """
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
 BAD = "def task_program():\n    go_to('hall')\n    go_to('cellar')\n"
+OFFICE = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
 NUMBERS = itertools.count(1)
 
 
@@ -71,8 +72,7 @@ def at_rest(server: PageServer) -> None:
 
 
 def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> None:
-    world = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
-    with PageServer(tmp_path, "--speed", "40", world=world) as server:
+    with PageServer(tmp_path, "--speed", "40", world=OFFICE) as server:
         page = opened(server)
         page.locator(".picks .pick").first.click()
         page.get_by_role("button", name="Write the program").click()
@@ -147,6 +147,13 @@ def test_an_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer
     page.wait_for_selector(".cm-line.problem-line")
     expect(page.locator(".cm-line.problem-line")).to_contain_text('there is no room "cellar"')
     assert page.locator(".cm-line.problem-line").evaluate("e => [...e.parentNode.children].indexOf(e)") == 2
+    for width, height in (DESK, TABLET, PHONE):
+        page.set_viewport_size({"width": width, "height": height})
+        box, editor = (page.locator(part).bounding_box() for part in (".problem-words", ".editor"))
+        assert box is not None
+        assert editor is not None
+        assert box["x"] + box["width"] <= editor["x"] + editor["width"]
+    page.set_viewport_size({"width": DESK[0], "height": DESK[1]})
     page.reload()
     expect(page.locator(".cm-line.problem-line")).to_have_count(1)
     button = page.get_by_role("button", name="Run it on the robot")
@@ -301,6 +308,57 @@ def test_stop_ends_what_the_robot_does(server: PageServer, opened: OpenPage, how
     assert server.call("GET", "/api/robot").data["state"] == "stopped"
 
 
+def test_a_stop_before_the_robot_moves_discards_the_program(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    checked(page, TEA)
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_have_text("Discarded; the robot had not moved.")
+    expect(page.locator(".reason")).to_have_text("stopped from the page before it ran")
+
+
+def test_recent_instructions_are_up_to_date(tmp_path: Path, opened: OpenPage) -> None:
+    with PageServer(tmp_path, world=OFFICE) as server:
+        page = opened(server)
+        page.locator(".pick").first.click()
+        page.get_by_role("button", name="Write the program").click()
+        page.get_by_role("button", name="Run it on the robot").click()
+        expect(page.locator(".headline")).to_have_text("Running")
+        page.reload()
+        expect(page.get_by_text("Recent")).to_be_visible()
+        expect(page.locator(".pick .state")).to_have_count(0)
+        page.locator("#stop").click()
+        expect(page.locator(".pick .state")).to_have_text("stopped")
+        expect(page.get_by_role("button", name="Prepare it again")).to_be_visible()
+        page.context.close()
+
+
+def test_an_unknown_instruction_leads_to_known_ones(tmp_path: Path, opened: OpenPage) -> None:
+    with PageServer(tmp_path, world=OFFICE) as server:
+        page = opened(server)
+        page.locator("textarea").fill("Go to the lobby.")
+        page.get_by_role("button", name="Write the program").click()
+        expect(page.locator(".trouble")).to_contain_text("OPENAI_API_KEY")
+        offered = page.locator(".picks", has_text="Similar instructions").locator(".pick")
+        expect(offered).to_have_count(3)
+        offered.first.click()
+        expect(page.locator("textarea")).to_have_value(offered.first.locator("span").inner_text())
+        page.get_by_role("button", name="Write the program").click()
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+        page.context.close()
+
+
+def test_an_empty_editor_says_that_programs_can_be_typed(tmp_path: Path, opened: OpenPage) -> None:
+    with PageServer(tmp_path) as server:
+        page = opened(server)
+        expect(page.locator("[data-started]")).to_be_visible()
+        shown = "getComputedStyle(document.querySelector('.cm-content'), '::before').content"
+        assert "def task_program():" in page.evaluate(shown)
+        checked(page, TEA)
+        assert page.evaluate(shown) == "none"
+        expect(page.get_by_text("A program of your own, without an instruction.")).to_be_visible()
+        page.context.close()
+
+
 def test_escape_leaves_a_program_alone_that_waits(server: PageServer, opened: OpenPage) -> None:
     page = opened(server)
     checked(page, TEA)
@@ -385,8 +443,7 @@ def test_many_tabs_stay_in_step(server: PageServer, opened: OpenPage) -> None:
 
 
 def test_examples_are_seen_whole_and_taken_by_a_click(tmp_path: Path, opened: OpenPage) -> None:
-    world = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
-    with PageServer(tmp_path, world=world) as server:
+    with PageServer(tmp_path, world=OFFICE) as server:
         page = opened(server)
         for pick in page.locator(".pick").all():
             words = pick.locator("span")
@@ -410,8 +467,7 @@ def is_in_sight(page: Page, name: str) -> bool:
 
 
 def test_a_phone_shows_first_what_is_to_be_done(tmp_path: Path, opened: OpenPage) -> None:
-    world = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
-    with PageServer(tmp_path, "--face", "--speed", "2", world=world) as server:
+    with PageServer(tmp_path, "--face", "--speed", "2", world=OFFICE) as server:
         page = opened(server, size=PHONE)
         page.locator(".pick").last.scroll_into_view_if_needed()
         page.locator(".pick").last.click()
@@ -430,6 +486,14 @@ def test_a_phone_shows_first_what_is_to_be_done(tmp_path: Path, opened: OpenPage
         page.locator("#stop").click()
         expect(page.locator(".headline")).to_have_text("Stopped")
         expect(page.locator(".headline")).to_be_in_viewport()
+        told, status = (page.locator(part).bounding_box() for part in ("#stop-told", "#h-status"))
+        assert told is not None
+        assert status is not None
+        assert told["y"] + told["height"] < status["y"]
+        page.locator(".pick").last.scroll_into_view_if_needed()
+        page.locator(".pick").last.click()
+        expect(page.locator("textarea").first).to_be_in_viewport()
+        assert is_in_sight(page, "Write the program")
         page.context.close()
 
 
@@ -458,7 +522,9 @@ def test_past_missions_are_told_and_downloaded(server: PageServer, opened: OpenP
     expect(page.locator(".headline")).to_have_text("Done")
     page.get_by_role("link", name="Missions").click()
     expect(page.locator(".rows .state-done").first).to_be_visible()
+    expect(page.locator(".rows a").first).to_contain_text('typed: get_all_rooms(), go_to("study"), …')
     page.locator(".rows a").first.click()
+    expect(page.locator(".pages [aria-current]")).to_have_text("Missions")
     expect(page.locator(".timeline")).to_contain_text("Would you like tea?")
     expect(page.locator(".timeline .text").first).to_have_text("Mission created")
     expect(page.locator(".timeline .text").last).to_have_text("Done")

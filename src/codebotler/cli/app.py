@@ -35,6 +35,14 @@ RobotOption = Annotated[
 ]
 
 
+AllOption = Annotated[
+    bool,
+    typer.Option(
+        "--all", help="Show what the robot would do in each kind of imagined world, not only in one."
+    ),
+]
+
+
 @app.command()
 def generate(
     instruction: Annotated[str, typer.Argument(help="What the robot should do, in plain words.")],
@@ -116,6 +124,7 @@ def check(
             help="Do not assume that people and objects are there unless the program has looked for them.",
         ),
     ] = False,
+    shows_all: AllOption = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,
     rules: options.RulesOption = None,
@@ -147,7 +156,8 @@ def check(
     if json:
         print_json(found.data())
     else:
-        print_rich(check_view(found, source, "the program" if program == "-" else program))
+        name = "the program" if program == "-" else program
+        print_rich(check_view(found, source, name, shows_all=shows_all))
     raise typer.Exit(1 if found.problems else 0)
 
 
@@ -186,13 +196,17 @@ def run(
         ),
     ],
     robot: RobotOption = "sim",
-    world: Annotated[Path | None, typer.Option(help="The world file of a simulated robot.")] = None,
+    world: Annotated[
+        Path | None,
+        typer.Option(help="The world file of a simulated robot; by default an office for --robot sim."),
+    ] = None,
     model: options.ModelOption = None,
     base_url: options.BaseUrlOption = None,
     yes: Annotated[bool, typer.Option("--yes", help="Run the program without asking.")] = False,
     despite_problems: Annotated[
         bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
     ] = False,
+    shows_all: AllOption = False,
     speed: options.SpeedOption = 1.0,
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
@@ -215,8 +229,9 @@ def run(
 
     chosen = chosen_model(model, base_url)
     house_rules = () if rules is None else read_rules(rules)
-    request = Request(program, chosen.name, yes, despite_problems, house_rules)
+    request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
     asked = SamplingSettings(base_url=chosen.base_url)
+    world = _world_of(robot, world)
     settings = Options(
         world=None if world is None else World.read(world),
         speed=speed or None,
@@ -349,15 +364,12 @@ def serve(
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
-    from codebotler.robots.simulated import OFFICE
     from codebotler.web.access import Access, Place
     from codebotler.web.console import Console
 
     place = Place(host, port, tuple(name or ()))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
-    if world is None and robot == "sim":
-        world = OFFICE
-        note("the robot works in an example office; --world FILE names another world")
+    world = _world_of(robot, world)
     known = None if world is None else World.read(world)
     house_rules = () if rules is None else read_rules(rules)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
@@ -371,6 +383,16 @@ def serve(
     from codebotler.web.frame import installed_pages
 
     server.serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
+
+
+def _world_of(robot: str, world: Path | None) -> Path | None:
+    """The world file that is named, or else an office for the simulated robot."""
+    from codebotler.robots.simulated import OFFICE
+
+    if world is not None or robot != "sim":
+        return world
+    note("the robot works in an example office; --world FILE names another world")
+    return OFFICE
 
 
 def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -16,6 +17,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_BYTES, read_text, text_of
 from codebotler.core.program import TASK, bound_names
 from codebotler.core.terminal import shortened, visible
+from codebotler.core.trace import RunError
+from codebotler.core.words import room_name
 from codebotler.prompts.extract import program_of
 
 INPUT = "standard input"
@@ -40,15 +43,21 @@ def read_program(name: str) -> str:
     return text if TASK in bound_names(text) else program_of(text).source
 
 
-def check_view(found: Check, program: str, name: str) -> RenderableType:
-    """What a check found, for a person: the verdict, the problems, and what the robot would do."""
+def check_view(found: Check, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
+    """What a check found, for a person: the verdict, the problems, and what the robot would do.
+
+    By default that is shown in one imagined world, with `shows_all` in one of each kind.
+    """
     parts: list[RenderableType] = [_verdict(found, name)]
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
     parts += [Text(), _rooms(found), *_in_vain(found)]
-    if found.samples:
-        parts += [Text(), *_sample(_telling(found), found)]
+    kinds = _kinds(found)
+    for sample in kinds if shows_all else kinds[:1]:
+        parts += [Text(), *_sample(sample, found)]
+    if len(kinds) > 1 and not shows_all:
+        parts += [Text(), Text(f"this is 1 of {len(kinds)} different courses; --all shows them", "dim")]
     return Group(*parts)
 
 
@@ -101,20 +110,34 @@ def _in_vain(found: Check) -> Iterator[Text]:
         )
 
 
-def _telling(found: Check) -> Sample:
-    """The sample that says most about what the robot is to do: one that ends well, if there is one."""
+def _kinds(found: Check) -> list[Sample]:
+    """A sample of each kind of world in which the robot does something else.
+
+    First comes what says most about what the robot is to do: those that end well, the longest first.
+    """
 
     def rank(sample: Sample) -> tuple[bool, bool, int]:
         return sample.outcome.error is not None, sample.in_vain, -len(sample.outcome.trace)
 
-    return min(found.samples, key=rank)
+    different: dict[tuple[str, RunError | None], Sample] = {}
+    for sample in found.samples:
+        different.setdefault((str(steps_of(sample.outcome.trace)), sample.outcome.error), sample)
+    return sorted(different.values(), key=rank)
+
+
+def _for_people(step: dict[str, Any]) -> dict[str, Any]:
+    """A step with the name that the place where robots start has on the page."""
+    names = {key: room_name(step[key]) for key in ("place", "to") if step.get(key)}
+    if step["kind"] == "goto":
+        names["text"] = room_name(step["text"])
+    return {**step, **names}
 
 
 def _sample(sample: Sample, found: Check) -> Iterator[RenderableType]:
     where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
     yield Text.assemble(("what the robot would do", "bold"), where)
     steps = steps_of(sample.outcome.trace, found.room_map.room)
-    yield storyboard(steps, set())
+    yield storyboard([_for_people(step) for step in steps], set())
     if sample.outcome.error is not None:
         told = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
         yield Padding(Text(told, "red"), (0, 0, 0, 4))

@@ -6,13 +6,24 @@ import errno
 import os
 import sys
 from functools import cache
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
 from typer.main import get_command
 
 from codebotler.core.errors import UserError, installed
-from codebotler.core.terminal import FULL, drop_output, flush_output, note, open_streams, system_sentence
+from codebotler.core.terminal import (
+    FULL,
+    drop_output,
+    flush_output,
+    note,
+    open_streams,
+    shortened,
+    system_sentence,
+)
+
+if TYPE_CHECKING:
+    from codebotler.models.recorded import UnknownInstructionError
 
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
@@ -67,14 +78,28 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
         return 1, str(error)
     if isinstance(error, UnknownInstructionError):
-        from codebotler.models.usable import how_to_use_a_model
-
-        return 2, f"{error.sentence}\nfor other instructions, {how_to_use_a_model()}"
+        return 2, _unknown_instruction(error)
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None
+
+
+def _unknown_instruction(error: UnknownInstructionError) -> str:
+    """The closest instructions are whole, to be copied."""
+    from codebotler.models.usable import how_to_use_a_model
+
+    told = f'{error.model} has no program for "{shortened(error.instruction, 200)}"'
+    if error.closest:
+        told += "; the closest that it knows here:"
+    return "\n".join(
+        [
+            told,
+            *(f"  {closest}" for closest in error.closest),
+            f"for other instructions, {how_to_use_a_model()}",
+        ]
+    )
 
 
 def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' own

@@ -10,9 +10,10 @@ from codebotler.core.files import Appender, expect_replaceable, to_line
 from codebotler.core.terminal import busy, note, print_source, visible
 from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore, write_checked_program
+from codebotler.missions.preflight import with_closest_here
 from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of, open_model
-from codebotler.models.recorded import NOTICE, is_recorded
+from codebotler.models.recorded import NOTICE, UnknownInstructionError, is_recorded
 from codebotler.prompts import Prompt
 from codebotler.simulator.guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
@@ -40,15 +41,18 @@ def write(
                 _tell(attempt, retries + 1)
 
             room_map = None if world is None else RoomMap.of(world)
-            made = write_checked_program(
-                asked,
-                prompt,
-                room_map=room_map,
-                house_rules=house_rules,
-                retries=retries,
-                repair=repair,
-                tried=tried,
-            )
+            try:
+                made = write_checked_program(
+                    asked,
+                    prompt,
+                    room_map=room_map,
+                    house_rules=house_rules,
+                    retries=retries,
+                    repair=repair,
+                    tried=tried,
+                )
+            except UnknownInstructionError as error:
+                raise with_closest_here(error, room_map) from None
         print_source(made.program)
     if is_recorded(asked.name):
         note(NOTICE)

@@ -47,6 +47,7 @@ class Request:
     model: str = "recorded"  # writes the program for an instruction
     yes: bool = False  # whether to run the program without asking
     despite_problems: bool = False
+    shows_all: bool = False  # of the kinds of imagined worlds in which it does something else
     rules: tuple[Rule, ...] = ()  # of the house
 
     def __post_init__(self) -> None:
@@ -117,7 +118,7 @@ def _show_check(view: SessionView, request: Request) -> None:
             note(NOTICE)
         print_rich(source_view(view.program))
     name = request.what if request.is_program and request.what != "-" else "the program"
-    print_rich(check_view(view.check, view.program, name))
+    print_rich(check_view(view.check, view.program, name, shows_all=request.shows_all))
     for sentence in (*view.missing_skills, *view.unknown_rooms):
         note(shortened(f"before the robot moves: {sentence}"))
 

@@ -15,7 +15,7 @@ from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import console, shortened, visible
 from codebotler.missions.log import Line, State, Summary
 from codebotler.missions.view import SessionView
-from codebotler.missions.wording import event_text
+from codebotler.missions.wording import event_text, title
 from codebotler.models.chosen import ChosenModel
 from codebotler.models.usable import SETUP, UsableModel
 from codebotler.robots.base import Readiness
@@ -113,12 +113,14 @@ def list_view(summaries: Sequence[Summary]) -> RenderableType:
     table = grid("left", "left", "left", "left")
     for summary in summaries:
         state = summary.state
-        what = summary.instruction or "a program"
         table.add_row(
             summary.id,
             Text(state, STYLES.get(state, "bold")),
             summary.robot,
-            Text(shortened(what, 100) + (f"  ({shortened(summary.reason, 200)})" if summary.reason else "")),
+            Text(
+                shortened(title(summary), 100)
+                + (f"  ({shortened(summary.reason, 200)})" if summary.reason else "")
+            ),
         )
     return table
 

@@ -18,6 +18,7 @@ from codebotler.core.trace import Outcome, RunError, Status, Trace
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event, log_of
 from codebotler.missions.pictures import Pictures
+from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.guard import Guard, Rule
@@ -194,7 +195,7 @@ class Mission:
             if self.state is State.RUNNING:
                 self._be_stopping()
             elif self.state is not State.STOPPING:
-                self._step(State.STOPPED, "be stopped", reason=f"stopped by {by} before it ran")
+                self._step(State.STOPPED, "be stopped", reason=f"{stop_text(by)} before it ran")
 
     def run(
         self,
@@ -280,7 +281,7 @@ class Mission:
                 if self._live is not None:
                     self.trace = self._live.trace
                 if self._stopped_by is not None and reason != UNCONFIRMED:
-                    state, reason, line = State.STOPPED, f"stopped by {self._stopped_by}", None
+                    state, reason, line = State.STOPPED, stop_text(self._stopped_by), None
                 if self._stopped_by is not None and self.state is State.RUNNING:
                     self._be_stopping()
                 self._step(state, "end", reason=reason, line=line)
@@ -293,8 +294,9 @@ class Mission:
     def _be_stopping(self) -> None:
         """Log who stopped it; the robot may have ended before the stop returned."""
         passed_on = min(self._passed_on, time.monotonic())
-        self._write("stop", by=self._stopped_by, seconds_to_cancel=round(passed_on - self._asked, 6))
-        self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
+        by = self._stopped_by or ""
+        self._write("stop", by=by, seconds_to_cancel=round(passed_on - self._asked, 6))
+        self._step(State.STOPPING, "be stopped", reason=stop_text(by))
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state.is_moving:

@@ -10,6 +10,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.program import called_skills, tree_of
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.live import answered
+from codebotler.models.recorded import UnknownInstructionError, closest_to, recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -66,6 +67,25 @@ def unknown_rooms(program: str, room_map: RoomMap) -> list[str]:
 
     named = named_rooms(tree_of(program))
     return [no_room(name, room_map) for name in named if room_map.room(name) is None and not is_part(name)]
+
+
+def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
+    """The instructions that the recorded models know and whose rooms are there, with a program each."""
+    replies = recorded_model("recorded").replies
+    known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
+    if room_map is None:
+        return known
+    return {
+        instruction: program
+        for instruction, program in known.items()
+        if named_rooms(tree_of(program)) and not unknown_rooms(program, room_map)
+    }
+
+
+def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) -> UnknownInstructionError:
+    """The same error, with the closest instructions whose rooms are there."""
+    closest = closest_to(error.instruction, known_instructions(room_map))
+    return UnknownInstructionError(error.model, error.instruction, closest)
 
 
 def missing_skills(program: str, robot: Robot) -> list[str]:

@@ -14,14 +14,16 @@ from codebotler.core.program import parsed
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point
-from codebotler.missions.log import SKILL_ENDS, Line
+from codebotler.missions.log import SKILL_ENDS, Line, State
 from codebotler.missions.wording import activity, event_text, stop_text
 
 AT = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
 MOST, MOST_STEPS = 200, 60  # moments, and drives, looks and finds, that are kept
 NEAR = 0.05  # metres; a robot that moves less stays where it is
-UNTOLD = frozenset({"state", "cancelled"})  # events that other events or the page tell
 ANSWER = "answer"  # the kind of moment at which the robot hears something
+STOPS = frozenset(
+    {State.STOPPING, State.STOPPED}
+)  # which the tool notes some time after the robot has stopped
 
 
 @dataclass(frozen=True)
@@ -45,17 +47,21 @@ class Find:
 class Progress:
     """How far a mission has come."""
 
+    has_begun: bool = False  # to run on the robot
     doing: str = ""  # now, in words
     skill: str = ""  # the skill under way
     subject: str = ""  # its first argument
     activity: str = ""  # the skill in words, such as `driving to supply room`, also once it is cancelled
     line: int | None = None  # of the program, which calls the skill under way; None if that is not known
     clock: float = 0.0  # seconds by the robot's clock since the program began
-    room: str = ""  # the last destination, in the program's words
+    room: str = ""  # the destination, or the last that was reached, in the program's words
+    left: str = ""  # the room before it, in which the robot still is if it cannot go
     at: Point | None = None  # the position in metres, if known
     is_driving: bool = False  # to `room`
+    is_between: bool = False  # somewhere on the way from `room`, where a drive was cut short
     visited: tuple[str, ...] = ()  # the destinations that were reached, in the program's words
     looks: tuple[tuple[str, bool], ...] = ()  # what was looked for, and whether it was found
+    answers: tuple[str | None, ...] = ()  # to questions; None where one failed
     trail: tuple[Point, ...] = ()  # the last 200 positions
     finds: tuple[Find, ...] = ()  # what was seen, and who was asked, by room; each once
     held: str = ""  # what the robot holds
@@ -64,23 +70,36 @@ class Progress:
     def after(self, line: Line, program: str) -> Progress:
         """The progress after one more event of a program."""
         event = line["event"]
+        if event == "state":
+            return self.with_state(State(line["state"]), line["clock"])
         now = replace(self, clock=max(self.clock, line["clock"]))
         if event == "feedback":
             place = AT.search(line["text"])
             return now.moved((float(place[1]), float(place[2]))) if place else now
         if event == "skill":
             now = now.with_skill(line, program)
+        elif event == "sleep" and line["seconds"]:
+            now = replace(
+                now,
+                doing=event_text(line),
+                activity=activity(line),
+                line=line_of(program, "sleep", (line["seconds"],)),
+            )
         elif event in SKILL_ENDS:
-            if event == "result":
-                now = now.with_result(line["result"])
+            now = now.with_result(line["result"]) if event == "result" else now.with_failure(event)
             still = self.activity if event == "cancelled" else ""
             now = replace(now, doing="", skill="", line=None, is_driving=False, activity=still)
-        text = "" if event in UNTOLD else event_text(line)
+        text = "" if event == "cancelled" else event_text(line)
         if event == "stop":
             text = stop_text(line["by"], self.activity)
         if not text or (event == "sleep" and not line["seconds"]):
             return now
         return replace(now, moments=(*now.moments, _moment(line, text))[-MOST:])
+
+    def with_state(self, state: State, clock: float) -> Progress:
+        """The progress when the mission comes to a state."""
+        clock = self.clock if state in STOPS else max(self.clock, clock)
+        return replace(self, clock=clock, has_begun=self.has_begun or state is State.RUNNING)
 
     def with_skill(self, line: Line, program: str) -> Progress:
         """The progress when a skill begins."""
@@ -97,13 +116,14 @@ class Progress:
             subject=str(next(iter(arguments), "")).strip(),
             activity=activity(line),
         )
-        return replace(now, room=now.subject) if drives else now
+        return replace(now, room=now.subject, left=self.room) if drives else now
 
     def moved(self, at: Point) -> Progress:
         """The progress when the robot is somewhere."""
+        now = replace(self, at=at, is_between=self.is_between or self.is_driving)
         if self.trail and math.dist(self.trail[-1], at) < NEAR:
-            return replace(self, at=at)
-        return replace(self, at=at, trail=(*self.trail, at)[-MOST:])
+            return now
+        return replace(now, trail=(*self.trail, at)[-MOST:])
 
     def with_result(self, result: object) -> Progress:
         """The progress when the skill under way has ended well."""
@@ -111,7 +131,8 @@ class Progress:
         now = self
         match recording and recording.kind:
             case "goto":
-                now = replace(self, visited=(*self.visited, self.subject)[:MOST_STEPS])
+                visited = (*self.visited, self.subject)[:MOST_STEPS]
+                now = replace(self, visited=visited, is_between=False)
             case "pick":
                 now = replace(self, held=self.subject)
             case "place":
@@ -119,9 +140,19 @@ class Progress:
             case "check":
                 now = self._found(Find(self.room, self.subject)) if result is True else self
                 now = replace(now, looks=(*self.looks, (self.subject, result is True))[:MOST_STEPS])
-            case "ask" if self.subject:
-                now = self._found(Find(self.room, self.subject))
+            case "ask":
+                now = self._found(Find(self.room, self.subject)) if self.subject else self
+                now = replace(now, answers=(*now.answers, str(result))[:MOST_STEPS])
         return now
+
+    def with_failure(self, event: str) -> Progress:
+        """The progress when the skill under way has failed or was cut short."""
+        recording = SKILLS[self.skill].recording if self.skill in SKILLS else None
+        if recording is not None and recording.is_drive and event != "late":
+            return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")
+        if recording is not None and recording.options and event == "error":
+            return replace(self, answers=(*self.answers, None)[:MOST_STEPS])
+        return self
 
     def _found(self, find: Find) -> Progress:
         known = [one for one in self.finds if (one.room, one.name) != (find.room, find.name)]
@@ -147,7 +178,7 @@ def _plain(argument: object) -> object:
 
 
 def line_of(program: str, skill: str, given: Sequence[object]) -> int | None:
-    """The line of a program that calls a skill with these arguments; None where several can be meant."""
+    """The line of a program that calls a skill, or `sleep`, with these arguments; None if several do."""
     lines = {line for line, fixed in _calls(program).get(skill, ()) if _fits(fixed, given)}
     return lines.pop() if len(lines) == 1 else None
 
@@ -161,15 +192,23 @@ def _fits(fixed: Sequence[object], given: Sequence[object]) -> bool:
 
 @lru_cache(maxsize=16)
 def _calls(program: str) -> Mapping[str, Sequence[tuple[int, tuple[object, ...]]]]:
-    """The calls of each skill, with the arguments that are constants."""
+    """The calls of each skill and of `sleep`, with the arguments that are constants."""
     tree = parsed(program)
     if not isinstance(tree, ast.Module):
         return {}
     found: dict[str, list[tuple[int, tuple[object, ...]]]] = {}
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in SKILLS:
-            found.setdefault(node.func.id, []).append((node.lineno, tuple(_values(node))))
+        if isinstance(node, ast.Call) and (name := _name_of(node.func)):
+            found.setdefault(name, []).append((node.lineno, tuple(_values(node))))
     return found
+
+
+def _name_of(function: ast.expr) -> str:
+    """The name of a skill, or `sleep`; empty for other functions."""
+    if isinstance(function, ast.Name) and function.id in {*SKILLS, "sleep"}:
+        return function.id
+    is_sleep = isinstance(function, ast.Attribute) and function.attr == "sleep"
+    return "sleep" if is_sleep else ""
 
 
 def _values(call: ast.Call) -> Iterator[object]:

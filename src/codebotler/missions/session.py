@@ -19,7 +19,7 @@ from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import write_program
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
-from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
+from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms, with_closest_here
 from codebotler.missions.view import CHECKING, Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
@@ -173,10 +173,12 @@ class MissionSession:
                 self._before = None
             self._show(busy="connecting the robot")
             self._through()
+        except UnknownInstructionError as error:
+            self.error = with_closest_here(error, self._view.room_map)
+            self._show(trouble=_unknown(error), known=self.error.closest)
         except EXPECTED as error:
             self.error = error
-            known = error.closest if isinstance(error, UnknownInstructionError) else ()
-            self._show(trouble=_sentence(error), known=known)
+            self._show(trouble=_sentence(error))
         except Exception as error:
             self.error = error
             LOG.exception("a mission failed unexpectedly")
@@ -249,6 +251,9 @@ class MissionSession:
             if before.program:
                 self._restore(before)
             return
+        except UnknownInstructionError as error:
+            mission.fail(_unknown(error))
+            raise
         except (UserError, ModelError) as error:
             if not before.program:
                 raise
@@ -347,6 +352,10 @@ class MissionSession:
 
 
 UNCHECKED: dict[str, object] = {"check": None, "missing_skills": (), "unknown_rooms": ()}
+
+
+def _unknown(error: UnknownInstructionError) -> str:
+    return f"{error.model} has no program for this instruction"
 
 
 def _sentence(error: Exception) -> str:

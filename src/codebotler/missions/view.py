@@ -55,7 +55,7 @@ class SessionView:
     line: int | None = None  # of the program, where it failed
     busy: str = ""  # what goes on before the robot moves, such as `checking`
     trouble: str = ""  # why it could not go on, in a sentence
-    known: tuple[str, ...] = ()  # instructions that can be carried out instead, where this one is unknown
+    known: tuple[str, ...] | None = None  # by the model, where it does not know this instruction
     instruction: str = ""
     model: str = ""  # its name; empty where none may be asked
     program: str = ""  # while a model writes, as much as has arrived

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Mapping, Sequence
 
+from codebotler.core.program import nodes, tree_of
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
-from codebotler.core.words import room_name
-from codebotler.missions.log import Line
+from codebotler.core.words import brief, room_name
+from codebotler.missions.log import Line, Summary
 
 PAGE = "the page"  # as whoever presses STOP there is logged
+FIRST_CALLS = 2  # of a program, in the title of its mission
 
 
 def event_text(line: Line) -> str:
@@ -19,7 +22,9 @@ def event_text(line: Line) -> str:
 
 
 def activity(line: Line) -> str:
-    """What a robot is at while a skill is under way, such as `driving to supply room`."""
+    """What a robot is at during a skill or while the program sleeps, such as `driving to supply room`."""
+    if line["event"] == "sleep":
+        return f"waiting for {line['seconds']:g} s"
     skill = SKILLS.get(line["skill"])
     if skill is None or skill.verb is None:
         return f"executing {visible(line['skill'])}"
@@ -31,10 +36,25 @@ def activity(line: Line) -> str:
     return f'{skill.verb.ing} "{text}"' if skill.recording.is_spoken else f"{skill.verb.ing} {text}"
 
 
-def stop_text(by: str, doing: str) -> str:
+def stop_text(by: str, doing: str = "") -> str:
     """A stop in words, and what it interrupted, such as `driving to supply room`, if anything."""
     during = f" while {doing}" if doing else ""
     return f"stopped {'from' if by == PAGE else 'by'} {visible(by)}{during}"
+
+
+def title(summary: Summary) -> str:
+    """The instruction of a mission, or else the first skills that its program calls."""
+    if summary.instruction:
+        return summary.instruction
+    calls = [
+        node
+        for node in nodes(tree_of(summary.program))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in SKILLS
+    ]
+    calls.sort(key=lambda call: (call.lineno, call.col_offset))
+    shown = [brief(ast.get_source_segment(summary.program, call) or "") for call in calls[:FIRST_CALLS]]
+    more = ["…"] * (len(calls) > FIRST_CALLS)
+    return f"typed: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
 
 
 def call_text(skill: str, arguments: Sequence[str | Sequence[str]]) -> str:
@@ -79,7 +99,7 @@ EVENTS: Mapping[str, Callable[[Line], str]] = {
     "picture": lambda line: shortened(line.get("text") or f"picture: {line.get('file')}"),
     "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",
     "sleep": lambda line: f"waits for {line['seconds']:g} s",
-    "stop": lambda line: stop_text(line["by"], ""),
+    "stop": lambda line: stop_text(line["by"]),
     "cancelled": lambda _: "cancelled",
     "late": lambda _: "finished after the stop; nothing more will run",
     "log": lambda line: shortened(line["text"]),

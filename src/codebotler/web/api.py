@@ -215,6 +215,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
             "mission": view.id,
             "state": view.state,
             "reason": view.reason,
+            "has_begun": view.progress.has_begun,
             "is_over": view.is_over,
         }
 

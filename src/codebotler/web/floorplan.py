@@ -16,6 +16,7 @@ WIDE = 0.62
 """The width of a letter, in heights of a letter."""
 
 SMALLEST, LARGEST, SMALL = 0.2, 0.62, 0.44
+HALO = 0.62  # the radius around the robot, in metres
 MOST_LETTERS, MOST_FINDS = 60, 3
 
 
@@ -25,7 +26,7 @@ class MapState:
 
     Args:
         at: the robot's position in metres, if known.
-        room: where it is, or where it drives to.
+        room: where it is, or where it drives to; empty if that is not known, or it is in none.
         is_driving: whether it drives there.
         trail: the positions on its way so far.
         finds: by room, what was seen and who was asked there.
@@ -42,9 +43,9 @@ class MapState:
     @property
     def sentence(self) -> str:
         """The same in words."""
-        where = (
-            f"{'is driving to' if self.is_driving else 'is in'} {room_name(self.room)}" if self.room else ""
-        )
+        where = "is between rooms" if self.at else ""
+        if self.room:
+            where = f"{'is driving to' if self.is_driving else 'is in'} {room_name(self.room)}"
         holds = f" and is holding {self.held}" if self.held else ""
         parts = [f"The robot {where}{holds}." if where else "The robot's position is unknown."]
         parts += [f"Found in {room_name(room)}: {', '.join(names)}." for room, names in self.finds.items()]
@@ -73,7 +74,11 @@ def floorplan(world: World, state: MapState) -> str:
     if len(state.trail) > 1:
         parts.append(f'<polyline class="trail" points="{_joined(map(on_map, state.trail))}"/>')
     if state.at is not None:
-        parts += _robot(*on_map(state.at), state.held)
+        x, y = on_map(state.at)
+        parts.append(_robot(x, y))
+        if state.held:
+            held = f"holding {shortened(state.held, MOST_LETTERS)}"
+            parts.append(_text(x, y + HALO + 0.12, SMALL, held, "held"))
     about = escape(shortened(f"Map of {len(rooms)} rooms. {state.sentence}", 400))
     return (
         f'<svg class="floorplan" viewBox="0 0 {right - left:.2f} {high - low:.2f}" role="img" '
@@ -81,21 +86,37 @@ def floorplan(world: World, state: MapState) -> str:
     )
 
 
+def room_at(rooms: Iterable[Room], at: Point) -> str:
+    """The name of the room whose footprint a point is in; empty if there is none."""
+    return next((one.name for one in rooms if _is_within(at, one.footprint or ())), "")
+
+
+def _is_within(at: Point, corners: Sequence[Point]) -> bool:
+    """Whether a ray from a point to the right crosses an odd number of edges."""
+    x, y = at
+    edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
+    crossings = [
+        a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)
+    ]
+    return sum(crossing > x for crossing in crossings) % 2 == 1
+
+
 def _joined(points: Iterable[Point]) -> str:
     return " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
 
 
-def _robot(x: float, y: float, held: str) -> Iterator[str]:
-    yield f'<g class="robot"><circle class="halo" cx="{x:.2f}" cy="{y:.2f}" r=".62"/>'
-    yield f'<circle class="body" cx="{x:.2f}" cy="{y:.2f}" r=".34"/></g>'
-    if held:
-        yield _text(x, y + 0.36 + SMALL, SMALL, f"holding {shortened(held, MOST_LETTERS)}", "held")
+def _robot(x: float, y: float) -> str:
+    at = f'cx="{x:.2f}" cy="{y:.2f}"'
+    return f'<g class="robot"><circle class="halo" {at} r="{HALO}"/><circle class="body" {at} r=".34"/></g>'
 
 
 def _labels(
     room: Room, corners: Sequence[Point], on_map: Callable[[Point], Point], finds: Sequence[str]
 ) -> Iterator[str]:
-    """The name of a room at the side that is farther from where the robot stands, and finds at the other."""
+    """The name of a room at the side that is farther from where the robot stands.
+
+    Finds are beside the name if there is space before the robot, or else at the other side.
+    """
     top, bottom = min(y for _, y in corners), max(y for _, y in corners)
     left, right = min(x for x, _ in corners), max(x for x, _ in corners)
     middle, stands = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
@@ -107,10 +128,14 @@ def _labels(
         yield _text(middle, start + 1.15 * size * number, size, line, "name")
     met = [shortened(one, MOST_LETTERS) for one in finds[-MOST_FINDS:]]
     small = _size(met or [""], right - left, SMALL)
+    named, found = size * (1.15 * len(lines) + 0.35), small * 1.15 * len(met)
+    is_beside = max(stands - top, bottom - stands) - HALO >= named + found
+    if is_above:
+        first = top + named + 0.85 * small if is_beside else bottom - found + 0.65 * small
+    else:
+        first = bottom - named - found + 0.85 * small if is_beside else top + 1.2 * small
     for number, one in enumerate(met):
-        down = bottom - small * (1.15 * (len(met) - 1 - number) + 0.5)
-        up = top + small * (1.15 * number + 1.2)
-        yield _text(middle, down if is_above else up, small, one, "find")
+        yield _text(middle, first + 1.15 * small * number, small, one, "find")
 
 
 def _size(lines: Sequence[str], width: float, largest: float) -> float:

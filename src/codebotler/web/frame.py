@@ -90,6 +90,11 @@ def scroll_up() -> None:
     ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
 
 
+def scroll_to(element: str) -> None:
+    """Show the element with an ID from its beginning."""
+    ui.run_javascript(f"document.getElementById({element!r}).scrollIntoView()")
+
+
 def warn(sentence: str, seconds: float = 5.0) -> None:
     """Show a warning for some seconds."""
     ui.notify(visible_lines(sentence), type="warning", position="top", timeout=1000 * seconds)

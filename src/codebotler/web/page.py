@@ -44,6 +44,7 @@ def add(console: Console, frame: Frame) -> None:
             async for _ in console.notifier.changes():
                 with box:
                     show()
+                await instruction.follow(console.view)
                 await asyncio.sleep(PAUSE)
 
         following = background_tasks.create(follow())

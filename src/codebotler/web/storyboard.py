@@ -20,6 +20,7 @@ from codebotler.web.frame import PlainText
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
 VERBS = SKILLS.verbs
 SPOKEN = frozenset({*(kind for kind, one in SKILLS.recordings.items() if one.is_spoken), "answer"})
+NO_ANSWER = "no answer"
 LEFT_OUT = "…"  # instead of a room, where steps are left out
 PLAIN = re.compile(r"[\w' -]+")
 """Names of rooms that need no quotes; others could be read as part of the sentence."""
@@ -56,13 +57,15 @@ class Strip:
 
 @dataclass(frozen=True)
 class Reached:
-    """How far a robot has come: the rooms that it has visited, and what it looked for and found or not."""
+    """How far a robot has come."""
 
-    visited: tuple[str, ...] = ()
-    looks: tuple[tuple[str, bool], ...] = ()
+    visited: tuple[str, ...] = ()  # rooms
+    looks: tuple[tuple[str, bool], ...] = ()  # what it looked for, and whether it was found
+    answers: tuple[str | None, ...] = ()  # to its questions; None where one failed
 
 
 NOWHERE = Reached()
+NONE_FITS = "What happened fits none of the imagined worlds; they are only examples."
 
 
 def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
@@ -73,6 +76,8 @@ def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
+    if shown and all(number is None for number in numbers):
+        PlainText("p", NONE_FITS, "quiet unsure")
     for strip, number_reached, is_folded in zip(shown, numbers, folded(numbers), strict=True):
         with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:
@@ -91,10 +96,9 @@ def folded(numbers: Sequence[int | None]) -> list[bool]:
 
 
 def scenes_reached(strip: Strip, reached: Reached) -> int | None:
-    """How many drives of a strip the robot has made; None if it went or found something else."""
-    seen = [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind == "check"]
+    """How many drives of a strip the robot has made; None if it went, found or heard something else."""
     is_whole = all(scene.room != LEFT_OUT for scene in strip.scenes)
-    if is_whole and seen[: len(reached.looks)] != [look_text(*look) for look in reached.looks]:
+    if is_whole and not (_has_seen(strip, reached.looks) and _has_heard(strip, reached.answers)):
         return None
     for number, room in enumerate(reached.visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
@@ -103,6 +107,21 @@ def scenes_reached(strip: Strip, reached: Reached) -> int | None:
         if scene is None or scene.room != shortened(room, MOST_TEXT):
             return None
     return len(reached.visited)
+
+
+def _has_seen(strip: Strip, looks: Sequence[tuple[str, bool]]) -> bool:
+    return _texts(strip, "check")[: len(looks)] == [look_text(*look) for look in looks]
+
+
+def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
+    """Robots that hear people may return an option in another case and with blanks around it."""
+    heard = [NO_ANSWER if answer is None else shortened(answer, MOST_TEXT) for answer in answers]
+    told = _texts(strip, "answer")[: len(answers)]
+    return [text.strip().casefold() for text in told] == [text.strip().casefold() for text in heard]
+
+
+def _texts(strip: Strip, kind: str) -> list[str]:
+    return [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind == kind]
 
 
 def draw_scene(
@@ -179,7 +198,7 @@ def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
     kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
     verb = VERBS[kind].third if kind in VERBS else shortened(kind)
     if "answer" in step:
-        heard = "no answer" if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
+        heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
         return (Deed(kind, text, number), Deed("answer", heard))
     if kind in SPOKEN:
         return (Deed(kind, text, number),)

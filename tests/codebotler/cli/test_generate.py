@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import command_line
-from codebotler.models.recorded import NOTICE
+from codebotler.models.recorded import NOTICE, recorded_model
+from codebotler.robots.simulated import OFFICE
 from command_line import Ended, Refusal, command, process
 from roboeval.suites.load import Suite
 from server import Fault, Request, Server
@@ -63,10 +64,22 @@ def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, p
 
 
 def test_an_instruction_that_nobody_recorded() -> None:
-    refusal = refused("Bring me the moon.", lines=2)
+    refusal = refused("Bring me the moon.", lines=5)
     assert "recorded:careful" in refusal.sentence
     assert '"Bring me the moon."' in refusal.sentence
     assert "\nfor other instructions, " in refusal.sentence
+
+
+def test_instructions_that_are_offered_instead_are_whole_and_fit_the_world(tmp_path: Path) -> None:
+    office = tmp_path / "office.yaml"
+    office.write_text(OFFICE.read_text())
+    refusal = refused("Go to the lobby, and tell me how many people are there.", "--world", office, lines=5)
+    _, *offered, _ = refusal.sentence.splitlines()
+    known = recorded_model("recorded").replies
+    assert {text.strip() for text in offered} <= known.keys()
+    assert not any("lobby" in text.lower() for text in offered)
+    (tmp_path / "hall.yaml").write_text("robot: hall\nrooms: [hall]\n")
+    assert len(refused("Go.", "--world", tmp_path / "hall.yaml", lines=2).sentence.splitlines()) == 2
 
 
 @pytest.mark.parametrize("instruction", ["", "  \n"])

@@ -186,14 +186,31 @@ def test_what_cannot_be_run_is_said_in_a_sentence(
 ) -> None:
     status, out, err = run(folder, *arguments)
     assert (status, out) == (2, "")
-    assert err.count("\n") == 1 + ("\nfor other" in err)
+    offered = err.count("\n  ")
+    assert err.count("\n") == 1 + offered + ("\nfor other" in err)
     assert all(name in err for name in named), err
     assert "running" not in states(folder)
 
 
-def test_simulated_robot_needs_a_world(folder: Path) -> None:
-    status, _, err = ended(folder, "run", "good.py", "--yes")
-    assert (status, "--world FILE" in err) == (2, True)
+def test_without_a_world_the_robot_works_in_the_office_of_the_examples(folder: Path) -> None:
+    (folder / "tea.py").write_text('def task_program():\n    go_to("alice\'s office")\n')
+    status, out, err = ended(folder, "run", "tea.py", "--yes", "--speed", "0")
+    assert (status, "example office" in err, "--world FILE" in err) == (0, True, True)
+    assert 'drives to "alice\'s office"' in out
+
+
+def test_one_course_is_shown_or_all_of_them(folder: Path) -> None:
+    one = run(folder, "good.py", "--yes")[1].partition("running on")[0]
+    assert one.count("what the robot would do") == 1
+    assert "1 of 2 different courses; --all" in one
+    both = run(folder, "good.py", "--yes", "--all")[1].partition("running on")[0]
+    assert [both.count('"mug": found'), both.count('"mug": not found')] == [1, 1]
+    assert "--all" not in both
+
+
+def test_a_typed_program_is_listed_by_its_first_skills(folder: Path) -> None:
+    run(folder, "good.py", "--yes")
+    assert 'typed: go_to("kitchen"), is_in_room("mug"), …' in ended(folder, "missions")[1]
 
 
 def test_feedback_comes_while_the_robot_drives(folder: Path) -> None:

@@ -18,14 +18,17 @@ from codebotler.core.world import Room, World
 from codebotler.missions import log as mission_log
 from codebotler.missions.log import Line, State, Summary
 from codebotler.missions.mission import Mission, MissionError
+from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.recorded import recorded_model
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Result, Robot
-from codebotler.robots.simulated import Simulated
+from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import MOST_PROGRAM, Console
+from codebotler.web.panes.instruction import examples
 from doubles import Answering
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -113,6 +116,34 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
         "author",
         "say hello in the kitchen",
     )
+
+
+def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> None:
+    world, model = World.read(OFFICE), recorded_model("recorded")
+    robot = Simulated(world, speed=None)
+    with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
+        assert len(examples(console)) >= 3
+        for instruction in known_instructions(RoomMap.of(world)):
+            console.begin(Order(instruction))
+            view = until(console, lambda view: view.check is not None)
+            assert console.session is not None
+            console.session.approve(view.digest, despite_problems=True)
+            ended = until(console, lambda view: view.is_over)
+            assert (ended.state, ended.reason) == (State.DONE, ""), instruction
+
+
+def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: Path) -> None:
+    office, model = World.read(OFFICE), recorded_model("recorded")
+    for world, count in ((office, 3), (WORLD, 0)):
+        robot = Simulated(world, speed=None)
+        with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
+            console.begin(Order("Go to the lobby, and tell me how many people are there."))
+            view = until(console, lambda view: view.is_over)
+            known = view.known
+            assert known is not None
+            assert view.reason == view.trouble == "recorded:careful has no program for this instruction"
+            assert len(known) == count
+            assert set(known) <= set(known_instructions(RoomMap.of(world)))
 
 
 def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Path) -> None:

@@ -10,10 +10,15 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
+from codebotler.missions.log import State, Summary
 from codebotler.missions.progress import MOST, MOST_STEPS, Find, Moment, Progress, line_of
-from codebotler.simulator.sampled_robot import Fact, GivenAnswer, Whereabouts
-from codebotler.web.floorplan import MOST_ROOMS, MapState, floorplan
+from codebotler.missions.view import SessionView
+from codebotler.missions.wording import title
+from codebotler.robots.simulated import OFFICE
+from codebotler.simulator.sampled_robot import Fact, GivenAnswer, RoomMap, Whereabouts
+from codebotler.web.floorplan import HALO, MOST_ROOMS, MapState, floorplan
 from codebotler.web.panes.past_missions import timeline
+from codebotler.web.panes.robot import map_state
 from codebotler.web.storyboard import (
     LEFT_OUT,
     MOST_STRIPS,
@@ -119,6 +124,56 @@ def test_where_the_robot_was_what_it_met_and_what_it_holds() -> None:
     assert after(call("go_to", location="attic"), failed).visited == ()
 
 
+def test_a_robot_that_was_stopped_on_its_way_is_where_its_dot_is() -> None:
+    world = World.read(OFFICE)
+
+    def shown(*lines: dict[str, Any]) -> MapState:
+        rooms = RoomMap.of(world)
+        return map_state(SessionView(room_map=rooms, progress=after(*lines)), world)
+
+    first = [call("go_to", location="printer room 2"), line("feedback", text="at (7.0, 3.0)"), done("go_to")]
+    second = [call("go_to", location="printer room 3"), line("feedback", text="at (8.5, 3.0)")]
+    cancelled = line("cancelled", number=2, skill="go_to")
+    assert shown(*first).room == "printer room 2"
+    assert shown(*first, *second).is_driving
+    assert shown(*first, *second).room == "printer room 3"
+    stopped = shown(*first, *second, cancelled)
+    assert (stopped.at, stopped.room, stopped.is_driving) == ((8.5, 3.0), "printer room 2", False)
+    between = shown(*first, *second, line("feedback", text="at (9.5, 3.0)"), cancelled)
+    assert (between.room, between.sentence) == ("", "The robot is between rooms.")
+    lost = shown(call("go_to", location="printer room 2"), cancelled)
+    assert (lost.at, lost.room) == (None, "")
+    failed = line("error", number=2, skill="go_to", kind="E", message="m")
+    assert shown(*first, call("go_to", location="supply room"), failed).room == "printer room 2"
+    seen = [call("is_in_room", entity="mug"), done("is_in_room", result=True)]
+    finds = after(*first, call("go_to", location="supply room"), failed, *seen).finds
+    assert finds == (Find("printer room 2", "mug"),)
+
+
+def test_a_program_that_sleeps_is_said_to_wait() -> None:
+    program = "def task_program():\n    say('a')\n    time.sleep(30)\n"
+    sleep = line("sleep", seconds=30.0)
+    now = Progress().after(sleep, program)
+    assert (now.doing, now.line) == ("waits for 30 s", 3)
+    assert now.after(line("stop", by="x"), program).moments[-1].text == "stopped by x while waiting for 30 s"
+    assert [text for _, text in timeline([sleep, line("stop", by="x")])][-1].endswith(
+        "while waiting for 30 s"
+    )
+
+
+def test_the_clock_stands_when_the_robot_has_stopped() -> None:
+    stop, running = line("stop", 19.8, by="x"), line("state", 0.0, state="running")
+    assert after(running, stop, line("state", 20.7, state="stopped")).clock == 19.8
+    assert after(running, line("sleep", 1.0, seconds=9.0), line("state", 10.0, state="done")).clock == 10.0
+    assert [
+        after(*lines).has_begun for lines in ((), (line("state", state="checked"),), (running, stop))
+    ] == [
+        False,
+        False,
+        True,
+    ]
+
+
 def test_a_stop_is_one_event_with_what_it_interrupted() -> None:
     drive, cancelled = call("go_to", location="supply room"), line("cancelled", number=1, skill="go_to")
     for events in (
@@ -194,6 +249,17 @@ def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
     assert told in floorplan(World((Room("start_loc"),), "start_loc"), state)
 
 
+def test_what_was_found_in_a_large_room_is_clear_of_the_robot() -> None:
+    world = World.read(OFFICE)
+    at, room = (7.0, 3.0), "printer room 2"
+    drawn = floorplan(world, MapState(at, room, trail=(at, at), finds={room: ["stapler"]}, held="paper"))
+    (robot,) = re.findall(r'class="body"[^>]* cy="([\d.]+)"', drawn)
+    (find,) = re.findall(r'<text class="find"[^>]* y="([\d.]+)"', drawn)
+    (held,) = re.findall(r'<text class="held"[^>]* y="([\d.]+)"', drawn)
+    names = [float(y) for y in re.findall(r'<text class="name"[^>]* y="([\d.]+)"[^>]*>printer<', drawn)]
+    assert float(robot) + HALO < float(held) < float(find) - 0.3 < min(names) - 0.3
+
+
 def test_strips_show_each_kind_of_world_once() -> None:
     program = """def task_program():
     go_to("kitchen")
@@ -244,6 +310,40 @@ def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> Non
         possible = [one for one in shown if scenes_reached(one, Reached(("kitchen",), (("mug", found),)))]
         said[found] = [one.scenes[-1].deeds[-1].text for one in possible]
     assert said == {True: ["yes"], False: ["no"]}
+
+
+def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> None:
+    program = "def task_program():\n    go_to('kitchen')\n    ask('ann', 'Tea?', ['Yes', 'No'])\n"
+    shown = strips(check(program, rooms=["hall", "kitchen"], samples=20))
+    answers = [one.scenes[-1].deeds[-1].text for one in shown]
+    assert sorted(answers) == ["No", "Yes"]
+
+    def possible(*heard: str | None) -> list[str]:
+        reached = Reached(("kitchen",), answers=heard)
+        return [a for a, one in zip(answers, shown, strict=True) if scenes_reached(one, reached) is not None]
+
+    assert sorted(possible()) == ["No", "Yes"]
+    assert possible(" yes") == ["Yes"]
+    assert possible(None) == []
+    asked = call("ask", person="ann", question="Tea?", options=["Yes", "No"])
+    assert after(asked, done("ask", result="No")).answers == ("No",)
+    assert after(asked, line("error", number=1, skill="ask", kind="E", message="m")).answers == (None,)
+
+
+@pytest.mark.parametrize(
+    ("program", "told"),
+    [
+        (
+            "def task_program():\n  say('a ' + ask('', 'b', ['c']))\n",
+            "typed: say('a ' + ask('', 'b', ['c'])), ask('', 'b', ['c'])",
+        ),
+        ("def task_program():\n  go_to(\"x\")\n  say('y')\n  say('z')\n", "typed: go_to(\"x\"), say('y'), …"),
+        ("def task_program(:\n", "a program without an instruction"),
+    ],
+)
+def test_a_typed_program_is_named_by_its_first_skills(program: str, told: str) -> None:
+    assert title(Summary("id", State.DONE, "simulated", 0.0, program=program)) == told
+    assert title(Summary("id", State.DONE, "simulated", 0.0, "Do it.", program=program)) == "Do it."
 
 
 def there(name: str, room: str, *, found: bool = True) -> Fact:

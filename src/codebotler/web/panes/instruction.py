@@ -6,21 +6,25 @@ import asyncio
 
 from nicegui import html, ui
 
-from codebotler.checking.room_names import named_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.program import called_skills, tree_of
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.log import Summary
 from codebotler.missions.mission import MissionError
-from codebotler.missions.preflight import unknown_rooms
+from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView
-from codebotler.models.recorded import is_recorded, recorded_model
+from codebotler.models.recorded import is_recorded
+from codebotler.models.usable import SETUP
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
 
-UNKNOWN = "There is no recorded program for this instruction. Choose an instruction below, or another model."
+UNKNOWN = "There is no recorded program for this instruction."
+NO_MODEL = (
+    f"For other instructions, {SETUP}, and add --model NAME to codebotler serve; "
+    "codebotler models lists the names."
+)
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 ABOUT_RECORDED = (
     "This is not a language model: its programs were written by people, so you can try everything without an "
@@ -36,6 +40,7 @@ class InstructionPane:
         self._number = -1
         self._asked = ""
         self._suggested: tuple[str, ...] = ()
+        self._ended = ""
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
             PlainText("h2", "Instruct").props("id=h-instruct")
             self._text = (
@@ -60,14 +65,25 @@ class InstructionPane:
 
     async def load(self) -> None:
         """Add the examples and the recent instructions, which are read from files."""
-        examples = await asyncio.to_thread(_examples, self._console)
-        before = await asyncio.to_thread(_before, self._console)
-        if self._examples.is_deleted:  # the page was closed meanwhile
-            return
-        if examples:
-            self._fill(self._examples, "Examples", [(text, "") for text in examples])
-        if before:
-            self._fill(self._before, "Recent", [(summary.instruction, summary.state) for summary in before])
+        shown = await asyncio.to_thread(examples, self._console)
+        if not self._examples.is_deleted:  # else the page was closed meanwhile
+            self._fill(self._examples, "Examples", [(text, "") for text in shown])
+        await self._load_recent()
+
+    async def follow(self, view: SessionView) -> None:
+        """Read the recent instructions again once a mission has ended."""
+        if view.is_over and view.id != self._ended:
+            self._ended = view.id
+            await self._load_recent()
+
+    async def _load_recent(self) -> None:
+        recent = await asyncio.to_thread(_recent, self._console)
+        if not self._before.is_deleted:
+            self._fill(
+                self._before,
+                "Recent",
+                [(one.instruction, one.state if one.has_ended else "") for one in recent],
+            )
 
     def show(self, view: SessionView) -> None:
         """Show a view."""
@@ -78,8 +94,8 @@ class InstructionPane:
             self._asked = visible_lines(view.instruction)
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
-        self._trouble.say(UNKNOWN if view.known else view.trouble)
-        self._suggest(view.known)
+        self._trouble.say(view.trouble if view.known is None else self._unknown(view.known))
+        self._suggest(view.known or ())
 
     def _ask(self) -> None:
         try:
@@ -92,18 +108,21 @@ class InstructionPane:
     def _about_model(self) -> None:
         self._about.set_visibility(is_recorded(str(self._model.value)))
 
+    def _unknown(self, known: tuple[str, ...]) -> str:
+        choose = "Choose one below. " if known else ""
+        has_other = not all(map(is_recorded, self._console.models))
+        return f"{UNKNOWN} {choose}{'You can also choose another model.' if has_other else NO_MODEL}"
+
     def _suggest(self, known: tuple[str, ...]) -> None:
-        """Offer known instructions that are alike, and fit the rooms that are there."""
-        if known == self._suggested:
-            return
-        self._suggested = known
-        self._alike.clear()
-        fitting = [text for text in known if _fits(text, self._console)]
-        if fitting:
-            self._fill(self._alike, "Similar instructions", [(text, "") for text in fitting])
+        """Offer instructions that are alike."""
+        if known != self._suggested:
+            self._suggested = known
+            self._fill(self._alike, "Similar instructions", [(text, "") for text in known])
 
     def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
         where.clear()
+        if not texts:
+            return
         with where:
             PlainText("h3", title)
             for text, state in texts:
@@ -114,29 +133,20 @@ class InstructionPane:
 
     def _take(self, text: str) -> None:
         self._text.value = visible_lines(text)
-        scroll_up()
+        scroll_to("h-instruct")
 
 
-def _examples(console: Console) -> list[str]:
+def examples(console: Console) -> list[str]:
     """Short instructions that the recorded model knows, of different kinds, for rooms that are there."""
+    room_map = None if console.world is None else RoomMap.of(console.world)
+    known = known_instructions(room_map)
     found: dict[frozenset[str], str] = {}
-    for instruction, replies in sorted(
-        recorded_model("recorded:careful").replies.items(), key=lambda known: len(known[0])
-    ):
-        if _fits(instruction, console):
-            found.setdefault(frozenset(called_skills(tree_of(replies[0].program))), instruction)
+    for instruction in sorted(known, key=len):
+        found.setdefault(frozenset(called_skills(tree_of(known[instruction]))), instruction)
     return list(found.values())[:MOST_EXAMPLES]
 
 
-def _fits(instruction: str, console: Console) -> bool:
-    """Whether the rooms of a recorded program are there."""
-    program = recorded_model("recorded:careful").replies[instruction][0].program
-    if console.world is None:
-        return True
-    return bool(named_rooms(tree_of(program))) and not unknown_rooms(program, RoomMap.of(console.world))
-
-
-def _before(console: Console) -> list[Summary]:
+def _recent(console: Console) -> list[Summary]:
     """The last different instructions."""
     try:
         known = missions(console.home)

@@ -13,7 +13,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
 from codebotler.missions.log import SKILL_ENDS, Line, State, Summary, events_of
 from codebotler.missions.store import find, missions
-from codebotler.missions.wording import activity, event_text, stop_text
+from codebotler.missions.wording import activity, event_text, stop_text, title
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText
 
@@ -46,7 +46,7 @@ def add(console: Console, frame: Frame) -> None:
 
     @ui.page("/missions/{mission}")
     async def one(mission: str) -> None:
-        frame("Mission", "")
+        frame("Mission", "/missions")
         with ui.element("div").classes("past"):
             try:
                 summary, events = await asyncio.to_thread(_read, console, mission)
@@ -61,7 +61,7 @@ def timeline(events: Sequence[Line]) -> Iterator[tuple[Line, str]]:
     doing, is_stopped = "", False
     for number, line in enumerate(events):
         event = line["event"]
-        if event == "skill":
+        if event == "skill" or (event == "sleep" and line["seconds"]):
             doing = activity(line)
         elif event in SKILL_ENDS and event != "cancelled":
             doing = ""
@@ -100,13 +100,13 @@ def _read(console: Console, mission: str) -> tuple[Summary, list[Line]]:
 def _row(summary: Summary) -> None:
     with ui.element("li"), html.a(href=f"/missions/{summary.id}"):
         PlainText("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
-        PlainText("span", shortened(summary.instruction or "a program without an instruction", 160), "text")
+        PlainText("span", shortened(title(summary), 160), "text")
         PlainText("small", summary.state, f"state state-{summary.state}")
 
 
 def _show(summary: Summary, events: list[Line]) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
-    PlainText("h1", shortened(summary.instruction, 300) or "A program without an instruction")
+    PlainText("h1", shortened(title(summary), 300))
     with ui.element("p").classes("facts"):
         PlainText("small", summary.state, f"state state-{summary.state}")
         by_hand = " · program typed or changed by hand" if summary.program else ""

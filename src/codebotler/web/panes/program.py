@@ -50,9 +50,9 @@ class ProgramPane:
             self._editor.on("update:value", js_handler="() => programEditor.typed()")
             self._verdict = PlainText("p", "", "verdict").props("role=status")
             self._problems = ui.element("ul").classes("problems")
+            self._instruction = PlainText("p", "")
             self._approval = ui.element("div").classes("word")
             with self._approval:
-                self._instruction = PlainText("p", "", "instruction")
                 self._despite = ui.checkbox("Run it despite the problems", on_change=self._ticked)
                 self._run = Button("Run it on the robot", self._approve, "go")
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
@@ -69,6 +69,7 @@ class ProgramPane:
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
         self._writer.say(_written_by(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
+        self._instruction.say(_made_for(view) if view.program else "")
         self._show_approval(view)
         reached = reached_in(view)
         drawn = (view.check, view.problems, view.unknown_rooms, shown, reached)
@@ -128,12 +129,11 @@ class ProgramPane:
         may_again = view.may_be_asked_again
         self._approval.set_visibility(open_ or self._may_rerun(view))
         self._despite.set_visibility(open_ and bool(view.problems) and view.can_run)
-        self._instruction.say(f"Instruction: {shortened(view.instruction, 400)}" if view.instruction else "")
         if not view.problems:
             self._despite.value = False
         self._repair.set_visibility(may_again and bool(view.problems))
         self._again_button.set_visibility(may_again)
-        self._run.text = "Run again" if self._may_rerun(view) else "Run it on the robot"
+        self._run.text = "Prepare it again" if self._may_rerun(view) else "Run it on the robot"
         self._ticked()
 
     def _may_rerun(self, view: SessionView) -> bool:
@@ -200,7 +200,7 @@ def reached_in(view: SessionView) -> Reached:
     if not named:
         return Reached()
     visited = tuple(named.room(words) or words for words in view.progress.visited)
-    return Reached(visited, view.progress.looks)
+    return Reached(visited, view.progress.looks, view.progress.answers)
 
 
 def _written_by(view: SessionView) -> str:
@@ -209,6 +209,12 @@ def _written_by(view: SessionView) -> str:
     if is_recorded(view.author):
         return "Recorded program, no language model."
     return f"Written by {view.author}."
+
+
+def _made_for(view: SessionView) -> str:
+    if view.instruction:
+        return f"Instruction: {shortened(view.instruction, 400)}"
+    return "A program of your own, without an instruction."
 
 
 def _for_editor(program: str) -> str:
@@ -250,6 +256,6 @@ def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
             continue
         end = sum(len(line) + 1 for line in lines[: problem.line]) - 1
         marks.append({"kind": "line", "line": problem.line, "class": "problem-line"})
-        words = f"  ◂ {shortened(problem.message, 160)}"
+        words = shortened(problem.message, 160)
         marks.append({"kind": "widget", "position": end, "text": words, "class": "problem-words"})
     return marks

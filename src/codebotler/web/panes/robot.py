@@ -14,7 +14,7 @@ from codebotler.missions.log import State, Summary
 from codebotler.missions.progress import ANSWER, Moment
 from codebotler.missions.view import Phase, SessionView
 from codebotler.web.console import Console
-from codebotler.web.floorplan import MapState, floorplan
+from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText
 from codebotler.web.panes.question import QuestionPane
 
@@ -117,7 +117,7 @@ class RobotPane:
 
 def map_state(view: SessionView, world: World) -> MapState:
     """What the map shows of a view; rooms in the program's words become those of the world."""
-    progress = view.progress
+    progress, rooms = view.progress, laid_out(world).rooms
 
     def room_of(words: str) -> str:
         return (view.room_map.room(words) if view.room_map and words else None) or world.robot
@@ -125,5 +125,10 @@ def map_state(view: SessionView, world: World) -> MapState:
     room, finds = room_of(progress.room), defaultdict[str, list[str]](list)
     for find in progress.finds:
         finds[room_of(find.room)].append(find.name)
-    at = progress.at or next((one.stand_at for one in laid_out(world).rooms if one.name == room), None)
+    at = progress.at
+    if progress.is_between and not progress.is_driving:
+        room = room_at(rooms, at) if at else ""
+    elif at is None:
+        stands_in = room_of(progress.left) if progress.is_driving else room
+        at = next((one.stand_at for one in rooms if one.name == stands_in), None)
     return MapState(at, room, progress.is_driving, progress.trail, dict(finds), progress.held)

@@ -2,6 +2,12 @@
 globalThis.programEditor = (() => {
   const PAUSE = 300; // milliseconds without a key, after which what was typed is sent
   const MOST = 200_000; // characters; the tool takes no more, and tells so
+  const PLACEHOLDER = `Or type a program, such as
+
+def task_program():
+    for room in get_all_rooms():
+        go_to(room)
+        say("Hello")`;
   let editor; // NiceGUI's component, once it is there
   let latest; // what the tool said last
   let sent = 0; // how many texts were sent
@@ -70,6 +76,7 @@ globalThis.programEditor = (() => {
     colour();
     // What people need who see no screen, or use no mouse, and CodeMirror does not offer.
     editor.$el.querySelector(".cm-content").setAttribute("aria-label", "Program");
+    editor.$el.querySelector(".cm-content").setAttribute("aria-placeholder", PLACEHOLDER);
     editor.$el.querySelector(".cm-scroller").setAttribute("tabindex", "0");
     if (latest) apply();
     editor.$el.setAttribute("data-started", "");

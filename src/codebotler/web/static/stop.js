@@ -4,6 +4,7 @@
   const told = document.getElementById("stop-told");
   const { stop: stopAt = "/api/stop", robot: robotAt = "/api/robot" } = document.currentScript.dataset;
   const LOST = "CodeBotler is not responding. Use the robot's emergency stop.";
+  const DISCARDED = "Discarded; the robot had not moved.";
   const ENDS = {
     stopped: "The robot has stopped.",
     done: "The mission had already ended.",
@@ -22,7 +23,9 @@
       const now = await (await fetch(`${robotAt}?once_over=true`)).json();
       if (which !== pressed) return;
       if (now.is_over) {
-        const text = ENDS[now.state] ?? (now.reason ? `The mission failed: ${now.reason}` : "The mission failed.");
+        const failed = now.reason ? `The mission failed: ${now.reason}` : "The mission failed.";
+        const isDiscarded = now.state === "stopped" && now.has_begun === false;
+        const text = isDiscarded ? DISCARDED : (ENDS[now.state] ?? failed);
         say(text, now.state === "failed" ? "bad" : "good");
         return;
       }
