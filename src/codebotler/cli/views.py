@@ -30,6 +30,7 @@ EVENT_STYLES: Mapping[str, str] = {
     "feedback": "dim",
     "picture": "dim",
     "error": "red",
+    "rule": "yellow",
     "stop": "yellow",
     "cancelled": "yellow",
     "late": "yellow",

@@ -91,6 +91,17 @@ def _result(line: Line) -> str:
             return f"→ {shortened(room_name(str(result)))}"
 
 
+def _rule(line: Line) -> str:
+    """A rule that was enforced, broken, or not kept at the end."""
+    rule = f'the rule "{visible(str(line["rule"]))}": {shortened(str(line["says"]))}'
+    if "what" not in line:
+        return f"not kept: {rule}"
+    kind, text = line["what"][:2]
+    doing = SKILLS.verbs[kind].ing if kind in SKILLS.verbs else visible(str(kind))
+    what = f'{doing} "{shortened(room_name(text) if kind == "goto" else text)}"'
+    return f"kept from {what} by {rule}" if line.get("prevented") else f"{what} broke {rule}"
+
+
 EVENTS: Mapping[str, Callable[[Line], str]] = {
     "skill": _skill,
     "result": _result,
@@ -99,6 +110,7 @@ EVENTS: Mapping[str, Callable[[Line], str]] = {
     "picture": lambda line: shortened(line.get("text") or f"picture: {line.get('file')}"),
     "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",
     "sleep": lambda line: f"waits for {line['seconds']:g} s",
+    "rule": _rule,
     "stop": lambda line: stop_text(line["by"]),
     "cancelled": lambda _: "cancelled",
     "late": lambda _: "finished after the stop; nothing more will run",

@@ -192,9 +192,9 @@ def _add_events(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program, in the rooms of the current mission if there is one."""
+        """Check a program by the rules of the house, in the rooms of the current mission if there is one."""
         with _refusing():
-            return console.check(new.program, console.view.room_map).data()
+            return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])
     async def robot(
@@ -253,6 +253,7 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "problems": list(view.problems),
         "unknown_rooms": list(view.unknown_rooms),
         "remarks": list(view.remarks),
+        "rules": [{"name": r.name, "says": r.says, "in_force": r.name not in view.off} for r in view.rules],
         "check": None if view.check is None else view.check.data(),
         "reason": view.reason,
         "line": view.line,

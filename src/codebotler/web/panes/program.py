@@ -21,6 +21,7 @@ from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
+from codebotler.web.panes.rules import RulesPane
 from codebotler.web.storyboard import Reached, draw_strips
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
@@ -50,6 +51,7 @@ class ProgramPane:
             self._editor.on("update:value", js_handler="() => programEditor.typed()")
             self._verdict = PlainText("p", "", "verdict").props("role=status")
             self._problems = ui.element("ul").classes("problems")
+            self._rules = RulesPane(console)
             self._instruction = PlainText("p", "")
             self._approval = ui.element("div").classes("word")
             with self._approval:
@@ -70,6 +72,7 @@ class ProgramPane:
         self._writer.say(_written_by(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
         self._instruction.say(_made_for(view) if view.program else "")
+        self._rules.show(view)
         self._show_approval(view)
         reached = reached_in(view)
         drawn = (view.check, view.problems, view.unknown_rooms, shown, reached)

@@ -1,0 +1,70 @@
+"""The rules of the house that count in a mission, and how a person switches one off."""
+
+from __future__ import annotations
+
+import asyncio
+
+from nicegui import ui
+
+from codebotler.core.terminal import shortened
+from codebotler.missions.mission import MissionError
+from codebotler.missions.view import SessionView
+from codebotler.simulator.guard import Rule
+from codebotler.web.console import Console
+from codebotler.web.frame import Button, PlainText, warn
+
+MOST_RULES, MOST_TEXT, MOST_REASON = 100, 300, 500
+
+
+class RulesPane:
+    """Lists the rules; nothing where there are none."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._drawn: tuple[object, ...] = ()
+        self._box = ui.element("div").classes("house-rules")
+        self._box.set_visibility(bool(console.rules))
+
+    def show(self, view: SessionView) -> None:
+        """Show which rules count in the mission at hand."""
+        drawn = (view.off, view.may_be_approved)
+        if self._console.rules and drawn != self._drawn:
+            self._drawn = drawn
+            self._box.clear()
+            with self._box:
+                self._draw(view)
+
+    def _draw(self, view: SessionView) -> None:
+        PlainText("h3", "Rules of the house")
+        with ui.element("ul"):
+            for rule in self._console.rules[:MOST_RULES]:
+                is_off = rule.name in view.off
+                with ui.element("li").classes("off" if is_off else ""):
+                    PlainText("span", shortened(rule.says, MOST_TEXT))
+                    if is_off:
+                        PlainText("small", "switched off in this mission", "quiet")
+                    elif view.may_be_approved:
+                        off = Button("Switch off …", lambda rule=rule: self._ask_why(rule), "plain small")
+                        off.props(f'aria-label="Switch off the rule {rule.name} in this mission"')
+
+    def _ask_why(self, rule: Rule) -> None:
+        """Have the person say why the rule does not count in this mission."""
+        with ui.dialog() as dialog, ui.card().classes("pane"):
+            PlainText("h3", f'Switch off "{shortened(rule.says, MOST_TEXT)}" in this mission?')
+            PlainText("p", "The robot may break it until this mission ends. The reason is logged.", "quiet")
+            reason = ui.input("Why?").props(f"outlined autofocus maxlength={MOST_REASON}").classes("why")
+
+            async def switch_off() -> None:
+                session = self._console.session
+                try:
+                    if session is not None:
+                        await asyncio.to_thread(session.switch_off, rule.name, reason.value or "")
+                    dialog.close()
+                except MissionError as error:
+                    warn(error.sentence)
+
+            with ui.element("div").classes("word"):
+                Button("Switch it off", switch_off, "risky go")
+                Button("Keep it", dialog.close, "plain")
+        dialog.on("hide", dialog.delete)
+        dialog.open()
