@@ -1,0 +1,76 @@
+"""House rules on the page: what a person sees of them, and how one is switched off for one mission."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from playwright.sync_api import expect
+
+from pageserver import PageServer
+from test_operate import checked, write
+from viewing import PHONE, OpenPage, until
+
+RULES = """
+rules:
+  - name: study
+    says: Never go into the study.
+    always: not tr.Exists(goto("study"))
+  - name: carry
+    says: Carry no mug out of the kitchen.
+    always: not tr.Exists(holding("mug", goto(without("kitchen"))))
+"""
+VISIT = "def task_program():\n    go_to('study')\n    say('hello')\n"
+SLY = "def task_program():\n    go_to('kitchen')\n    while True:\n        try: go_to('study')\n        except BaseException: say('again')\n"
+
+
+def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path, opened: OpenPage) -> None:
+    (tmp_path / "rules.yaml").write_text(RULES)
+    with PageServer(tmp_path, "--speed", "40", "--rules", "rules.yaml") as server:
+        page = opened(server)
+        expect(page.locator(".house-rules li")).to_have_text(
+            ["Never go into the study.", "Carry no mug out of the kitchen."]
+        )
+        write(page, SLY)
+        expect(page.get_by_text("1 problem. The robot should not run this.")).to_be_visible()
+        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids this')
+        page.get_by_text("Run it despite the problems").click()
+        page.get_by_role("button", name="Run it on the robot").click()
+        expect(page.locator(".headline")).to_have_text("Stopped")
+        expect(page.locator(".reason")).to_have_text("stopped by rule study")
+        expect(page.locator(".moment-rule")).to_contain_text('kept from going to "study" by the rule "study"')
+        expect(page.locator(".moment-say")).to_have_count(0)
+
+        write(page, VISIT)
+        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids this')
+        page.get_by_role("button", name="Switch off the rule study in this mission").click()
+        page.get_by_role("button", name="Switch it off").click()
+        expect(page.get_by_text("say why the rule does not count")).to_be_visible()
+        page.get_by_label("Why?").fill("Ann has asked for a visit")
+        page.get_by_role("button", name="Switch it off").click()
+        expect(page.locator(".house-rules li.off")).to_contain_text("switched off in this mission")
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+        page.get_by_role("button", name="Run it on the robot").click()
+        expect(page.locator(".headline")).to_have_text("Done")
+        expect(page.locator(".moment-log")).to_contain_text("Ann has asked for a visit")
+
+        write(page, VISIT + "\n")  # another mission, in which the rule counts again
+        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids this')
+        expect(page.locator(".house-rules li.off")).to_have_count(0)
+        page.context.close()
+
+
+def test_the_api_shows_rules_and_cannot_switch_them_off(tmp_path: Path, opened: OpenPage) -> None:
+    (tmp_path / "rules.yaml").write_text(RULES)
+    with PageServer(tmp_path, "--speed", "0", "--rules", "rules.yaml") as server:
+        page = opened(server, size=PHONE)
+        checked(page, "def task_program():\n    say('hello')\n")
+        now = json.loads(server.ask("GET", "/api/missions/current").text)
+        assert [(rule["name"], rule["in_force"]) for rule in now["rules"]] == [("study", True), ("carry", True)]
+        described = server.ask("GET", "/openapi.json").text
+        assert not re.search(r"switch|\boff\b", described)
+        found = server.ask("POST", "/api/check", {"program": VISIT}).data
+        assert [problem["kind"] for problem in found["problems"]] == ["RuleViolation"]
+        page.context.close()
+    assert until
