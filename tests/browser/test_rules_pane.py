@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
-from playwright.sync_api import expect
+from playwright.sync_api import Page, expect
 
 from pageserver import PageServer
-from test_operate import checked, write
-from viewing import PHONE, OpenPage, until
+from viewing import PHONE, OpenPage
 
 RULES = """
 rules:
@@ -22,7 +20,22 @@ rules:
     always: not tr.Exists(holding("mug", goto(without("kitchen"))))
 """
 VISIT = "def task_program():\n    go_to('study')\n    say('hello')\n"
-SLY = "def task_program():\n    go_to('kitchen')\n    while True:\n        try: go_to('study')\n        except BaseException: say('again')\n"
+SLY = """def task_program():
+    go_to("kitchen")
+    while True:
+        try:
+            go_to("study")
+        except BaseException:
+            say("again")
+"""
+
+
+def write(page: Page, program: str) -> None:
+    """Type a program in the place of what is there."""
+    expect(page.locator("[data-started] .cm-content")).to_be_visible()
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(program)
 
 
 def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path, opened: OpenPage) -> None:
@@ -65,12 +78,13 @@ def test_the_api_shows_rules_and_cannot_switch_them_off(tmp_path: Path, opened: 
     (tmp_path / "rules.yaml").write_text(RULES)
     with PageServer(tmp_path, "--speed", "0", "--rules", "rules.yaml") as server:
         page = opened(server, size=PHONE)
-        checked(page, "def task_program():\n    say('hello')\n")
-        now = json.loads(server.ask("GET", "/api/missions/current").text)
-        assert [(rule["name"], rule["in_force"]) for rule in now["rules"]] == [("study", True), ("carry", True)]
-        described = server.ask("GET", "/openapi.json").text
+        write(page, "def task_program():\n    say('hello')\n")
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+        now = server.call("GET", "/api/missions/current").data
+        in_force = [(rule["name"], rule["in_force"]) for rule in now["rules"]]
+        assert in_force == [("study", True), ("carry", True)]
+        described = server.call("GET", "/openapi.json").text
         assert not re.search(r"switch|\boff\b", described)
-        found = server.ask("POST", "/api/check", {"program": VISIT}).data
+        found = server.call("POST", "/api/check", {"program": VISIT}).data
         assert [problem["kind"] for problem in found["problems"]] == ["RuleViolation"]
         page.context.close()
-    assert until
