@@ -367,11 +367,11 @@ def serve(
     from codebotler.web.access import Access, Place
     from codebotler.web.console import Console
 
+    house_rules = () if rules is None else read_rules(rules)
     place = Place(host, port, tuple(name or ()))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
     world = _world_of(robot, world)
     known = None if world is None else World.read(world)
-    house_rules = () if rules is None else read_rules(rules)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
     opened = _opener(models, base_url)
     settings = Options(known, speed or None, address, ros_python)

@@ -1,0 +1,104 @@
+"""House rules on the command line: shown, and in force for every command that takes them."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+import command_line
+from command_line import Ended, command
+
+RULES = """
+rules:
+  - name: vault
+    says: Never go into the vault.
+    always: not tr.Exists(goto("vault"))
+  - name: knock
+    says: Knock before you enter an office.
+    always: >-
+      not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))
+"""
+WORLD = "robot: hall\nrooms: [hall, vault, office]\n"
+SLY = "def task_program():\n    go_to('hall')\n    go_to('vault')\n"
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    for name, text in (
+        ("rules.yaml", RULES),
+        ("world.yaml", WORLD),
+        ("sly.py", SLY),
+        ("bad.yaml", "rules: 3"),
+    ):
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def codebotler(folder: Path, *arguments: str, **variables: str) -> Ended:
+    environment = {**os.environ, "NO_COLOR": "1", "CODEBOTLER_HOME": str(folder / "home"), **variables}
+    return command("codebotler", *arguments, cwd=folder, environment=environment)
+
+
+def test_rules_are_shown_with_examples(files: Path) -> None:
+    ended = codebotler(files, "rules", "rules.yaml", "--world", "world.yaml")
+    assert ended.status == 0
+    assert "knock  Knock before you enter an office.\n" in ended.out
+    assert '  keeps it\n    1  says "knock"\n    2  drives to "office"\n' in ended.out
+    assert '  breaks it\n    1  drives to "vault"\n' in ended.out
+    told = json.loads(codebotler(files, "rules", "rules.yaml", "--json").out)
+    assert [(rule["name"], rule["breaks"][0]["text"], rule["warnings"]) for rule in told] == [
+        ("vault", "vault", []),
+        ("knock", "office", []),
+    ]
+
+
+@pytest.mark.parametrize("named", ["option", "variable"])
+def test_a_program_that_breaks_a_rule_is_rejected_and_not_run(files: Path, named: str) -> None:
+    more = ["--rules", "rules.yaml"] if named == "option" else []
+    variables = {} if more else {"CODEBOTLER_RULES": "rules.yaml"}
+    told = 'line 3: RuleViolation: the rule "vault" forbids this: Never go into the vault'
+    for arguments in (["check", "sly.py"], ["run", "sly.py", "--yes", "--speed", "0"]):
+        ended = codebotler(files, *arguments, "--world", "world.yaml", *more, **variables)
+        assert ended.status == 1
+        assert told in ended.out
+
+
+def test_a_rule_ends_a_program_that_runs_all_the_same(files: Path) -> None:
+    force = ("--yes", "--despite-problems", "--speed", "0", "--rules", "rules.yaml")
+    ended = codebotler(files, "run", "sly.py", "--world", "world.yaml", *force)
+    assert ended.status == 1
+    assert 'kept from going to "vault" by the rule "vault": Never go into the vault.' in ended.out
+    assert "stopped by rule vault" in ended.out
+    shown = codebotler(files, "missions", "last")
+    assert 'kept from going to "vault"' in shown.out
+
+
+def test_a_model_is_told_the_rules(files: Path) -> None:
+    ended = codebotler(files, "generate", "Say hello", "--show-prompt", "--rules", "rules.yaml")
+    assert "- Never go into the vault.\n- Knock before you enter an office." in ended.out
+    plain = codebotler(files, "generate", "Say hello", "--show-prompt")
+    assert "vault" not in plain.out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["check", "sly.py"],
+        ["generate", "Say hello"],
+        ["run", "sly.py", "--yes"],
+        ["serve", "--port", "0"],
+    ],
+)
+def test_rules_that_cannot_be_read_end_a_command_before_anything_else(
+    files: Path, arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(files)
+    refused = command_line.refused(*arguments, "--rules", "bad.yaml", name="codebotler")
+    assert refused.at == ("bad.yaml", 1)
+    assert '"rules" is a number' in refused.sentence
+    missing = command_line.refused(*arguments, "--rules", "none.yaml", name="codebotler")
+    assert "none.yaml" in str(missing)
+    assert not (files / "home").exists()
