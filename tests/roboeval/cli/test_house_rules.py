@@ -1,0 +1,83 @@
+"""Evaluations with house rules: their files, what they show, and that they are the same on every road."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from command_line import refused, roboeval
+
+RULES = """
+rules:
+  - name: knock
+    says: Knock before you enter an office.
+    always: >-
+      not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))
+  - name: once
+    says: Look for people once at most.
+    always: not tr.AtLeast(check("person"), 3)
+"""
+TASKS = ("--tasks", "LunchBreak,SayGoodDay,GetDrink")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "house.yaml").write_text(RULES)
+    return tmp_path
+
+
+def judged(folder: Path, *more: str) -> bytes:
+    ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, *more, cwd=folder)
+    assert ended.status == 0, ended.err
+    return (folder / "run" / "evaluations" / "paper-rules-house.jsonl").read_bytes()
+
+
+def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
+    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+    plain = (folder / "run" / "evaluations" / "paper.jsonl").read_bytes()
+    ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
+    assert "of programs break a rule of the house (95% interval" in ended.out
+    assert "knock" in ended.out
+    assert "pass@1 with the rules less pass@1 without: -" in ended.out
+    assert re.search(r"show run \w+/\d/\d --rules house.yaml", ended.err)
+    evaluations = folder / "run" / "evaluations"
+    assert (evaluations / "paper.jsonl").read_bytes() == plain
+    head = json.loads((evaluations / "paper-rules-house.json").read_text())
+    assert head["suite"] == "paper"
+    assert head["house_rules"] == {"house": hashlib.sha256(RULES.encode()).hexdigest()}
+    shown = roboeval("show", "run", "LunchBreak/0/0", "--rules", "house.yaml", cwd=folder)
+    assert 'the rule "knock" forbids this' in shown.out
+    told = json.loads(roboeval("show", "run", "--rules", "house.yaml", "--json", cwd=folder).out)
+    assert set(told["house_rules"]["programs_by_rule"]) <= {"knock", "once"}
+    assert told["house_rules"]["cost"]["mean"] < 0
+
+
+def test_rows_are_the_same_with_any_number_of_workers_and_on_both_roads(folder: Path) -> None:
+    assert roboeval("evaluate", "recorded:hasty", "--out", "run", *TASKS, cwd=folder).status == 0
+    one = judged(folder, "--workers", "1")
+    assert b'"RuleViolation"' in one
+    assert judged(folder, "--redo", "--workers", "4") == one
+    assert judged(folder, "--redo", "--one-process-per-run") == one
+
+
+def test_other_rules_do_not_go_on_with_an_evaluation(folder: Path) -> None:
+    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+    judged(folder)
+    (folder / "house.yaml").write_text(RULES.replace("3)", "4)"))
+    told = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
+    assert "judged with another set of house rules" in told.sentence
+    assert "--redo starts over" in told.sentence
+
+
+def test_rules_are_read_before_anything_is_judged(folder: Path) -> None:
+    (folder / "bad.yaml").write_text(RULES.replace("always: not", "always: nut"))
+    told = refused("evaluate", "recorded:careful", "--out", "run", "--rules", "bad.yaml", cwd=folder)
+    assert told.file == "bad.yaml"
+    assert not (folder / "run").exists()
+    (folder / "My Rules.yaml").write_text(RULES)
+    told = refused("evaluate", "recorded:careful", "--rules", "My Rules.yaml", cwd=folder)
+    assert "small letters" in told.sentence
