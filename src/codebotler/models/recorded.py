@@ -151,4 +151,4 @@ def _folders() -> Iterator[Path]:
     # The benchmark's solutions are data of roboeval, whose code codebotler must not import.
     benchmark = find_spec("roboeval")
     for place in (benchmark and benchmark.submodule_search_locations) or ():
-        yield Path(place, "suites", "paper", "solutions")
+        yield from (Path(place, "suites", suite, "solutions") for suite in ("paper", "rules"))

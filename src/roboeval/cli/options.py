@@ -149,7 +149,8 @@ def load(suite: str, rules: Path | None = None) -> Suite:
     from roboeval.suites.house import HouseRules
     from roboeval.suites.load import load_suite
 
-    return load_suite(suite).with_house_rules(None if rules is None else HouseRules.read(rules))
+    read = load_suite(suite)
+    return read if rules is None else read.with_house_rules(HouseRules.read(rules))
 
 
 def command(

@@ -177,7 +177,7 @@ class _Generation:
     async def _request(self, key: Key) -> None:
         _KEY.set(key)
         try:
-            prompt = prompt_for(self.plan.instruction(key))
+            prompt = prompt_for(self.plan.instruction(key), rules=self.plan.suite.house_sentences)
             await self._keep(key, await self._paced.reply(prompt, number=key[2]))
         except BudgetSpentError as error:
             self.progress.stopped = error.sentence

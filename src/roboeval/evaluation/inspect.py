@@ -60,7 +60,7 @@ def roboeval(
     ]
     return Task(
         dataset=MemoryDataset(samples, name=drawn.name),
-        setup=prompting(),
+        setup=prompting(suite),
         scorer=verdict(suite, worlds, seed),
         config=model.GenerateConfig(temperature=our.temperature, top_p=our.top_p, max_tokens=our.max_tokens),
         version=drawn.version,
@@ -73,13 +73,14 @@ def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
 
 @solver
 @of_codebotler
-def prompting() -> Solver:
+def prompting(suite: str = "paper") -> Solver:
     """The prompt of `roboeval generate`: with the skills and some examples before the instruction."""
+    rules = load_suite(suite).house_sentences
 
     async def prompt(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - comes later
         state.messages = [
             getattr(model, f"ChatMessage{message.role.title()}")(content=message.text)
-            for message in prompt_for(state.input_text).messages
+            for message in prompt_for(state.input_text, rules=rules).messages
         ]
         return state
 

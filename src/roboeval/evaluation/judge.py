@@ -282,7 +282,11 @@ def head(suite: Suite) -> dict[str, Any]:
             "skill_seconds": 0,
             "clock_starts": rules.clock_starts.isoformat(),
         },
-        **({} if (house := suite.house) is None else {"house_rules": {house.name: house.digest}}),
+        **(
+            {}
+            if (house := suite.house) is None
+            else {"house_rules": {house.name or suite.name: house.digest}}
+        ),
         "codebotler": __version__,
         "python": PYTHON,
     }

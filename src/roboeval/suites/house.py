@@ -17,7 +17,8 @@ class HouseRules:
     """The rules of a file.
 
     Args:
-        name: by which evaluations with them are kept: the file's name without its ending.
+        name: by which evaluations with them are kept: the file's name without its ending. It is empty where
+            a suite brings the rules itself.
         rules: in the order of the file.
         digest: the SHA-256 of the file, in hexadecimal.
     """
@@ -25,6 +26,11 @@ class HouseRules:
     name: str
     rules: tuple[Rule, ...]
     digest: str
+
+    @classmethod
+    def of_suite(cls, path: Path) -> HouseRules:
+        """Read the rules that a suite brings."""
+        return cls("", read_rules(path), hashlib.sha256(path.read_bytes()).hexdigest())
 
     @classmethod
     def read(cls, path: Path) -> HouseRules:

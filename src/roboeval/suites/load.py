@@ -77,8 +77,13 @@ class Suite:
     def __repr__(self) -> str:
         return f"Suite({self.name!r}, {counted(len(self.tasks), 'task')})"
 
+    @property
+    def house_sentences(self) -> list[str]:
+        """The rules of the house, as models are told them."""
+        return [] if self.house is None else [rule.says for rule in self.house.rules]
+
     def with_house_rules(self, house: HouseRules | None) -> Suite:
-        """The same suite with these house rules, or without any."""
+        """The same suite with these house rules in the place of its own, or without any."""
         return replace(self, house=house)
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
@@ -164,7 +169,7 @@ def task_files(folder: Path) -> list[Path]:
 
 def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
     """The suite in a folder; its files are read again only if they have changed."""
-    files = [folder / "suite.yaml", *task_files(folder)]
+    files = [*sorted(folder.glob("*.yaml")), *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
     return _suite_of(folder, skills, count, seed, versions)
@@ -189,6 +194,7 @@ def _suite_of(
     count, seed = count or head.worlds, head.seed if seed is None else seed
     documents = [YamlFile.read(path) for path in paths]
     words = head.rules.words_for_people
+    house = None if head.house_rules is None else HouseRules.of_suite(folder / head.house_rules)
     lenders = [_lender(file, head.instructions, path) if head.instructions else None for path in paths]
     tasks = [
         read_task(document, path, skills, lender=lender, count=count, seed=seed, words=words)
@@ -201,7 +207,10 @@ def _suite_of(
         about=head.about,
         rules=head.rules.rules(),
         tasks={task.name: task for task in tasks},
-        digest=_digest([file, *documents, *(lender for lender in lenders if lender is not None)], tasks),
+        digest=_digest(
+            [file, *documents, *(lender for lender in lenders if lender is not None)], tasks, house
+        ),
+        house=house,
         folder=folder,
         worlds=count if drawn else None,
         seed=seed if drawn else None,
@@ -218,9 +227,11 @@ def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
     return YamlFile.read(lender)
 
 
-def _digest(files: list[YamlFile], tasks: list[Task]) -> str:
+def _digest(files: list[YamlFile], tasks: list[Task], house: HouseRules | None) -> str:
     """A hash of what the files say, and of the worlds that were drawn."""
     content: list[object] = [file.data for file in files]
+    if house is not None:
+        content.append(house.digest)
     drawn = (scenario for task in tasks if task.drawn for scenario in task.scenarios)
     content += [[one.world.to_data(), *(requirement.text for requirement in one.require)] for one in drawn]
     canonical = json.dumps(content, sort_keys=True, default=str)

@@ -218,3 +218,4 @@ class SuiteFile(_Form):
     worlds: Annotated[int, Field(strict=True, ge=1, le=MOST_WORLDS)] = 30
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     rules: RulesFile = RulesFile()
+    house_rules: Name | None = None  # a file of the suite: no program may break its rules

@@ -217,7 +217,8 @@ def load_head(path: Path) -> dict[str, Any]:
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
     """The name of an evaluation's files."""
-    rules = "" if suite.house is None else f"-rules-{suite.house.name}"
+    named = suite.house is not None and suite.house.name
+    rules = f"-rules-{named}" if named else ""
     return suite.name + rules + ABLATED * ablated
 
 
