@@ -200,9 +200,9 @@ def test_place_of_a_mission_is_in_the_robots_own_words(
 ) -> None:
     places: list[str] = []
 
-    def run(mission: Mission, reserved: Reservation, place: str = "") -> State:
+    def run(mission: Mission, reserved: Reservation, place: str = "", **rules: Any) -> State:
         places.append(place)
-        return real(mission, reserved, place)
+        return real(mission, reserved, place, **rules)
 
     real = Mission.run
     monkeypatch.setattr(Mission, "run", run)

@@ -26,6 +26,7 @@ from codebotler.models.recorded import recorded_model
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Result, Robot
 from codebotler.robots.simulated import OFFICE, Simulated
+from codebotler.simulator.guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.panes.instruction import examples
@@ -397,9 +398,11 @@ def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
 def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on, check = threading.Event(), Console.check
 
-    def slow(console: Console, program: str, plan: RoomMap | None = None) -> Check:
+    def slow(
+        console: Console, program: str, plan: RoomMap | None = None, rules: tuple[Rule, ...] = ()
+    ) -> Check:
         go_on.wait(20)
-        return check(console, program, plan)
+        return check(console, program, plan, rules)
 
     monkeypatch.setattr(Console, "check", slow)
     with desk_of(tmp_path) as console:
