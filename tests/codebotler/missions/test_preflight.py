@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rich.progress  # noqa: F401 - by now, since an interrupt in the middle of an import leaves a file open
