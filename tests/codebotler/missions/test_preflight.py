@@ -201,7 +201,7 @@ def test_place_of_a_mission_is_in_the_robots_own_words(
 ) -> None:
     places: list[str] = []
 
-    def run(mission: Mission, reserved: Reservation, place: str = "", **rules: Any) -> State:
+    def run(mission: Mission, reserved: Reservation, place: str = "", **rules: Any) -> State:  # noqa: ANN401 - passed on
         places.append(place)
         return real(mission, reserved, place, **rules)
 
