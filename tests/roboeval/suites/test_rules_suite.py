@@ -42,7 +42,8 @@ class Judged(NamedTuple):
 
 
 def failure_of(row: Mapping[str, Any]) -> str | None:
-    return row["failure"] and row["failure"]["kind"]
+    """The kind of the failure that a row tells of."""
+    return None if row["failure"] is None else str(row["failure"]["kind"])
 
 
 @pytest.fixture(scope="module")
