@@ -84,6 +84,7 @@ class RecordedModel:
 
     name: str  # such as `recorded:careful`
     replies: Mapping[str, tuple[Solution, ...]] = field(repr=False)  # by instruction, at least one each
+    offered: tuple[str, ...] = field(default=(), repr=False)  # instructions that make sense by themselves
 
     def solution(self, instruction: str, index: int) -> Solution:
         """The reply for completion number `index`, counted from 0; they come round again."""
@@ -96,7 +97,7 @@ class RecordedModel:
         instruction = known.get(_words(prompt.instruction))
         if instruction is None:
             raise UnknownInstructionError(
-                self.name, prompt.instruction, closest_to(prompt.instruction, self.replies)
+                self.name, prompt.instruction, closest_to(prompt.instruction, self.offered)
             )
         program = self.solution(instruction, number).program
         heard(program)
@@ -136,19 +137,22 @@ def recorded_model(name: str) -> RecordedModel:
     if short not in NAMES:
         known = ", ".join(f"recorded:{known}" for known in NAMES)
         raise UserError(f'there is no recorded model "{name}"; there are {known}')
-    return RecordedModel(f"recorded:{short}", {one.instruction: one.by(short) for one in _recorded()})
+    usual, of_rules = (_recorded(suite) for suite in ("paper", "rules"))
+    replies = {one.instruction: one.by(short) for one in (*usual, *of_rules)}
+    return RecordedModel(f"recorded:{short}", replies, tuple(one.instruction for one in usual))
 
 
 @cache
-def _recorded() -> tuple[InstructionSolutions, ...]:
-    files = sorted((f for folder in _folders() for f in folder.glob("*.yaml")), key=lambda file: file.name)
+def _recorded(suite: str) -> tuple[InstructionSolutions, ...]:
+    """The instructions of a suite of the benchmark; with those of the paper's, our own."""
+    folders = [*_folders(suite), *([FOLDER] if suite == "paper" else [])]
+    files = sorted((f for folder in folders for f in folder.glob("*.yaml")), key=lambda file: file.name)
     forms = (YamlFile.read(file).validate(RecordedFile) for file in files)
     return tuple(one for form in forms for one in form.recorded)
 
 
-def _folders() -> Iterator[Path]:
-    yield FOLDER
+def _folders(suite: str) -> Iterator[Path]:
     # The benchmark's solutions are data of roboeval, whose code codebotler must not import.
     benchmark = find_spec("roboeval")
     for place in (benchmark and benchmark.submodule_search_locations) or ():
-        yield from (Path(place, "suites", suite, "solutions") for suite in ("paper", "rules"))
+        yield Path(place, "suites", suite, "solutions")

@@ -17,8 +17,7 @@ from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import AHEAD, LARGEST, shared_pool
-from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluation.judge import are_met, is_met, may_satisfy
+from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
 from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite
 
@@ -158,7 +157,7 @@ def batches(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
 def judged(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
     """The rewards of programs, in a thread that has a worker."""
     asked = asked_in(suite, task, prompt)
-    robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario, _ in asked]
+    robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     ran = shared_pool().here().run_all([(program, robots) for program in programs])
     return [
         total([Share.of(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TypeAlias
 
-from codebotler.simulator.engine import run
+from codebotler.core.trace import Outcome
+from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judge
-from roboeval.suites.load import Suite, Task
+from roboeval.evaluation.judge import judge, robot_in
+from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import solutions
 
 Verdicts: TypeAlias = Sequence[Verdict]  # on one program in all worlds of a task, or of its ablation
@@ -21,6 +23,14 @@ def tried(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
     """
     judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
     runs = [(solution.program, worlds) for worlds in judges for solution in solutions(task)]
-    pairs = ((program, scenario.world) for program, worlds in runs for scenario in worlds)
-    outcomes = iter([*run(pairs, workers=workers, rules=suite.rules)])
-    return [[judge(next(outcomes), scenario) for scenario in worlds] for _, worlds in runs]
+    with WorkerPool(workers) as pool:
+
+        def outcomes(program: str, worlds: Sequence[Scenario]) -> list[Outcome]:
+            robots = [partial(robot_in, scenario.world, suite) for scenario in worlds]
+            return pool.here().run_all([(program, robots)])[0]
+
+        ran = [pool.submit(outcomes, *each) for each in runs]
+        return [
+            [judge(outcome, scenario) for outcome, scenario in zip(one.result(), worlds, strict=True)]
+            for one, (_, worlds) in zip(ran, runs, strict=True)
+        ]

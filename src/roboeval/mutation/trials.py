@@ -10,9 +10,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judge
+from roboeval.evaluation.judge import judge, robot_in
 from roboeval.mutation.mutants import Mutant, Original, drawn, mutants, originals
 from roboeval.mutation.operator import Context
 from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMutant
@@ -46,7 +45,7 @@ def mutation_score(
     """
     scenarios = worlds_of(suite, task, worlds, seed)
 
-    robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario in scenarios]
+    robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
 
     def run(program: str) -> Iterator[Outcome]:
         for start in range(0, len(robots), AT_ONCE):

@@ -146,7 +146,5 @@ def test_without_the_rules_most_conflicts_are_none(programs: list[Judged], suite
 def test_the_linter_finds_nothing(suite: Suite) -> None:
     for task in suite.tasks.values():
         found = lint(task, tried(task, suite, workers=2))
-        # A linter that runs programs without the rules cannot see that one is broken.
-        breaking = {f"misjudged: {one.about}" for one in solutions(task) if one.fails == VIOLATION}
-        assert {finding.name for finding in found} <= breaking
+        assert [finding.name for finding in found] == []
         assert not task.accepted
