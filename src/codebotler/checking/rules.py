@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.world_file import Text
 from codebotler.core.yaml_files import Place, YamlFile
-from codebotler.rtl import Formula, RtlSyntaxError, holds, parse
+from codebotler.rtl import EventPattern, Formula, RtlSyntaxError, holds, parse
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.reasoning.backtracking import slow_text
+from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.guard import Rule
 
 
@@ -63,9 +67,22 @@ def read_rules(path: Path) -> tuple[Rule, ...]:
 
 def _parsed(text: str, file: YamlFile, at: Place) -> Formula:
     try:
-        return parse(text)
+        formula = parse(text)
     except RtlSyntaxError as error:
         raise file.wrong(f"this is not a formula: {error}", *at) from None
+    for element in elements(formula):
+        for pattern in _regexes(element):
+            if slow_text(pattern) is not None:
+                sentence = f"finding {pattern!r} takes much longer the longer a text is"
+                raise file.wrong(f"{sentence}; let no two repeats match the same text", *at)
+    return formula
+
+
+def _regexes(element: EventPattern) -> Iterator[str]:
+    texts = (element.text, element.options, element.answer, element.holding, element.to)
+    yield from (pattern for text in texts if text is not None for pattern in patterns(text))
+    if element.place is not None:
+        yield element.place
 
 
 def _bracketed(formula: Formula) -> str:

@@ -122,7 +122,7 @@ class LiveRobot:
             case "goto":
                 self._place = event.text
             case "pick":
-                self._held = event.text
+                self._held = event.text or "something"
             case "place":
                 self._held = ""
 
@@ -167,11 +167,15 @@ class LiveRobot:
     def _meant(self, request: str) -> list[str]:
         return [] if self._room_map is None else self._room_map.rooms_meant(request)
 
+    def _room(self, request: str) -> str:
+        """The room to which a request leads, by its name if that is known."""
+        known = None if self._room_map is None or not request else self._room_map.room(request)
+        return known or request
+
     def _seen_from(self, event: Event) -> Event:
         """An event as rules see it: rooms by the names that the robot knows them by."""
-        place = next(iter(self._meant(event.place)), event.place)
-        room = next(iter(self._meant(event.text)), event.text) if event.kind == "goto" else event.text
-        return replace(event, text=room, place=place)
+        room = self._room(event.text) if event.kind == "goto" else event.text
+        return replace(event, text=room, place=self._room(event.place))
 
     def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, logged."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from codebotler.core.trace import Event
@@ -11,6 +12,8 @@ from codebotler.rtl import formulas
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.automaton import Automaton, Letter, Undecided, machine_of
 from codebotler.rtl.semantics import is_match
+
+MOST_STEPS = 4_000  # that are remembered of a formula
 
 
 class Monitor:
@@ -22,20 +25,18 @@ class Monitor:
     Args:
         formula: what to watch.
         events: all that can happen, as far as the formula tells events apart; None for anything.
+
+    `holds` says whether the formula is true of the events so far.
     """
 
     def __init__(self, formula: formulas.Formula, events: Iterable[Event] | None = None) -> None:
         self.formula = formula
-        self._elements = tuple(dict.fromkeys(elements(formula)))
-        self._machine = machine_of(formula)
+        self._machine = _Machine.of(formula)
         self._state: Any = self._machine.start
+        self.holds = self._machine.accepts(self._state)
         self._seen = 0
-        self._future = None if events is None else _Future.of(formula, map(self._letter, events))
-
-    @property
-    def holds(self) -> bool:
-        """Whether the formula is true of the events so far."""
-        return self._machine.accepts(self._state)
+        letters = None if events is None else [self._machine.letter(self._mask(event)) for event in events]
+        self._future = None if letters is None else _Future.of(formula, letters)
 
     @property
     def is_final(self) -> bool | None:
@@ -49,19 +50,63 @@ class Monitor:
             Inconclusive: an option is no text; the event does not count.
             ValueError: the event is not one of `events`; it does not count.
         """
-        letter = self._letter(event)
+        mask = self._mask(event)
         if self._future is not None:
-            self._future.step(letter)
-        self._state = self._machine.step(self._state, letter)
+            self._future.step(self._machine.letter(mask))
+        self._state, self.holds = self._machine.step(self._state, mask)
         self._seen += 1
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
         """Whether the formula would hold if this came next; Inconclusive if an option of it is no text."""
-        return self._machine.accepts(self._machine.step(self._state, self._letter(event)))
+        return self._machine.step(self._state, self._mask(event))[1]
 
-    def _letter(self, event: Event) -> Letter:
-        return frozenset([one for one in self._elements if is_match(one, event, self._seen)])
+    def _mask(self, event: Event) -> int:
+        return self._machine.mask(event, self._seen)
+
+
+class _Machine:
+    """The automaton of a formula, which remembers steps; shared by all monitors of the formula.
+
+    Letters are numbers, with a bit for each element of the formula that matches.
+    """
+
+    def __init__(self, formula: formulas.Formula) -> None:
+        self._elements = tuple(dict.fromkeys(elements(formula)))
+        self._by_kind: dict[str, list[tuple[int, formulas.EventPattern]]] = {}
+        for bit, element in enumerate(self._elements):
+            self._by_kind.setdefault(element.kind, []).append((1 << bit, element))
+        self._machine = machine_of(formula)
+        self.start, self.accepts = self._machine.start, self._machine.accepts
+        self._steps: dict[tuple[Any, int], tuple[Any, bool]] = {}
+
+    @classmethod
+    @lru_cache(maxsize=256)
+    def of(cls, formula: formulas.Formula) -> _Machine:
+        """That of a formula."""
+        return cls(formula)
+
+    def mask(self, event: Event, at: int) -> int:
+        """The letter of an event."""
+        found = 0
+        for bit, element in self._by_kind.get(event.kind, ()):
+            if is_match(element, event, at):
+                found |= bit
+        return found
+
+    def letter(self, mask: int) -> Letter:
+        """The elements of a letter."""
+        return frozenset(one for bit, one in enumerate(self._elements) if mask >> bit & 1)
+
+    def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
+        """The state after a letter, and whether the formula holds there."""
+        known = self._steps.get((state, mask))
+        if known is None:
+            after = self._machine.step(state, self.letter(mask))
+            known = after, self._machine.accepts(after)
+            if len(self._steps) < MOST_STEPS:
+                self._steps[state, mask] = known
+        return known
 
 
 class _Future:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 from codebotler.core.errors import RobotError
@@ -73,26 +74,28 @@ class Guard:
 
     def __init__(self, rules: Sequence[Rule]) -> None:
         self.rules = tuple(rules)
-        self._always = [(rule, Monitor(rule.formula)) for rule in rules if rule.when == "always"]
-        self._finally = [(rule, Monitor(rule.formula)) for rule in rules if rule.when == "finally"]
+        watched = [(rule, Monitor(rule.formula), _depends_on(rule)) for rule in rules]
+        self._always = [each for each in watched if each[0].when == "always"]
+        self._finally = [each for each in watched if each[0].when == "finally"]
         self._unjudged: set[str] = set()  # names of rules that had to compare an option that is no text
 
     @property
     def may_refuse(self) -> bool:
         """Whether a program may go on after something was refused."""
-        return any(rule.refuse for rule, _ in self._always)
+        return any(rule.refuse for rule, _, _ in self._always)
 
     def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
-        for rule, monitor in self._always:
+        for rule, monitor, depends in self._always:
             for attempt in attempts:
-                if not any(_would_hold(monitor, event) for event in _results(rule, attempt)):
+                events = _results(rule, attempt) if attempt.kind in depends else (attempt,)
+                if not any([_would_hold(monitor, event) for event in events]):  # noqa: C419 - quicker
                     raise RuleViolationError(rule, attempt)
 
     def happened(self, event: Event) -> None:
         """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
         late: RuleViolationError | None = None
-        for rule, monitor in (*self._always, *self._finally):
+        for rule, monitor, _ in (*self._always, *self._finally):
             try:
                 holds = monitor.feed(event)
             except Inconclusive:
@@ -105,7 +108,7 @@ class Guard:
 
     def at_end(self) -> RuleViolationError | None:
         """The first rule that is not kept if the mission ends now."""
-        for rule, monitor in self._finally:
+        for rule, monitor, _ in self._finally:
             if rule.name in self._unjudged or not monitor.holds:
                 return RuleViolationError(rule, None)
         return None
@@ -118,15 +121,25 @@ def _would_hold(monitor: Monitor, event: Event) -> bool:
         return False
 
 
-def _results(rule: Rule, attempt: Event) -> Iterator[Event]:
-    """An event as it may turn out."""
-    wanted = [one for one in elements(rule.formula) if one.kind == attempt.kind]
-    if any(one.found is not None for one in wanted):
-        yield replace(attempt, found=True)
-        yield replace(attempt, found=False)
-    elif any(one.answer is not None for one in wanted):
-        yield from (replace(attempt, answer=option.text) for option in attempt.options)
-        if not attempt.options:
-            yield attempt
-    else:
-        yield attempt
+def _depends_on(rule: Rule) -> frozenset[str]:
+    """The kinds of events whose results a rule compares."""
+    found, answered = _results_of(rule)
+    return found | answered
+
+
+@lru_cache(maxsize=256)
+def _results_of(rule: Rule) -> tuple[frozenset[str], frozenset[str]]:
+    """The kinds of events of which a rule compares what a look finds, and what somebody answers."""
+    wanted = [*elements(rule.formula)]
+    found = frozenset(one.kind for one in wanted if one.found is not None)
+    return found, frozenset(one.kind for one in wanted if one.answer is not None)
+
+
+def _results(rule: Rule, attempt: Event) -> Sequence[Event]:
+    """An event as it may turn out, as far as a rule tells that apart."""
+    found, answered = _results_of(rule)
+    if attempt.kind in found:
+        return [replace(attempt, found=True), replace(attempt, found=False)]
+    if attempt.kind in answered and attempt.options:
+        return [replace(attempt, answer=option.text) for option in attempt.options]
+    return (attempt,)

@@ -141,8 +141,11 @@ class SimulatedRobot:
         if attempt is None:
             return self._perform(skill, arguments)
         is_drive = row.recording is not None and row.recording.is_drive
-        meant = (replace(attempt, text=room) for room in self.meant_rooms(attempt.text)) if is_drive else ()
-        guard.judge(attempt, *meant)
+        attempts = [attempt]
+        if is_drive:
+            rooms = self.meant_rooms(attempt.text)
+            attempts += [replace(attempt, text=room) for room in rooms if room != attempt.text]
+        guard.judge(*attempts)
         try:
             result = self._perform(skill, arguments)
         except RobotError:
@@ -150,11 +153,16 @@ class SimulatedRobot:
                 guard.happened(event)
             raise
         for event in self.events[before:]:
-            guard.happened(replace(event, text=self.room) if is_drive else event)
+            guard.happened(replace(event, text=self.room) if is_drive and event.text != self.room else event)
         return result
 
     def meant_rooms(self, request: str) -> Sequence[str]:
-        """All rooms that a request may mean."""
+        """All rooms that a request may mean: only those where it leads, if it is the name of one."""
+        wanted = request.strip().lower()
+        named = [room for room in self.rooms if room.lower() == wanted]
+        if named:
+            leads_to = resolve_room(self.rooms, request, self.rules.matching)
+            return [*named, *([] if leads_to is None else [leads_to])]
         return [room for room in self.rooms if finds(request, room, self.rules.matching)]
 
     def _perform(self, skill: str, arguments: Sequence[Argument]) -> Result:

@@ -58,16 +58,19 @@ class RoomMap:
     def room(self, request: str) -> str | None:
         """The room that a request finds; None if there is no such room."""
         if not (self.guessed or self.plain):
-            return next(iter(self.rooms_meant(request)), None)
+            return next((r for r in self.rooms if real.finds(request, r, "label-in-request")), None)
         wanted = request.strip()
         same = [room for room in self.rooms if room.strip().casefold() == wanted.casefold()]
         within = (room for room in self.rooms if room.casefold() in wanted.casefold())
         return same[0] if same else next(within, (wanted or None) if self.guessed else None)
 
     def rooms_meant(self, request: str) -> list[str]:
-        """All known rooms that a request may mean."""
+        """All known rooms that a request may mean: only those where it leads, if it is the name of one."""
+        wanted, leads_to = request.strip().casefold(), self.room(request)
+        named = [room for room in self.rooms if room.strip().casefold() == wanted]
+        if named:
+            return [*named, *([] if leads_to is None or leads_to in named else [leads_to])]
         if self.guessed or self.plain:
-            wanted = request.casefold()
             return [room for room in self.rooms if room.strip().casefold() in wanted]
         return [room for room in self.rooms if real.finds(request, room, "label-in-request")]
 

@@ -11,10 +11,10 @@ from codebotler.core.world import World
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.simulator.robot import whole_words
 from roboeval.evaluation.failures import failure
 from roboeval.evaluation.runs.rows import Failure
-from roboeval.linting.backtracking import slow_text
 from roboeval.linting.clauses import clauses_of
 from roboeval.linting.findings import Finding
 from roboeval.linting.trials import Verdicts

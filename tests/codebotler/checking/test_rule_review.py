@@ -35,6 +35,8 @@ FORMULAS = (
     'not tr.AtLeast(goto("kitchen"), 2)',
     'not tr.Exists(at("kitchen", holding("glass", goto(without("kitchen")))))',
     'not tr.Exists(to("carol", ask(".*", ".*")))',
+    'not tr.Exists(holding(".*", goto("kitchen")))',
+    'not tr.Exists(at("hall", holding(without("mug"), goto(".*"))))',
     'not tr.Exists(missed("glass"))',
     'not tr.OnlyAfterLast(missed("glass")).Exists(say(".*"))',
     'not tr.Last(say("done")) or tr.OnlyAfterLast(goto("kitchen")).Exists(found("glass"))',

@@ -70,6 +70,11 @@ def test_rules_are_read_in_order(tmp_path: Path) -> None:
         ),
         (f"rules:\n  - name: a\n    says: b\n    finally: '{HOLDS}'\n    refuse: true\n", 5, ['"refuse"']),
         (f"rules:\n{TWICE}{TWICE}", 5, ['"a"', "twice"]),
+        (
+            "rules:\n  - name: a\n    says: b\n    always: not tr.Exists(say('knock.*knock.*knock.*door'))\n",
+            4,
+            ["knock.*knock.*knock.*door", "takes much longer"],
+        ),
     ],
 )
 def test_each_fault_is_one_sentence_with_file_and_line(

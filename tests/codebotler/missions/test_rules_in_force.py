@@ -39,13 +39,15 @@ def answering(answer: Callable[[str, str], Result] = lambda *_: None) -> Answeri
     return Answering(answer)
 
 
-def ran(folder: Path, robot: Robot, program: str, rules: Sequence[Rule]) -> tuple[Mission, list[Line]]:
+def ran(
+    folder: Path, robot: Robot, program: str, rules: Sequence[Rule], rooms: RoomMap = ROOMS
+) -> tuple[Mission, list[Line]]:
     mission = Mission(folder, robot.name)
     mission.draft(program)
     mission.check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
-        mission.run(reserved, "hall", rules=rules, room_map=ROOMS)
+        mission.run(reserved, "hall", rules=rules, room_map=rooms)
     lines = (mission.folder / EVENTS).read_text().splitlines()
     return mission, [json.loads(line) for line in lines]
 
@@ -123,6 +125,16 @@ def test_every_room_that_a_request_may_mean_counts(tmp_path: Path, request_: str
     mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", rooms)
     assert mission.state is State.STOPPED
     assert robot.done == []
+
+
+def test_a_room_is_the_one_where_a_request_leads(tmp_path: Path) -> None:
+    """Of two rooms of which one's name is in the other's, the exact name means that one only."""
+    rooms = RoomMap(("hall", "room 1", "room 10"), "hall", plain=True)
+    silent = Rule("ten", "Say nothing in room 10.", parse('not tr.Exists(at("room 10", say(".*")))'))
+    program = "def task_program():\n    go_to('{}')\n    say('hello')\n"
+    for room, state in (("room 10", State.STOPPED), ("room 1", State.DONE)):
+        mission, _ = ran(tmp_path / room[-2:], answering(), program.format(room), [silent], rooms)
+        assert mission.state is state, room
 
 
 def test_what_is_carried_counts_on_the_simulated_robot(tmp_path: Path) -> None:

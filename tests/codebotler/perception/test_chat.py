@@ -17,7 +17,7 @@ from codebotler.models import rate_limit
 from codebotler.perception import Detector, PerceptionError, Sighting, image_of, jpeg_of, open_detector
 from codebotler.perception.chat import FENCED, LONGEST_REPLY, SYSTEM, TRIES, sighting_in
 from codebotler.perception.open import LOOKING
-from roboeval.linting.backtracking import Attack, is_superlinear
+from codebotler.rtl.reasoning.backtracking import Attack, is_superlinear
 from server import Fault, Request, Server
 
 PICTURE = Image.new("RGB", (64, 40), (200, 30, 30))

@@ -69,7 +69,7 @@ def test_what_a_rule_forbids_is_not_done() -> None:
 def test_every_room_that_a_request_may_mean_counts() -> None:
     one = robot(rule('not tr.Exists(goto("room 2"))'))
     one.perform("go_to", ["vault"])
-    refused(one, "go_to", "vault room 2")  # though the simulated robot would go to the first of both
+    refused(one, "go_to", "the vault room 2")  # though the simulated robot would go to the first of both
     refused(robot(VAULT), "go_to", "the office, not the vault")
 
 

@@ -51,7 +51,7 @@ def alphabet(
         for found in ([None] if all(e.found is None for e in alike) else [True, False])
         for place in (places if kind != "goto" or any(e.place for e in alike) else [""])
         for holding in (held if any(e.holding for e in alike) else [""])
-        for to in _texts([element.to for element in alike])
+        for to in _texts([element.to for element in alike])[any(e.to for e in alike) :]  # each has somebody
     ]
 
 
@@ -78,7 +78,14 @@ def _texts(wanted: Sequence[Text | None], nothing: str) -> list[str]: ...
 def _texts(wanted: Sequence[Text | None], nothing: str | None = None) -> list[Any]:
     """Texts that match in all combinations, and what stands for there being none."""
     texts = _distinct(wanted)
-    return [*dict.fromkeys([nothing, *(distinct_strings(texts, outer=True) if texts else ())])]
+    strings = distinct_strings(texts, outer=True) if texts else ()
+    if nothing == "":  # which stands for there being none, so that an empty text needs another spelling
+        strings = tuple(string or "x" for string in strings if string or _is_as_empty("x", texts))
+    return [*dict.fromkeys([nothing, *strings])]
+
+
+def _is_as_empty(string: str, texts: Sequence[Text]) -> bool:
+    return all(text.matches(string) == text.matches("") for text in texts)
 
 
 def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:

@@ -13,11 +13,11 @@ import pytest
 import codebotler.rtl
 import codebotler.simulator.robot
 from codebotler.rtl import Claim, Number, Time
+from codebotler.rtl.reasoning.backtracking import FILLERS, Attack, is_superlinear, sampled_attacks, slow_text
 from codebotler.rtl.text.clauses import clauses, sentences
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import polarity
 from codebotler.rtl.text.times import times_in
-from roboeval.linting.backtracking import FILLERS, Attack, is_superlinear, sampled_attacks, slow_text
 from roboeval.linting.task_findings import searched_regexes
 from roboeval.suites.load import load_suite
 
