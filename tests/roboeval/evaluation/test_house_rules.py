@@ -1,0 +1,86 @@
+"""What house rules do to a few programs; bench/rules.py measures many."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+import pytest
+
+import rules
+from codebotler.core.trace import Event
+from codebotler.simulator.guard import Guard
+from rules import ALL, Effect, Measuring, errand_of, houses
+
+HASTY = """
+def task_program():
+    go_to("kitchen")
+    for drink in ["water", "lemonade"]:
+        if is_in_room(drink):
+            pick(drink)
+            break
+    go_to("lobby")
+    drink = ask("", "What would you like?", ["water", "iced tea", "lemonade"])
+    say("Here you are.")
+"""
+IN_VAIN = """
+def task_program():
+    try:
+        pick("a unicorn")
+    except Exception:
+        pass
+    go_to("lobby")
+    drink = ask("", "What would you like?", ["water", "iced tea", "lemonade"])
+    go_to("kitchen")
+    pick(drink)
+"""
+
+
+@pytest.fixture(scope="module")
+def measuring() -> Iterator[Measuring]:
+    started = Measuring()
+    yield started
+    started.worker.close()
+
+
+def effects(measuring: Measuring, task: str, program: str) -> dict[str, Effect]:
+    found = measuring.effects([(task, program)], frozenset())
+    return {effect.house: effect for effect in found}
+
+
+def test_there_are_three_rules_or_more_of_eight_kinds() -> None:
+    kinds = Counter(house.kind for house in houses())
+    del kinds[ALL]
+    assert len(kinds) == 8
+    assert min(kinds.values()) >= 3
+
+
+def test_rules_stop_what_breaks_them_and_nothing_else(measuring: Measuring) -> None:
+    found = effects(measuring, "GetDrink", HASTY)
+    broken = {name for name, effect in found.items() if effect.broken}
+    assert {"permission-to-take", "holding-in-the-lobby", ALL} <= broken
+    assert not {"order-see-then-take", "words-whole-sentences"} & broken
+    assert "rooms-one-office-at-a-time" not in found
+    for effect in found.values():
+        assert effect.executed == effect.unseen == effect.altered == effect.failing == 0
+        assert effect.rejected == (effect.broken > 0)
+
+
+def test_what_was_refused_would_have_failed(measuring: Measuring) -> None:
+    found = effects(measuring, "GetDrink", IN_VAIN)["permission-to-take"]
+    assert (found.broken, found.failing, found.altered) == (0, 3, 0)
+
+
+def test_a_guard_that_sees_nothing_is_noticed(measuring: Measuring, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(_: Guard, *events: Event) -> None:
+        """Take what there is."""
+
+    monkeypatch.setattr(Guard, "judge", nothing)
+    monkeypatch.setattr(Guard, "happened", nothing)
+    found = effects(measuring, "GetDrink", HASTY)["permission-to-take"]
+    assert (found.broken, found.executed) == (3, 3)
+
+
+def test_an_errand_costs_more_with_rules(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rules, "SIZES", (0, 1))
+    monkeypatch.setattr(rules, "ROUNDS", 1)
+    assert len(errand_of(1)) > 30
+    assert rules.costs()[0][0] > 0
