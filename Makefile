@@ -136,6 +136,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/generate.py
 	$(BIN)/python bench/faulty_server.py
 	$(BIN)/python bench/check.py
+	$(BIN)/python bench/rules.py
 	$(BIN)/python bench/reward.py
 	$(BIN)/python bench/report.py
 	$(BIN)/python bench/stop.py

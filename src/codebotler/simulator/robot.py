@@ -141,11 +141,8 @@ class SimulatedRobot:
         if attempt is None:
             return self._perform(skill, arguments)
         is_drive = row.recording is not None and row.recording.is_drive
-        attempts = [attempt]
-        if is_drive:
-            rooms = self.meant_rooms(attempt.text)
-            attempts += [replace(attempt, text=room) for room in rooms if room != attempt.text]
-        guard.judge(*attempts)
+        names = self.meant_rooms(attempt.text) if is_drive else self._moved(attempt)
+        guard.judge(attempt, *(replace(attempt, text=name) for name in names if name != attempt.text))
         try:
             result = self._perform(skill, arguments)
         except RobotError:
@@ -155,6 +152,15 @@ class SimulatedRobot:
         for event in self.events[before:]:
             guard.happened(replace(event, text=self.room) if is_drive and event.text != self.room else event)
         return result
+
+    def _moved(self, attempt: Event) -> Sequence[str]:
+        """By which name the thing is recorded that would be picked up or put down."""
+        if self.rules.events != "as-happened":
+            return ()
+        if attempt.kind == "place" and self.taken is not None:
+            return (self.taken.label,)
+        here = self.things[self.room] if attempt.kind == "pick" else ()
+        return [thing.label for thing in here if thing.is_meant_by(attempt.text, self.rules.matching)][:1]
 
     def meant_rooms(self, request: str) -> Sequence[str]:
         """All rooms that a request may mean: only those where it leads, if it is the name of one."""

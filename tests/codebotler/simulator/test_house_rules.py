@@ -73,6 +73,17 @@ def test_every_room_that_a_request_may_mean_counts() -> None:
     refused(robot(VAULT), "go_to", "the office, not the vault")
 
 
+def test_a_thing_counts_by_the_name_that_is_recorded() -> None:
+    world = World((Room("hall", ("cup|mug",)),), "hall")
+    as_happened = Rules(literals="as-written", events="as-happened")
+    for formula in ('not tr.Exists(pick("cup"))', 'not tr.Exists(place("cup"))'):
+        one = SimulatedRobot(world, as_happened, guard=Guard([rule(formula)]))
+        if "place" in formula:
+            one.perform("pick", ["mug"])
+        error = refused(one, "place" if "place" in formula else "pick", "mug")
+        assert not error.is_late
+
+
 def test_an_attempt_that_would_fail_is_judged_before() -> None:
     one = robot(rule('not tr.Exists(pick("crown"))'))
     refused(one, "pick", "crown")
