@@ -167,8 +167,8 @@ class Scope:
 
 
 @dataclass(frozen=True)
-class Exists:
-    """Some event matches.
+class _OfEvent:
+    """About one event.
 
     Args:
         element: what the event must match.
@@ -179,23 +179,15 @@ class Exists:
     scopes: tuple[Scope, ...] = ()
 
     def __str__(self) -> str:
-        return f"{_scoped(self.scopes)}.Exists({self.element})"
+        return f"{_scoped(self.scopes)}.{type(self).__name__}({self.element})"
 
 
-@dataclass(frozen=True)
-class Last:
-    """There is a last event, and it matches.
+class Exists(_OfEvent):
+    """Some event matches."""
 
-    Args:
-        element: what the event must match.
-        scopes: where to look, each within the one before.
-    """
 
-    element: EventPattern
-    scopes: tuple[Scope, ...] = ()
-
-    def __str__(self) -> str:
-        return f"{_scoped(self.scopes)}.Last({self.element})"
+class Last(_OfEvent):
+    """There is a last event, and it matches."""
 
 
 @dataclass(frozen=True)
