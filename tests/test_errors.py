@@ -31,7 +31,6 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
         {"is_late": True},
     ),
     "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
-    "roboeval.web.run_store.RunGoneError": (A_SENTENCE, {"file": "runs/a"}),
 }
 """What each exception takes; one sentence by default."""
 

@@ -53,7 +53,7 @@ class RuleViolationError(RobotError):
         self.rule, self.event, self.is_late = rule, event, is_late
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _violation, (self.rule, self.event, self.is_late)
+        return _violation, (self.rule, self.event, self.is_late), vars(self)
 
     @property
     def ends_run(self) -> bool:

@@ -126,7 +126,7 @@ def test_no_more_than_10000_completions_of_a_prompt(tmp_path: Path, command: str
 
 def test_a_suite_that_nobody_recorded(tmp_path: Path) -> None:
     roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
-    assert "recorded:careful" in refused("generate", "--suite", "mine", cwd=tmp_path, lines=2).sentence
+    assert "recorded:careful" in refused("generate", "--suite", "mine", cwd=tmp_path, lines=5).sentence
     assert not (tmp_path / "runs").exists()
 
 
