@@ -33,8 +33,8 @@ from codebotler.rtl.formulas import And, Or, Test
 from codebotler.rtl.semantics import is_match
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.guard import VIOLATION, Guard, Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot, resolve_room
+from codebotler.simulator.rule_guard import VIOLATION, Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge
@@ -212,7 +212,7 @@ class GuardedRun:
         return self.outcome.error is not None and self.outcome.error.kind == VIOLATION
 
 
-class WatchedGuard(Guard):
+class WatchedGuard(RuleGuard):
     """A guard that keeps what it has refused."""
 
     refused: Event | None = None
@@ -445,7 +445,7 @@ def cost(rules: Sequence[Rule], world: World, number: Iterator[int]) -> tuple[fl
     calls = 0
     for _ in range(RUNS):
         start = time.process_time()
-        guard = Guard(rules) if rules else None
+        guard = RuleGuard(rules) if rules else None
         making += time.process_time() - start
         robot = SimulatedRobot(world, guard=guard)
         errand = errand_of(next(number))
@@ -502,7 +502,7 @@ def costs() -> dict[int, tuple[float, float]]:
 
 def lets_pass(rule: Rule, world: World) -> bool:
     """Whether a rule allows the errand."""
-    robot = SimulatedRobot(world, guard=Guard([rule]))
+    robot = SimulatedRobot(world, guard=RuleGuard([rule]))
     try:
         for skill, arguments in errand_of(0):
             robot.perform(skill, arguments)

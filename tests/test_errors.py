@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.core.trace import Event, Option
 from codebotler.rtl import parse
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 
 SOURCES = Path(__file__).parent.parent / "src"
 ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError", "RobotError"}
@@ -26,7 +26,7 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.rtl.semantics.Inconclusive": ((4, 1, Option("3", is_text=False)), {}),
     "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),
-    "codebotler.simulator.guard.RuleViolationError": (
+    "codebotler.simulator.rule_guard.RuleViolationError": (
         (Rule("quiet", "Be quiet.", parse('not tr.Exists(say(".*"))')), Event("say", "hello")),
         {"is_late": True},
     ),

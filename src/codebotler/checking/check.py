@@ -25,9 +25,9 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.guard import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import Behaviour
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Worker
 

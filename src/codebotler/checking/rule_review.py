@@ -12,8 +12,8 @@ from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided, samples
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.simulator.guard import Guard, Rule, RuleViolationError
 from codebotler.simulator.robot import finds
+from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 
 NEVER_BROKEN = "nothing can break it"
 ALWAYS_BROKEN = "all that a robot can do breaks it"
@@ -64,7 +64,7 @@ def _review(rule: Rule, world: World | None) -> Review:
 
 def _is_by_result(rule: Rule, breaks: Trace) -> bool:
     """Whether the last step would not break a rule if it turned out otherwise."""
-    guard = Guard([rule])
+    guard = RuleGuard([rule])
     for event in breaks[:-1]:
         guard.happened(event)
     try:

@@ -14,7 +14,7 @@ from codebotler.rtl import EventPattern, Formula, RtlSyntaxError, holds, parse
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 
 
 class RuleFile(BaseModel):

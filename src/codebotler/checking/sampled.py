@@ -13,9 +13,9 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.words import listed
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.guard import Guard, Rule
 from codebotler.simulator.isolated_process import PROCESSOR_TIME
 from codebotler.simulator.robot import Behaviour
+from codebotler.simulator.rule_guard import Rule, RuleGuard
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
 from codebotler.simulator.worker import Job, Worker
@@ -71,7 +71,7 @@ class SampledRuns:
 
     def _new_robot(self, number: int) -> SampledRobot:
         how = self._settings
-        guard = Guard(how.house_rules) if how.house_rules else None
+        guard = RuleGuard(how.house_rules) if how.house_rules else None
         sampler = self._samplers[number]
         robot = SampledRobot(self._room_map, sampler, how.rules, how.skills, how.behaviours, guard=guard)
         self._robots[number] = robot

@@ -15,7 +15,7 @@ from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import NOTICE, UnknownInstructionError, is_recorded
 from codebotler.prompts import Prompt
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 

@@ -15,8 +15,8 @@ from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unhear
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt, prompt_for
-from codebotler.simulator.guard import Rule
 from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]

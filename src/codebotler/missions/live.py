@@ -13,8 +13,8 @@ from codebotler.core.skills import Skill
 from codebotler.core.trace import Event, Trace, attempted, trace_data
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
-from codebotler.simulator.guard import Guard, RuleViolationError
 from codebotler.simulator.robot import Argument, Result
+from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -48,7 +48,7 @@ class LiveRobot:
         *,
         place: str = "",
         clock_starts: datetime | None = None,
-        guard: Guard | None = None,
+        guard: RuleGuard | None = None,
         room_map: RoomMap | None = None,
     ) -> None:
         self.robot, self.skills, self._note = robot, robot.skills, note
@@ -128,7 +128,7 @@ class LiveRobot:
 
     # --- rules
 
-    def _judge(self, guard: Guard, event: Event) -> None:
+    def _judge(self, guard: RuleGuard, event: Event) -> None:
         """Refuse what a rule forbids, in whichever room it would happen; the robot is not told."""
         seen = self._seen_from(event)
         rooms = [event.text, *(self._meant(event.text) if event.kind == "goto" else ())]

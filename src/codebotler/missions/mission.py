@@ -21,7 +21,7 @@ from codebotler.missions.pictures import Pictures
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.guard import Guard, Rule
+from codebotler.simulator.rule_guard import Rule, RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
@@ -223,7 +223,7 @@ class Mission:
             NotReadyError: the robot is on another mission, or was.
             OSError: an event could not be written or printed, so the robot was stopped.
         """
-        guard = Guard(rules) if rules else None
+        guard = RuleGuard(rules) if rules else None
         live = LiveRobot(reserved.robot, self._write, place=place, guard=guard, room_map=room_map)
         live.on_broken = lambda broken: self.stop(f"rule {broken.rule.name}")
         with self._writing:

@@ -26,7 +26,7 @@ from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError
 

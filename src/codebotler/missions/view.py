@@ -10,7 +10,7 @@ from codebotler.checking.problems import Check
 from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 UNREADABLE = frozenset({"SyntaxError", "IndentationError", "TabError"})

@@ -16,7 +16,7 @@ from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.rules import PAPER, Matching, Rules
 
 if TYPE_CHECKING:
-    from codebotler.simulator.guard import Guard
+    from codebotler.simulator.rule_guard import RuleGuard
 
 Argument: TypeAlias = str | tuple[Option, ...]
 Result: TypeAlias = str | list[str] | bool | int | None
@@ -77,7 +77,7 @@ class SimulatedRobot:
         skills: SkillTable = SKILLS,
         behaviours: Mapping[str, Behaviour] | None = None,
         *,
-        guard: Guard | None = None,
+        guard: RuleGuard | None = None,
     ) -> None:
         self.guard = guard
         self.world, self.rules, self.skills = world, rules, skills
@@ -134,7 +134,7 @@ class SimulatedRobot:
             return self._perform_guarded(self.guard, skill, arguments)
         return self._perform(skill, arguments)
 
-    def _perform_guarded(self, guard: Guard, skill: str, arguments: Sequence[Argument]) -> Result:
+    def _perform_guarded(self, guard: RuleGuard, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill, unless a rule forbids it; RuleViolation if it does, or was broken by it."""
         row, before = self.skills[skill], len(self.events)
         attempt = attempted(row, arguments, place=self.room, time=self.now, holding=self.held or "")

@@ -25,7 +25,7 @@ from codebotler.simulator.robot import (
 from codebotler.simulator.rules import Rules
 
 if TYPE_CHECKING:
-    from codebotler.simulator.guard import Guard
+    from codebotler.simulator.rule_guard import RuleGuard
 
 AS_WRITTEN = Rules(literals="as-written")  # for a program that a robot is to run: nothing in it is changed
 
@@ -163,7 +163,7 @@ class SampledRobot(SimulatedRobot):
         skills: SkillTable = SKILLS,
         behaviours: Mapping[str, Behaviour] | None = None,
         *,
-        guard: Guard | None = None,
+        guard: RuleGuard | None = None,
     ) -> None:
         does = SAMPLED if behaviours is None else behaviours
         world = World(tuple(map(Room, room_map.rooms)), room_map.start)

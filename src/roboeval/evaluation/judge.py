@@ -22,8 +22,8 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Outcome, Status, Trace, outcome_data
 from codebotler.core.world import World
 from codebotler.rtl import Inconclusive, holds
-from codebotler.simulator.guard import Guard
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.rules import PAPER
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON, Local, OpenEngine
@@ -188,7 +188,7 @@ def run_in_worlds(
 
 def robot_in(world: World, suite: Suite) -> SimulatedRobot:
     """A robot in a world, by the rules of a suite and of its house."""
-    guard = None if suite.house is None else Guard(suite.house.rules)
+    guard = None if suite.house is None else RuleGuard(suite.house.rules)
     return SimulatedRobot(world, suite.rules, guard=guard)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from codebotler.checking.rules import read_rules
 from codebotler.core.errors import UserError
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 
 
 @dataclass(frozen=True)

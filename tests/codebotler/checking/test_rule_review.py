@@ -15,7 +15,7 @@ from codebotler.cli.rules import step_sentence
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Monitor, holds, parse
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 
 WORLD = World(
     (Room("hall"), Room("kitchen", ("glass",)), Room("office", (), (Person("carol"),))),

@@ -15,7 +15,7 @@ from codebotler.robots.base import Result, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from doubles import Answering
 

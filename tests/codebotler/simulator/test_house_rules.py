@@ -15,8 +15,8 @@ from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, Option, Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import holds, parse
-from codebotler.simulator.guard import Guard, Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.worker import Worker
 
@@ -44,7 +44,7 @@ KNOCK = rule(
 
 
 def robot(*rules: Rule) -> SimulatedRobot:
-    return SimulatedRobot(WORLD, AS_WRITTEN, guard=Guard(rules))
+    return SimulatedRobot(WORLD, AS_WRITTEN, guard=RuleGuard(rules))
 
 
 def refused(guarded: SimulatedRobot, skill: str, *arguments: str | tuple[Option, ...]) -> RuleViolationError:
@@ -77,7 +77,7 @@ def test_a_thing_counts_by_the_name_that_is_recorded() -> None:
     world = World((Room("hall", ("cup|mug",)),), "hall")
     as_happened = Rules(literals="as-written", events="as-happened")
     for formula in ('not tr.Exists(pick("cup"))', 'not tr.Exists(place("cup"))'):
-        one = SimulatedRobot(world, as_happened, guard=Guard([rule(formula)]))
+        one = SimulatedRobot(world, as_happened, guard=RuleGuard([rule(formula)]))
         if "place" in formula:
             one.perform("pick", ["mug"])
         error = refused(one, "place" if "place" in formula else "pick", "mug")
@@ -135,7 +135,7 @@ def test_an_option_that_is_no_text_is_refused() -> None:
 
 def test_rules_of_the_end() -> None:
     report = Rule("report", "Report.", parse('tr.Exists(say("done"))'), "finally")
-    guard = Guard([report])
+    guard = RuleGuard([report])
     assert str(guard.at_end()) == 'the rule "report" is not kept at the end: Report'
     guard.happened(Event("say", "done"))
     assert guard.at_end() is None

@@ -26,7 +26,7 @@ from codebotler.models.recorded import recorded_model
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Result, Robot
 from codebotler.robots.simulated import OFFICE, Simulated
-from codebotler.simulator.guard import Rule
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.panes.instruction import examples

@@ -7,7 +7,7 @@ import pytest
 
 import rules
 from codebotler.core.trace import Event
-from codebotler.simulator.guard import Guard
+from codebotler.simulator.rule_guard import RuleGuard
 from rules import ALL, Effect, Measuring, errand_of, houses
 
 HASTY = """
@@ -70,11 +70,11 @@ def test_what_was_refused_would_have_failed(measuring: Measuring) -> None:
 
 
 def test_a_guard_that_sees_nothing_is_noticed(measuring: Measuring, monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(_: Guard, *events: Event) -> None:
+    def nothing(_: RuleGuard, *events: Event) -> None:
         """Take what there is."""
 
-    monkeypatch.setattr(Guard, "judge", nothing)
-    monkeypatch.setattr(Guard, "happened", nothing)
+    monkeypatch.setattr(RuleGuard, "judge", nothing)
+    monkeypatch.setattr(RuleGuard, "happened", nothing)
     found = effects(measuring, "GetDrink", HASTY)["permission-to-take"]
     assert (found.broken, found.executed) == (3, 3)
 

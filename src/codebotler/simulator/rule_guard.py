@@ -1,4 +1,4 @@
-"""`Guard`: keeps a robot from breaking the rules of the house, whatever its program asks for."""
+"""`RuleGuard`: keeps a robot from breaking the rules of the house, whatever its program asks for."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _violation(rule: Rule, event: Event | None, is_late: bool) -> RuleViolationE
     return RuleViolationError(rule, event, is_late=is_late)
 
 
-class Guard:
+class RuleGuard:
     """Judges by rules all that one robot is to do, before it does it.
 
     Args:
