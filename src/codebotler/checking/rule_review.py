@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -12,7 +12,7 @@ from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided, samples
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.simulator.robot import finds
+from codebotler.simulator.robot import found_in
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 
 NEVER_BROKEN = "nothing can break it"
@@ -151,13 +151,15 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         sort = {"goto": "room", "pick": "thing", "place": "thing"}.get(element.kind)
         named.append((sort or "", element.text if sort else None, rooms if sort == "room" else things))
         for what, text, known in named:
-            if isinstance(text, Regex) and not _is_among(text, known):
+            if isinstance(text, Regex) and not may_mean(text.pattern, known):
                 yield f'it names the {what} "{text.pattern}", which is not in this world'
 
 
-def _is_among(text: Regex, known: Sequence[str]) -> bool:
-    """Whether a regex may mean one of these names; one that matches anything does."""
-    spelled = samples(text.pattern)
-    return text.matches("") or any(
-        text.matches(name) or any(finds(one, name, "label-in-request") for one in spelled) for name in known
+def may_mean(pattern: str, labels: Iterable[str]) -> bool:
+    """Whether a regex may mean one of these labels; true also if it matches anything, or nothing."""
+    matches, texts = Regex(pattern).matches, samples(pattern)
+    return (
+        not texts
+        or matches("")
+        or any(matches(label) or any(found_in(label, text) for text in texts) for label in labels)
     )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,35 +11,9 @@ from codebotler.cli import options
 from codebotler.cli.ending import obey
 from codebotler.core.terminal import note, noting_all, print_text
 
-if TYPE_CHECKING:
-    from codebotler.models.base import Model
-
 app = options.command_line(
     "codebotler", "Turn instructions into robot programs, check them, and run them on robots."
 )
-
-
-def robot_names(incomplete: str) -> list[str]:
-    """Shell completion of kinds of robots."""
-    from codebotler.robots.open import KINDS
-
-    return [name for name in KINDS if name.startswith(incomplete)]
-
-
-RobotOption = Annotated[
-    str,
-    typer.Option(
-        help="Which robot: sim, or another that `codebotler robots` lists.", autocompletion=robot_names
-    ),
-]
-
-
-AllOption = Annotated[
-    bool,
-    typer.Option(
-        "--all", help="Show what the robot would do in each kind of imagined world, not only in one."
-    ),
-]
 
 
 @app.command()
@@ -124,7 +97,7 @@ def check(
             help="Do not assume that people and objects are there unless the program has looked for them.",
         ),
     ] = False,
-    shows_all: AllOption = False,
+    shows_all: options.AllOption = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,
     rules: options.RulesOption = None,
@@ -195,7 +168,7 @@ def run(
             metavar="PROGRAM|INSTRUCTION", help="A program file, - for standard input, or an instruction."
         ),
     ],
-    robot: RobotOption = "sim",
+    robot: options.RobotOption = "sim",
     world: Annotated[
         Path | None,
         typer.Option(help="The world file of a simulated robot; by default an office for --robot sim."),
@@ -206,7 +179,7 @@ def run(
     despite_problems: Annotated[
         bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
     ] = False,
-    shows_all: AllOption = False,
+    shows_all: options.AllOption = False,
     speed: options.SpeedOption = 1.0,
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
@@ -231,7 +204,7 @@ def run(
     house_rules = () if rules is None else read_rules(rules)
     request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
     asked = SamplingSettings(base_url=chosen.base_url)
-    world = _world_of(robot, world)
+    world = options.world_or_office(robot, world)
     settings = Options(
         world=None if world is None else World.read(world),
         speed=speed or None,
@@ -316,14 +289,14 @@ def robots(
         print_rich(robots_view(found))
 
 
-@app.command()
-def serve(
+@app.command("serve")
+def serve_page(
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
     name: options.NameOption = None,
     token: options.TokenOption = None,
     no_token: options.NoTokenOption = False,
-    robot: RobotOption = "sim",
+    robot: options.RobotOption = "sim",
     world: Annotated[
         Path | None,
         typer.Option(
@@ -358,57 +331,23 @@ def serve(
     Ctrl-C ends it, which also stops the robot.
     """
     from codebotler.checking.rules import read_rules
-    from codebotler.core.files import home
+    from codebotler.cli.serve import opener, serve
     from codebotler.core.world import World
     from codebotler.models.chosen import chosen_model
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
-    from codebotler.robots.open import open_robot, open_with_face
     from codebotler.web.access import Access, Place
-    from codebotler.web.console import Console
 
     house_rules = () if rules is None else read_rules(rules)
     place = Place(host, port, tuple(name or ()))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
-    world = _world_of(robot, world)
+    world = options.world_or_office(robot, world)
     known = None if world is None else World.read(world)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
-    opened = _opener(models, base_url)
     settings = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
-    body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
-    console = Console(body, home(), opened, models=models, world=known, face=shown, rules=house_rules)
-
-    from codebotler.web import server
-    from codebotler.web.frame import installed_pages
-
-    server.serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
-
-
-def _world_of(robot: str, world: Path | None) -> Path | None:
-    """The world file that is named, or else an office for the simulated robot."""
-    from codebotler.robots.simulated import OFFICE
-
-    if world is not None or robot != "sim":
-        return world
-    note("the robot works in an example office; --world FILE names another world")
-    return OFFICE
-
-
-def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:
-    """What opens models by their names; names that make no sense are refused at once."""
-    from codebotler.models.base import SamplingSettings
-    from codebotler.models.chosen import chosen_model
-    from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
-
-    for each in models:
-        kind_of(each)
-    if base_url is not None:
-        expect_server(*models)
-    return lambda name: open_model(
-        name,
-        SamplingSettings(base_url=chosen_model(name, base_url).base_url if runs_on_server(name) else None),
-    )
+    named = robot, settings, models, opener(models, base_url)
+    serve(*named, place, access, runs, face=shown, rules=house_rules, alone_for=stop_when_alone)
 
 
 @app.command("virtual-robot")

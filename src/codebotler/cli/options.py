@@ -8,8 +8,30 @@ from typing import Annotated
 import typer
 
 from codebotler import __version__
-from codebotler.core.terminal import print_text
+from codebotler.core.terminal import note, print_text
 
+
+def robot_names(incomplete: str) -> list[str]:
+    """Shell completion of kinds of robots."""
+    from codebotler.robots.open import KINDS
+
+    return [name for name in KINDS if name.startswith(incomplete)]
+
+
+RobotOption = Annotated[
+    str,
+    typer.Option(
+        help="Which robot: sim, or another that `codebotler robots` lists.", autocompletion=robot_names
+    ),
+]
+
+
+AllOption = Annotated[
+    bool,
+    typer.Option(
+        "--all", help="Show what the robot would do in each kind of imagined world, not only in one."
+    ),
+]
 ModelOption = Annotated[
     str | None,
     typer.Option(
@@ -61,6 +83,16 @@ TokenOption = Annotated[str | None, typer.Option(help="The token that opens the 
 NoTokenOption = Annotated[
     bool, typer.Option("--no-token", help="Let anyone on this machine in without a token; not with --host.")
 ]
+
+
+def world_or_office(robot: str, world: Path | None) -> Path | None:
+    """The world file that is named, or else an office for the simulated robot."""
+    from codebotler.robots.simulated import OFFICE
+
+    if world is not None or robot != "sim":
+        return world
+    note("the robot works in an example office; --world FILE names another world")
+    return OFFICE
 
 
 def command_line(name: str, about: str) -> typer.Typer:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.trace import Event, Option, Trace, attempted
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.rules import PAPER, Matching, Rules
 
@@ -131,36 +131,8 @@ class SimulatedRobot:
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill; a question is answered by the position of the chosen option."""
         if self.guard is not None:
-            return self._perform_guarded(self.guard, skill, arguments)
-        return self._perform(skill, arguments)
-
-    def _perform_guarded(self, guard: RuleGuard, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill, unless a rule forbids it; RuleViolation if it does, or was broken by it."""
-        row, before = self.skills[skill], len(self.events)
-        attempt = attempted(row, arguments, place=self.room, time=self.now, holding=self.held or "")
-        if attempt is None:
-            return self._perform(skill, arguments)
-        is_drive = row.recording is not None and row.recording.is_drive
-        names = self.meant_rooms(attempt.text) if is_drive else self._moved(attempt)
-        guard.judge(attempt, *(replace(attempt, text=name) for name in names if name != attempt.text))
-        try:
-            result = self._perform(skill, arguments)
-        except RobotError:
-            for event in self.events[before:]:
-                guard.happened(event)
-            raise
-        for event in self.events[before:]:
-            guard.happened(replace(event, text=self.room) if is_drive and event.text != self.room else event)
-        return result
-
-    def _moved(self, attempt: Event) -> Sequence[str]:
-        """By which name the thing is recorded that would be picked up or put down."""
-        if self.rules.events != "as-happened":
-            return ()
-        if attempt.kind == "place" and self.taken is not None:
-            return (self.taken.label,)
-        here = self.things[self.room] if attempt.kind == "pick" else ()
-        return [thing.label for thing in here if thing.is_meant_by(attempt.text, self.rules.matching)][:1]
+            return self.guard.perform(self, skill, arguments)
+        return self.execute(skill, arguments)
 
     def meant_rooms(self, request: str) -> Sequence[str]:
         """All rooms that a request may mean: only those where it leads, if it is the name of one."""
@@ -171,7 +143,8 @@ class SimulatedRobot:
             return [*named, *([] if leads_to is None else [leads_to])]
         return [room for room in self.rooms if finds(request, room, self.rules.matching)]
 
-    def _perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
+    def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """The same, whatever rules say."""
         result = self.behaviours[skill](self, *arguments)
         if isinstance(result, bool) and self.events and self.events[-1].found is None:
             self._add_result(skill, found=result)
@@ -423,15 +396,3 @@ IDLE: frozenset[Behaviour] = frozenset(
     {get_current_location, get_all_rooms, is_in_room, say}
 )  # the robot stays as it is
 IDLE_SKILLS = frozenset(does.__name__ for does in IDLE)
-
-
-def located(trace: Trace, world: World) -> Trace:
-    """The trace with the place of each event, found by driving through the world again."""
-    rooms = [room.name for room in world.rooms]
-    room_of = cache(partial(resolve_room, rooms))
-    here, events = world.robot, []
-    for event in trace:
-        events.append(replace(event, place=here))
-        if event.kind == "goto":
-            here = room_of(event.text) or here
-    return tuple(events)

@@ -8,9 +8,10 @@ from functools import lru_cache
 from typing import Literal
 
 from codebotler.core.errors import RobotError
-from codebotler.core.trace import Event
+from codebotler.core.trace import Event, attempted
 from codebotler.rtl import Formula, Inconclusive, Monitor
 from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 
 VIOLATION = "RuleViolation"
 
@@ -84,6 +85,26 @@ class RuleGuard:
         """Whether a program may go on after something was refused."""
         return any(rule.refuse for rule, _, _ in self._always)
 
+    def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
+        row, before = robot.skills[skill], len(robot.events)
+        attempt = attempted(row, arguments, place=robot.room, time=robot.now, holding=robot.held or "")
+        if attempt is None:
+            return robot.execute(skill, arguments)
+        is_drive = row.recording is not None and row.recording.is_drive
+        names = robot.meant_rooms(attempt.text) if is_drive else _moved(robot, attempt)
+        self.judge(attempt, *(replace(attempt, text=name) for name in names if name != attempt.text))
+        try:
+            result = robot.execute(skill, arguments)
+        except RobotError:
+            for event in robot.events[before:]:
+                self.happened(event)
+            raise
+        for event in robot.events[before:]:
+            elsewhere = is_drive and event.text != robot.room
+            self.happened(replace(event, text=robot.room) if elsewhere else event)
+        return result
+
     def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
         for rule, monitor, depends in self._always:
@@ -112,6 +133,16 @@ class RuleGuard:
             if rule.name in self._unjudged or not monitor.holds:
                 return RuleViolationError(rule, None)
         return None
+
+
+def _moved(robot: SimulatedRobot, attempt: Event) -> Sequence[str]:
+    """By which name the thing is recorded that would be picked up or put down."""
+    if robot.rules.events != "as-happened":
+        return ()
+    if attempt.kind == "place" and robot.taken is not None:
+        return (robot.taken.label,)
+    here = robot.things[robot.room] if attempt.kind == "pick" else ()
+    return [thing.label for thing in here if thing.is_meant_by(attempt.text, robot.rules.matching)][:1]
 
 
 def _would_hold(monitor: Monitor, event: Event) -> bool:

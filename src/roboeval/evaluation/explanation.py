@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, lru_cache, partial
 from typing import Any
 
@@ -13,8 +14,9 @@ from codebotler.core.program import parsed
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event, Trace, trace_from
 from codebotler.core.words import counted
+from codebotler.core.world import World
 from codebotler.rtl import explain
-from codebotler.simulator.robot import located, resolve_room
+from codebotler.simulator.robot import resolve_room
 from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.suites.load import Scenario, Suite
 
@@ -87,6 +89,18 @@ def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablat
 def _trace(verdict: Mapping[str, Any], scenario: Scenario | None) -> Trace:
     trace = trace_from(verdict["trace"])
     return trace if scenario is None else located(trace, scenario.world)
+
+
+def located(trace: Trace, world: World) -> Trace:
+    """The trace with the place of each event, found by driving through the world again."""
+    rooms = [room.name for room in world.rooms]
+    room_of = cache(partial(resolve_room, rooms))
+    here, events = world.robot, []
+    for event in trace:
+        events.append(replace(event, place=here))
+        if event.kind == "goto":
+            here = room_of(event.text) or here
+    return tuple(events)
 
 
 def _world_data(verdict: Mapping[str, Any], scenario: Scenario | None, patience: Patience) -> dict[str, Any]:

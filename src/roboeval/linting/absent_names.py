@@ -6,14 +6,13 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from codebotler.checking.rule_review import may_mean
 from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room
-from codebotler.rtl import EventPattern, Regex
+from codebotler.rtl import EventPattern
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import patterns
-from codebotler.simulator.robot import found_in
 from roboeval.suites.load import Requirement, Scenario, Task
 
 ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
@@ -22,7 +21,7 @@ ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someon
 def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
     """The sort and the name of what a requirement names and its world lacks."""
     for what, name, known in _named(requirement, scenario.world.rooms, task):
-        if not _is_among(name, known):
+        if not may_mean(name, known):
             yield what, name
 
 
@@ -50,16 +49,6 @@ def _named(
     for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
         if parameter == "person" or argument.lower() in _people(task):
             yield "person", argument, people
-
-
-def _is_among(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may mean one of these labels; true also if it matches anything, or nothing."""
-    matches, texts = Regex(pattern).matches, samples(pattern)
-    return (
-        not texts
-        or matches("")
-        or any(matches(label) or any(found_in(label, text) for text in texts) for label in labels)
-    )
 
 
 # --- people

@@ -9,8 +9,9 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.robot import Result, SimulatedRobot, Thing, _pattern, choose, located, resolve_room
+from codebotler.simulator.robot import Result, SimulatedRobot, Thing, _pattern, choose, resolve_room
 from codebotler.simulator.rules import Matching, Rules
+from roboeval.evaluation.explanation import located
 
 Texts: TypeAlias = tuple[str, ...]
 
