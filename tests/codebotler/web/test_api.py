@@ -32,11 +32,11 @@ FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
-    with PageServer(tmp_path_factory.mktemp("api"), "--speed", "1") as server:
+    with PageServer(tmp_path_factory.mktemp("api"), "--speed", "4") as server:
         yield server
 
 
-def until(server: PageServer, holds: Callable[[dict[str, Any]], bool], seconds: float = 15.0) -> Any:  # noqa: ANN401 - JSON
+def until(server: PageServer, holds: Callable[[dict[str, Any]], bool], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON
     ends = time.monotonic() + seconds
     while not holds(now := server.call("GET", "/api/missions/current").data):
         assert time.monotonic() < ends, now
