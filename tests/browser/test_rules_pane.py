@@ -47,7 +47,7 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
         )
         write(page, SLY)
         expect(page.get_by_text("1 problem. The robot should not run this.")).to_be_visible()
-        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids this')
+        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids going to "study"')
         page.get_by_text("Run it despite the problems").click()
         page.get_by_role("button", name="Run it on the robot").click()
         expect(page.locator(".headline")).to_have_text("Stopped")
@@ -56,7 +56,7 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
         expect(page.locator(".moment-say")).to_have_count(0)
 
         write(page, VISIT)
-        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids this')
+        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids going to "study"')
         page.get_by_role("button", name="Switch off the rule study in this mission").click()
         page.get_by_role("button", name="Switch it off").click()
         expect(page.get_by_text("say why the rule does not count")).to_be_visible()
@@ -69,7 +69,7 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
         expect(page.locator(".moment-log")).to_contain_text("Ann has asked for a visit")
 
         write(page, VISIT + "\n")  # another mission, in which the rule counts again
-        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids this')
+        expect(page.locator(".problems")).to_contain_text('the rule "study" forbids going to "study"')
         expect(page.locator(".house-rules li.off")).to_have_count(0)
         page.context.close()
 

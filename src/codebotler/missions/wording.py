@@ -9,7 +9,9 @@ from codebotler.core.program import nodes, tree_of
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import brief, room_name
+from codebotler.core.trace import trace_from
 from codebotler.missions.log import Line, Summary
+from codebotler.rtl.wording import event_words
 
 PAGE = "the page"  # as whoever presses STOP there is logged
 FIRST_CALLS = 2  # of a program, in the title of its mission
@@ -96,9 +98,7 @@ def _rule(line: Line) -> str:
     rule = f'the rule "{visible(str(line["rule"]))}": {shortened(str(line["says"]))}'
     if "what" not in line:
         return f"not kept: {rule}"
-    kind, text = line["what"][:2]
-    doing = SKILLS.verbs[kind].ing if kind in SKILLS.verbs else visible(str(kind))
-    what = f'{doing} "{shortened(room_name(text) if kind == "goto" else text)}"'
+    what = visible(event_words(trace_from([line["what"]])[0]))
     return f"kept from {what} by {rule}" if line.get("prevented") else f"{what} broke {rule}"
 
 

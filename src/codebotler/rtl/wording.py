@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Literal, TypeAlias
 
+from codebotler.core import words
 from codebotler.core.skills import SKILLS, Verb
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
@@ -71,6 +72,15 @@ def happening(event: Event, element: EventPattern) -> str:
     if element.holding is not None:
         thing += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
     return thing if element.place is None else f"{thing} in {room_name(event.place)}"
+
+
+def event_words(event: Event) -> str:
+    """What a robot does, such as `driving to "kitchen"`, and what has come of it if that is known."""
+    text = quoted(words.room_name(event.text) if event.kind == "goto" else event.text)
+    if event.answer is not None:
+        return f"the answer {quoted(event.answer)} to {text}"
+    doing = verb(event.kind)
+    return f"{doing.ing} {text}" + ("" if event.found is None else f" ({doing.results[event.found]})")
 
 
 def verb(kind: str) -> Verb:

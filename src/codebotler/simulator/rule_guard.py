@@ -11,6 +11,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, attempted
 from codebotler.rtl import Formula, Inconclusive, Monitor
 from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.wording import event_words
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 
 VIOLATION = "RuleViolation"
@@ -46,11 +47,10 @@ class RuleViolationError(RobotError):
 
     def __init__(self, rule: Rule, event: Event | None, *, is_late: bool = False) -> None:
         if event is None:
-            what = f'the rule "{rule.name}" is not kept at the end'
+            what = "is not kept at the end"
         else:
-            what = f'the rule "{rule.name}" {"is broken" if is_late else "forbids this"}'
-        says = rule.says.rstrip(".")
-        super().__init__(VIOLATION, f"{what}: {says}")
+            what = f"{'is broken by' if is_late else 'forbids'} {event_words(event)}"
+        super().__init__(VIOLATION, f'the rule "{rule.name}" {what}: {rule.says.rstrip(".")}')
         self.rule, self.event, self.is_late = rule, event, is_late
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -154,12 +154,13 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: Check) -> list[Strip]:
-    """One strip for each kind of world that makes a difference; those that end well first."""
-    different: dict[tuple[tuple[Scene, ...], str], Strip] = {}
+    """One strip for each kind of world that makes a difference: one for each problem, then those that end well."""
+    different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
-        different.setdefault((strip.scenes, strip.ending), strip)
-    return sorted(different.values(), key=lambda strip: not strip.ends_well)[:MOST_STRIPS]
+        different.setdefault((strip.scenes, strip.ending), (sample.number in check.showing, strip))
+    ranked = sorted(different.values(), key=lambda each: (not each[0], not each[1].ends_well))
+    return [strip for _, strip in ranked[:MOST_STRIPS]]
 
 
 def _strip(sample: Sample, check: Check) -> Strip:

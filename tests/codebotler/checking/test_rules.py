@@ -109,7 +109,7 @@ def test_a_rule_that_is_broken_somewhere_is_a_problem_with_line_rule_and_world(t
         tmp_path, "go_to('kitchen')", "if is_in_room('mug'):", "    go_to('server room')", *RETURNS
     )
     assert problem == (
-        'line 4: RuleViolation: the rule "server-room" forbids this: Never go into the server room, '
+        'line 4: RuleViolation: the rule "server-room" forbids going to "server room": Never go into the server room, '
         'where "mug" is in "kitchen"'
     )
 

@@ -59,7 +59,7 @@ def test_rules_are_shown_with_examples(files: Path) -> None:
 def test_a_program_that_breaks_a_rule_is_rejected_and_not_run(files: Path, named: str) -> None:
     more = ["--rules", "rules.yaml"] if named == "option" else []
     variables = {} if more else {"CODEBOTLER_RULES": "rules.yaml"}
-    told = 'line 3: RuleViolation: the rule "vault" forbids this: Never go into the vault'
+    told = 'line 3: RuleViolation: the rule "vault" forbids going to "vault": Never go into the vault'
     for arguments in (["check", "sly.py"], ["run", "sly.py", "--yes", "--speed", "0"]):
         ended = codebotler(files, *arguments, "--world", "world.yaml", *more, **variables)
         assert ended.status == 1

@@ -63,7 +63,7 @@ def test_what_a_rule_forbids_is_not_done() -> None:
     one.perform("go_to", ["office"])
     error = refused(one, "go_to", "the vault")
     assert (one.room, error.kind, error.ends_run) == ("office", "RuleViolation", True)
-    assert str(error) == 'the rule "vault" forbids this: Do as the house wants'
+    assert str(error) == 'the rule "vault" forbids going to "the vault": Do as the house wants'
 
 
 def test_every_room_that_a_request_may_mean_counts() -> None:
@@ -168,7 +168,7 @@ def test_a_refusal_may_be_caught(worker: Worker) -> None:
     outcome = ran(worker, program, [rule('not tr.Exists(goto("vault"))', refuse=True)])
     assert outcome.status is Status.FINISHED
     assert [event.kind for event in outcome.trace] == ["say"]
-    assert "forbids this" in outcome.trace[0].text
+    assert "forbids going to \"vault\"" in outcome.trace[0].text
 
 
 def test_a_rule_of_the_end_is_reported(worker: Worker) -> None:

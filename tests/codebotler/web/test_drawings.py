@@ -402,3 +402,12 @@ def test_a_drive_to_nowhere_and_a_long_run_are_shown() -> None:
     (long,) = strips(check(many, rooms=["hall"]))
     assert "182 more steps" in [deed.text for scene in long.scenes for deed in scene.deeds]
     assert len(strips(check(many, rooms=["hall"]))) <= MOST_STRIPS
+
+
+def test_what_fails_is_shown_first_also_in_the_last_of_many_worlds() -> None:
+    looks = "".join(f"    if is_in_room('thing {n}'):\n        say('{n}')\n" for n in range(4))
+    program = f"def task_program():\n{looks}    if is_in_room('key'):\n        go_to('cellar')\n"
+    found = check(program, rooms=["hall"], samples=20)
+    shown = strips(found)
+    assert len(shown) == MOST_STRIPS
+    assert [strip.ends_well for strip in shown] == [False, *[True] * (MOST_STRIPS - 1)]

@@ -50,7 +50,7 @@ def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
     assert head["suite"] == "paper"
     assert head["house_rules"] == {"house": hashlib.sha256(RULES.encode()).hexdigest()}
     shown = roboeval("show", "run", "LunchBreak/0/0", "--rules", "house.yaml", cwd=folder)
-    assert 'the rule "knock" forbids this' in shown.out
+    assert 'the rule "knock" forbids going to "' in shown.out
     told = json.loads(roboeval("show", "run", "--rules", "house.yaml", "--json", cwd=folder).out)
     assert set(told["house_rules"]["programs_by_rule"]) <= {"knock", "once"}
     assert told["house_rules"]["cost"]["mean"] < 0
