@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from bridges import bridge, over_ros
 from codebotler.core.skills import SKILLS
 from ros_graph import GO_TO, Graph
 
@@ -24,10 +25,27 @@ FAR = """def task_program():
 """
 
 
-def begun(graph: Graph, folder: Path, program: str, *options: str) -> subprocess.Popen[str]:
+RULES = """rules:
+  - name: vault
+    says: Never go into the vault.
+    always: not tr.Exists(goto("vault"))
+"""
+STUBBORN = """def task_program():
+    go_to("the hall")
+    while True:
+        try:
+            go_to("the vault")
+        except BaseException:
+            say("I go on")
+"""
+
+
+def begun(
+    graph: Graph, folder: Path, program: str, *options: str, robot: str = "ros1"
+) -> subprocess.Popen[str]:
     (folder / "program.py").write_text(program)
     return subprocess.Popen(
-        [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", "ros1", "--yes", *options],
+        [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", robot, "--yes", *options],
         cwd=folder,
         env={
             **os.environ,
@@ -74,3 +92,18 @@ def test_signal_cancels_the_goal_and_no_other_is_sent(
     server.expect("cancel", "never")
     assert (tool.returncode, server.said.empty()) == (status, True), err
     assert "stopped by" in out
+
+
+@pytest.mark.parametrize("robot", ["ros1", "rosbridge"])
+def test_what_a_house_rule_forbids_is_never_sent(graph: Graph, tmp_path: Path, robot: str) -> None:
+    server = graph.serve(*SKILLS.rows)
+    (tmp_path / "house.yaml").write_text(RULES)
+    options = ("--rules", "house.yaml", "--despite-problems")
+    with bridge(over_ros(graph.uri)) as double:
+        address = ("--address", double.address) if robot == "rosbridge" else ()
+        with begun(graph, tmp_path, STUBBORN, *options, *address, robot=robot) as tool:
+            out, err = tool.communicate()
+    assert "stopped by rule vault" in out, err
+    for goal in ("", "", "the hall"):  # it was asked for its rooms and where it is
+        server.expect("goal", goal)
+    assert server.said.empty()

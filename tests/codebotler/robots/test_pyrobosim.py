@@ -468,6 +468,22 @@ def test_command_runs_a_program_and_ctrl_c_stops_it(tmp_path: Path) -> None:
     assert "stopped" in rest
 
 
+def test_command_keeps_a_house_rule(tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text(WORLD.to_yaml())
+    (tmp_path / "program.py").write_text(PROGRAM)
+    rule = """{name: study, says: No cup goes into the study., always: not tr.Exists(holding("cup", goto("study")))}"""
+    (tmp_path / "house.yaml").write_text(f"rules: [{rule}]")
+    command = [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", "pyrobosim", "--yes"]
+    command += ["--world", "world.yaml", "--speed", "0", "--rules", "house.yaml", "--despite-problems"]
+    environment = {**os.environ, "CODEBOTLER_HOME": str(tmp_path / "home"), "NO_COLOR": "1"}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert "stopped by rule study" in done.stdout, done.stderr
+    assert "picks up" in done.stdout
+    assert "puts down" not in done.stdout
+
+
 def test_it_is_listed() -> None:
     (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
     assert kind.works

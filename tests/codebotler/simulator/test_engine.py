@@ -25,7 +25,7 @@ from codebotler.simulator.engine import digest, run
 from codebotler.simulator.fork_server import BatchServer
 from codebotler.simulator.isolated_process import SIMULATION, LostProcessError, compiled_file
 from codebotler.simulator.ledger import SkillAnswer
-from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.pool import FEW, WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
@@ -308,8 +308,8 @@ def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
 
 
 LONG_RUNS = [
-    (saying("a"), WORLD),
-    *((f"def task_program():\n    sum(range(10**12))\n    say('{number}')\n", WORLD) for number in range(8)),
+    *((saying(str(number)), WORLD) for number in range(FEW)),  # the first batch, whose results come at once
+    *((f"def task_program():\n    sum(range(10**12))\n    say('{number}')\n", WORLD) for number in range(2 * FEW)),
 ]
 
 

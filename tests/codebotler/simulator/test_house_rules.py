@@ -151,6 +151,13 @@ def worker(request: pytest.FixtureRequest) -> Iterator[Worker]:
     worker.close()
 
 
+@pytest.fixture(scope="module")
+def fork_worker() -> Iterator[Worker]:
+    worker = Worker(one_process_per_run=True)
+    yield worker
+    worker.close()
+
+
 def ran(worker: Worker, program: str, rules: Sequence[Rule]) -> Outcome:
     return worker.run(program, partial(robot, *rules))
 
@@ -244,11 +251,7 @@ def test_no_program_breaks_a_rule(worker: Worker, body: str, *, refuse: bool) ->
 @pytest.mark.parametrize(
     "path", sorted((Path(__file__).parents[2] / "hostile").glob("backdoors_*.py")), ids=lambda path: path.stem
 )
-def test_no_backdoor_gets_past_a_rule(path: Path) -> None:
+def test_no_backdoor_gets_past_a_rule(fork_worker: Worker, path: Path) -> None:
     program = path.read_text().replace("@", "x")
-    shut = Worker(one_process_per_run=True)
-    try:
-        outcome = ran(shut, program, [rule('not tr.Exists(goto(".*")) and not tr.Exists(say(".*"))')])
-    finally:
-        shut.close()
+    outcome = ran(fork_worker, program, [rule('not tr.Exists(goto(".*")) and not tr.Exists(say(".*"))')])
     assert not [event for event in outcome.trace if event.kind in {"goto", "say"}]

@@ -117,14 +117,14 @@ def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
 def test_program_may_compute_for_long_if_it_acts_in_between(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 5.0)
+    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 3.0)
     program = (
         "def task_program():\n"
-        "    for i in range(10):\n"
-        "        for _ in range(40): sum(range(1_200_000))\n"
+        "    for i in range(20):\n"
+        "        for _ in range(20): sum(range(1_200_000))\n"
         "        say(str(i))\n"
     )
-    assert done(worker, program)[0] == list("0123456789")
+    assert done(worker, program)[0] == [str(number) for number in range(20)]
 
 
 @pytest.mark.parametrize("seconds", ["-1.0", "NaN", "Infinity", "true", '"1"', "[]"])
