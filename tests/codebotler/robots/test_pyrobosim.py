@@ -471,7 +471,8 @@ def test_command_runs_a_program_and_ctrl_c_stops_it(tmp_path: Path) -> None:
 def test_command_keeps_a_house_rule(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(WORLD.to_yaml())
     (tmp_path / "program.py").write_text(PROGRAM)
-    rule = """{name: study, says: No cup goes into the study., always: not tr.Exists(holding("cup", goto("study")))}"""
+    always = """'not tr.Exists(holding("cup", goto("study")))'"""
+    rule = f"{{name: study, says: No cup goes into the study., always: {always}}}"
     (tmp_path / "house.yaml").write_text(f"rules: [{rule}]")
     command = [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", "pyrobosim", "--yes"]
     command += ["--world", "world.yaml", "--speed", "0", "--rules", "house.yaml", "--despite-problems"]
