@@ -28,7 +28,7 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),
     "codebotler.simulator.rule_guard.RuleViolationError": (
         (Rule("quiet", "Be quiet.", parse('not tr.Exists(say(".*"))')), Event("say", "hello")),
-        {"is_late": True},
+        {"verdict": "is broken by"},
     ),
     "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
 }

@@ -99,8 +99,12 @@ class Check:
     @property
     def showing(self) -> frozenset[int]:
         """The numbers of samples that show the problems: for each the first that ends so, if one does."""
-        ends = {sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error}
-        first = (problem.samples[0] if problem.samples else ends.get(problem.line) for problem in self.problems)
+        ends = {
+            sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
+        }
+        first = (
+            problem.samples[0] if problem.samples else ends.get(problem.line) for problem in self.problems
+        )
         return frozenset(number for number in first if number is not None)
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:

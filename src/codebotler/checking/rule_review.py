@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import chain, combinations
 
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Trace
 from codebotler.core.world import World
-from codebotler.rtl import EventPattern, Exists, Formula, Not, Or, Regex, Text
+from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided, samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.robot import found_in
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 
-NEVER_BROKEN = "nothing can break it"
+NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
 ALWAYS_BROKEN = "all that a robot can do breaks it"
 IMPOSSIBLE = "nothing can keep it"
-UNDECIDED = "it would take too long to find out what it allows"
+UNDECIDED = (
+    "it is too large for examples, though it is enforced all the same; "
+    'make a rule of each part that is joined by "and"'
+)
 DETECTED = (
     "it depends on what a look finds or a person answers, so it can only be noticed: "
     "the mission stops right after that"
@@ -76,8 +79,9 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
 
 def _kept(rule: Rule, world: World | None) -> Trace | None:
     spoken_of = [*dict.fromkeys(elements(rule.formula))]
+    less = [replace(one, place=None) for one in spoken_of] + [replace(one, holding=None) for one in spoken_of]
     kinds = [EventPattern(kind, Regex(".*")) for kind in dict.fromkeys(one.kind for one in spoken_of)]
-    happenings: list[Formula] = [*map(Exists, (*spoken_of, *kinds)), ANYTHING]
+    happenings: list[Formula] = [*map(Exists, dict.fromkeys([*spoken_of, *less, *kinds])), ANYTHING]
     for happens in happenings:
         trace = _trace([happens], [rule], world)
         if trace is not None:
@@ -91,8 +95,24 @@ def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None)
     finally_ = [rule.formula for rule in kept if rule.when == "finally"]
     moves = None if world is None else {room.name: room.name for room in world.rooms}
     start = "" if world is None else world.robot
-    reasoner = Reasoner([*wanted, *always, *finally_], moves, start)
-    return reasoner.trace([*wanted, *finally_], always=always, shortest=True)
+    possible = [
+        *dict.fromkeys(chain.from_iterable(map(_holding_needs_a_pick, [*wanted, *always, *finally_])))
+    ]
+    for physics in (possible, []) if possible else ([],):  # an example may need what no robot can do
+        reasoner = Reasoner([*wanted, *always, *finally_, *physics], moves, start)
+        found = reasoner.trace([*wanted, *finally_], always=[*always, *physics], shortest=True)
+        if found is not None:
+            return found
+    return None
+
+
+def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
+    """For each event in which a robot must hold something: it has picked that up, and not put it down."""
+    for element in elements(formula):
+        if element.holding is not None:
+            held = EventPattern(element.kind, Regex(".*"), holding=element.holding)
+            since = (Scope("AfterLast", EventPattern("place", Regex(".*"))),)
+            yield Or((Not(Last(held)), Exists(EventPattern("pick", element.holding), since)))
 
 
 # --- two rules
@@ -137,6 +157,24 @@ def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
 # --- names
 
 
+def unknown_rooms_in(rules: Sequence[Rule], rooms: Sequence[str]) -> list[str]:
+    """A sentence for each room that a rule names and that is not among these."""
+    return [
+        f'the rule "{rule.name}" names the room "{pattern}", which is not there; look for a misspelt name'
+        for rule in rules
+        for pattern in dict.fromkeys(_room_patterns(rule))
+        if not may_mean(pattern, rooms)
+    ]
+
+
+def _room_patterns(rule: Rule) -> Iterator[str]:
+    for element in elements(rule.formula):
+        if element.place is not None:
+            yield element.place
+        if element.kind == "goto" and isinstance(element.text, Regex):
+            yield element.text.pattern
+
+
 def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
     """Rooms, things and people that a rule names, and its world lacks."""
     if world is None:
@@ -161,5 +199,6 @@ def may_mean(pattern: str, labels: Iterable[str]) -> bool:
     return (
         not texts
         or matches("")
+        or matches("\uffff")
         or any(matches(label) or any(found_in(label, text) for text in texts) for label in labels)
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from codebotler.core.words import brief
 from codebotler.core.world_file import Text
 from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import EventPattern, Formula, RtlSyntaxError, holds, parse
@@ -16,13 +18,21 @@ from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.rule_guard import Rule
 
+MOST_QUOTED = 30  # characters of a formula, from where it is wrong
+
+
+def _as_name(text: str) -> str:
+    if not re.fullmatch("[a-z][a-z0-9-]*", text):
+        raise ValueError("may have only small letters, digits and dashes, such as server-room")
+    return text
+
 
 class RuleFile(BaseModel):
     """One rule in a file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: Annotated[str, Field(strict=True, pattern=r"^[a-z][a-z0-9-]*$")]
+    name: Annotated[str, Field(strict=True), AfterValidator(_as_name)]
     says: Annotated[Text, Field(min_length=1)]
     always: Text | None = None
     finally_: Annotated[Text | None, Field(alias="finally")] = None
@@ -30,8 +40,13 @@ class RuleFile(BaseModel):
 
     def rule(self, file: YamlFile, at: Place) -> Rule:
         """The rule that it describes, or a UserError."""
-        if (self.always is None) == (self.finally_ is None):
-            raise file.wrong(f'the rule "{self.name}" needs either "always" or "finally", a formula', *at)
+        if self.always is None and self.finally_ is None:
+            raise file.wrong(
+                f'the rule "{self.name}" has no formula; write one after "always" or "finally"', *at
+            )
+        if self.always is not None and self.finally_ is not None:
+            sentence = f'the rule "{self.name}" has both "always" and "finally"; make two rules of it'
+            raise file.wrong(sentence, *at, "finally")
         if self.always is None:
             if self.refuse:
                 sentence = 'what holds "finally" cannot be refused; remove "refuse", or write "always"'
@@ -41,8 +56,10 @@ class RuleFile(BaseModel):
         formula = _parsed(self.always, file, (*at, "always"))
         if not holds(formula, ()):
             whenever = f"not tr.Last(...) or {_bracketed(formula)}"
-            sentence = f'"{self.name}" is broken before anything has happened; say when it counts: {whenever}'
-            raise file.wrong(f"the rule {sentence}", *at, "always")
+            sentence = f'the rule "{self.name}" is broken before anything has happened; say when it counts'
+            raise file.wrong(
+                f'{sentence}: {whenever}, or write "finally" if it counts at the end', *at, "always"
+            )
         return Rule(self.name, self.says, formula, "always", self.refuse)
 
 
@@ -69,7 +86,9 @@ def _parsed(text: str, file: YamlFile, at: Place) -> Formula:
     try:
         formula = parse(text)
     except RtlSyntaxError as error:
-        raise file.wrong(f"this is not a formula: {error}", *at) from None
+        there = brief(text[error.column - 1 :], MOST_QUOTED)
+        where = f"column {error.column}" + (f", at {there}" if there else "")
+        raise file.wrong(f"this is not a formula: {where}: {error.problem}", *at) from None
     for element in elements(formula):
         for pattern in _regexes(element):
             if slow_text(pattern) is not None:

@@ -49,8 +49,8 @@ def generate(
 
     The exit status is 1 if the check finds problems.
     """
-    from codebotler.checking.rules import read_rules
     from codebotler.cli.generate import show, write
+    from codebotler.cli.rules import rules_for
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
     from codebotler.models.chosen import chosen_model
@@ -58,7 +58,7 @@ def generate(
 
     chosen = chosen_model(model, base_url)
     known = None if world is None else World.read(world)
-    house_rules = () if rules is None else read_rules(rules)
+    house_rules = rules_for(known, rules)
     prompt = prompt_for(
         instruction,
         rooms=() if known is None else [room.name for room in known.rooms],
@@ -107,13 +107,13 @@ def check(
     It reads the program and runs it in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
-    from codebotler.checking.rules import read_rules
     from codebotler.cli.check import check_view, read_program
+    from codebotler.cli.rules import rules_for
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
 
     known = None if world is None else World.read(world)
-    house_rules = () if rules is None else read_rules(rules)
+    house_rules = rules_for(known, rules)
     source = read_program(program)
     with busy("checking"):
         found = check.check(

@@ -113,13 +113,18 @@ def _in_vain(found: Check) -> Iterator[Text]:
 def _kinds(found: Check) -> list[Sample]:
     """A sample of each kind of world in which the robot does something else.
 
-    First come those that show a problem, and then what says most about what the robot is to do: those that end
-    well, the longest first.
+    First come those that show a problem, and then what says most about what the robot is to do: those that
+    end well, the longest first.
     """
 
     def rank(sample: Sample) -> tuple[bool, bool, bool, int]:
         outcome = sample.outcome
-        return sample.number not in found.showing, outcome.error is not None, sample.in_vain, -len(outcome.trace)
+        return (
+            sample.number not in found.showing,
+            outcome.error is not None,
+            sample.in_vain,
+            -len(outcome.trace),
+        )
 
     different: dict[tuple[str, RunError | None], Sample] = {}
     for sample in found.samples:

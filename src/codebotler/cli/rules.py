@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from codebotler.checking.rule_review import Review
+from codebotler.checking.rule_review import Review, unknown_rooms_in
+from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
 from codebotler.core.skills import SKILLS
-from codebotler.core.terminal import visible
+from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import listed
+from codebotler.core.world import World
+from codebotler.simulator.rule_guard import Rule
 
 MADE_UP = ("", "x")  # texts in examples that stand for any other
 ASPECTS = {"always": "at any time", "finally": "at the end"}
+
+
+def rules_for(world: World | None, path: Path | None) -> tuple[Rule, ...]:
+    """The rules in a file, if one is named, with a remark on each room that the world lacks."""
+    rules = () if path is None else read_rules(path)
+    for sentence in () if world is None else unknown_rooms_in(rules, [room.name for room in world.rooms]):
+        note(sentence)
+    return rules
 
 
 def review_view(found: Sequence[Review]) -> RenderableType:
@@ -58,7 +70,8 @@ def step_sentence(event: Event) -> str:
     told += [f"offering {listed(offered)}"] if offered else []
     told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []
     told += [f"in {visible(event.place)}"] if event.place not in MADE_UP and not recording.is_drive else []
-    told += [f'holding "{visible(event.holding)}"'] if event.holding else []
+    held = "something" if event.holding in MADE_UP else f'"{visible(event.holding)}"'
+    told += [f"holding {held}"] if event.holding else []
     if event.found is not None:
         told.append(f"and {'finds it' if event.found else 'does not find it'}")
     told += [f'and hears "{visible(event.answer)}"'] if event.answer is not None else []

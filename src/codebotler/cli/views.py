@@ -104,6 +104,8 @@ def ending(ended: Summary | SessionView) -> Group:
 
 def _why(ended: Summary | SessionView) -> str:
     line = "" if ended.line is None else f" in line {ended.line}"
+    if ended.state is not None and ended.reason.startswith(f"{ended.state} "):  # such as `stopped by Ctrl-C`
+        return shortened(ended.reason).removeprefix(ended.state) + line
     return f"{line}: {shortened(ended.reason)}" if ended.reason else line
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import date
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -103,9 +104,9 @@ class YamlFile:
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
+            first, hint = _first(error.errors(include_url=False))
             place = (*at, *first["loc"])
-            raise self.wrong(_sentence(first, self._name(place)), *place) from None
+            raise self.wrong(_sentence(first, self._name(place)) + hint, *place) from None
 
     def _name(self, place: Place) -> str:
         if not place:
@@ -174,6 +175,18 @@ WHAT = (
 )
 
 
+def _first(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
+    """The error to report, and a hint: a key that is missing may be there, but misspelt."""
+    first = errors[0]
+    *around, missing = first["loc"] or ("",)
+    for other in errors[1:] if first["type"] == "missing" else ():
+        *place, key = other["loc"] or ("",)
+        is_beside = other["type"] == "extra_forbidden" and place == around
+        if is_beside and get_close_matches(str(key), [str(missing)]):
+            return other, f'; did you mean "{missing}"?'
+    return first, ""
+
+
 def _sentence(error: ErrorDetails, name: str) -> str:
     kind, value = error["type"], error["input"]
     if kind == "missing":
@@ -193,6 +206,8 @@ def _instead_of(expected: str, value: object) -> str:
     if value is None:
         return "is empty; fill it in or remove it"
     sentence = f"is {next(word for kind, word in WHAT if isinstance(value, kind))}, not {expected}"
+    if expected == "a list" and isinstance(value, Mapping):
+        return f'{sentence}; begin each entry with "- "'
     if expected != "a text" or not isinstance(value, int | float | date):
         return sentence
     word = {True: ' ("yes")', False: ' ("no")'}[value] if isinstance(value, bool) else ""

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from codebotler.checking.problems import Check
+from codebotler.checking.rule_review import unknown_rooms_in
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import write_program
@@ -213,6 +214,8 @@ class MissionSession:
                     return
                 raise
             self._show(room_map=room_map)
+            for sentence in unknown_rooms_in(self._view.rules, room_map.rooms) if room_map else ():
+                self._remark(sentence)
             if order.has_program:
                 self._take(mission, order.program)
             else:

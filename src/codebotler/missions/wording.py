@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from codebotler.core.program import nodes, tree_of
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
-from codebotler.core.words import brief, room_name
 from codebotler.core.trace import trace_from
+from codebotler.core.words import brief, room_name
 from codebotler.missions.log import Line, Summary
 from codebotler.rtl.wording import event_words
 
@@ -42,6 +42,13 @@ def stop_text(by: str, doing: str = "") -> str:
     """A stop in words, and what it interrupted, such as `driving to supply room`, if anything."""
     during = f" while {doing}" if doing else ""
     return f"stopped {'from' if by == PAGE else 'by'} {visible(by)}{during}"
+
+
+def state_text(state: str, reason: str) -> str:
+    """A state and why it was reached, such as `stopped by rule vault` or `failed: the door is shut`."""
+    if not reason or reason.startswith(state):
+        return shortened(reason) or state
+    return f"{state}: {shortened(reason)}"
 
 
 def title(summary: Summary) -> str:
@@ -105,7 +112,7 @@ def _rule(line: Line) -> str:
 EVENTS: Mapping[str, Callable[[Line], str]] = {
     "skill": _skill,
     "result": _result,
-    "state": lambda line: line["state"] + (f": {shortened(line['reason'])}" if "reason" in line else ""),
+    "state": lambda line: state_text(line["state"], line.get("reason", "")),
     "feedback": lambda line: shortened(line["text"]),
     "picture": lambda line: shortened(line.get("text") or f"picture: {line.get('file')}"),
     "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",

@@ -20,6 +20,7 @@ TESTS = ("Exists", "Last", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
 TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
 QUESTIONS = ("mention", "answered")
 LOOKS = {"found": True, "missed": False}
+SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
 AROUND = ("at", "holding", "to")  # what else an event must be like
 
 DEEPEST = 50
@@ -240,19 +241,23 @@ class _Parser:
         for keyword in call.keywords:
             raise self.error(keyword.col_offset, "arguments have no names in RTL")
         found = len(call.args)
+        if wanted is not None and found != wanted and name == self.question:
+            hint = f'{name} takes a question and an option, as in {name}("tea", ".*")'
+            raise self.error(at, f"{hint}; mention(...) takes a text that may be in either")
         if wanted is not None and found != wanted:
             raise self.error(at, f"{name} takes {wanted} argument{'s' * (wanted > 1)}, not {found}")
         return call.args
 
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
-        close = get_close_matches(name, known, 1)
+        close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
         return self.error(at, f"unknown {what} {name}; {hint}")
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
         found = ast.get_source_segment(self.text, node) or "something else"
         found = found if len(found) <= _LONGEST_SHOWN else found[: _LONGEST_SHOWN - 3] + "..."
-        return self.error(node.col_offset, f"expected {what}, found {found}")
+        hint = "; put quotes around it" if "string" in what and isinstance(node, ast.Name) else ""
+        return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
 
     def error(self, at: ast.expr | int, problem: str) -> RtlSyntaxError:
         if isinstance(at, ast.Attribute):

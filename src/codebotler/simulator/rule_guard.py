@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, attempted
@@ -15,6 +15,7 @@ from codebotler.rtl.wording import event_words
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 
 VIOLATION = "RuleViolation"
+Verdict: TypeAlias = Literal["forbids", "cannot judge", "is broken by"]
 
 
 @dataclass(frozen=True)
@@ -42,28 +43,27 @@ class RuleViolationError(RobotError):
     Args:
         rule: the rule.
         event: what would break it, or has broken it; None at the end of a mission.
-        is_late: whether that has happened already.
+        verdict: what it has to do with the event.
     """
 
-    def __init__(self, rule: Rule, event: Event | None, *, is_late: bool = False) -> None:
-        if event is None:
-            what = "is not kept at the end"
-        else:
-            what = f"{'is broken by' if is_late else 'forbids'} {event_words(event)}"
-        super().__init__(VIOLATION, f'the rule "{rule.name}" {what}: {rule.says.rstrip(".")}')
-        self.rule, self.event, self.is_late = rule, event, is_late
+    def __init__(self, rule: Rule, event: Event | None, verdict: Verdict = "forbids") -> None:
+        what = "is not kept at the end" if event is None else f"{verdict} {event_words(event)}"
+        why = ", which offers an option that is no text" if verdict == "cannot judge" else ""
+        super().__init__(VIOLATION, f'the rule "{rule.name}" {what}{why}: {rule.says.rstrip(".")}')
+        self.rule, self.event, self.verdict = rule, event, verdict
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _violation, (self.rule, self.event, self.is_late), vars(self)
+        return type(self), (self.rule, self.event, self.verdict), vars(self)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the event has happened already."""
+        return self.verdict == "is broken by"
 
     @property
     def ends_run(self) -> bool:
         """Whether the program cannot go on, whatever it catches."""
         return self.is_late or not self.rule.refuse
-
-
-def _violation(rule: Rule, event: Event | None, is_late: bool) -> RuleViolationError:  # noqa: FBT001 - for pickle
-    return RuleViolationError(rule, event, is_late=is_late)
 
 
 class RuleGuard:
@@ -111,7 +111,8 @@ class RuleGuard:
             for attempt in attempts:
                 events = _results(rule, attempt) if attempt.kind in depends else (attempt,)
                 if not any([_would_hold(monitor, event) for event in events]):  # noqa: C419 - quicker
-                    raise RuleViolationError(rule, attempt)
+                    unclear = _is_unclear(monitor, attempt)
+                    raise RuleViolationError(rule, attempt, "cannot judge" if unclear else "forbids")
 
     def happened(self, event: Event) -> None:
         """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
@@ -123,7 +124,7 @@ class RuleGuard:
                 self._unjudged.add(rule.name)
                 holds = False
             if not holds and rule.when == "always" and late is None:
-                late = RuleViolationError(rule, event, is_late=True)
+                late = RuleViolationError(rule, event, "is broken by")
         if late is not None:
             raise late
 
@@ -143,6 +144,15 @@ def _moved(robot: SimulatedRobot, attempt: Event) -> Sequence[str]:
         return (robot.taken.label,)
     here = robot.things[robot.room] if attempt.kind == "pick" else ()
     return [thing.label for thing in here if thing.is_meant_by(attempt.text, robot.rules.matching)][:1]
+
+
+def _is_unclear(monitor: Monitor, event: Event) -> bool:
+    """Whether an event cannot be judged, since it has options that are no text."""
+    try:
+        monitor.would_hold(event)
+    except Inconclusive:
+        return True
+    return False
 
 
 def _would_hold(monitor: Monitor, event: Event) -> bool:

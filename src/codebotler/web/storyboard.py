@@ -154,7 +154,7 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: Check) -> list[Strip]:
-    """One strip for each kind of world that makes a difference: one for each problem, then those that end well."""
+    """One strip for each kind of world that makes a difference: those that show a problem first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)

@@ -69,6 +69,20 @@ def test_an_example_shows_when_a_rule_counts() -> None:
     assert [(event.kind, event.text) for event in review.keeps] == [("say", "knock"), ("goto", "office")]
 
 
+def test_a_robot_picks_up_what_it_holds_in_an_example() -> None:
+    (review,) = reviewed(
+        rules('not tr.Exists(at("kitchen", holding("glass", goto(without("kitchen")))))'), WORLD
+    )
+    assert review.breaks is not None
+    assert [(event.kind, event.text) for event in review.breaks[:2]] == [
+        ("goto", "kitchen"),
+        ("pick", "glass"),
+    ]
+    assert review.breaks[2].holding == "glass"
+    (odd,) = reviewed(rules('not tr.Exists(pick("mug")) and not tr.Exists(holding("mug", say(".*")))'), WORLD)
+    assert odd.breaks is not None
+
+
 def test_examples_of_a_world_are_of_its_rooms() -> None:
     (review,) = reviewed(rules('not tr.Exists(at("kitchen", say("hush")))'), WORLD)
     assert review.breaks is not None
@@ -106,6 +120,8 @@ def test_a_name_that_the_world_lacks_is_told() -> None:
     for text, name in zip(texts, named, strict=True):
         (review,) = reviewed(rules(text), WORLD)
         assert any(name in warning for warning in review.warnings), text
+        (known,) = reviewed(rules('not tr.Exists(holding(".", goto("hall")))'), WORLD)
+        assert not known.warnings
         (anywhere,) = reviewed(rules(text))
         assert not any("world" in warning for warning in anywhere.warnings)
 

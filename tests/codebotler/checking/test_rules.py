@@ -53,14 +53,39 @@ def test_rules_are_read_in_order(tmp_path: Path) -> None:
         ("- a\n", 1, ["a list", "a mapping"]),
         ("rules: []\n", 1, ['"rules"']),
         ("rules:\n  - name: a\n    says: b\n", 2, ['"a"', '"always"', '"finally"']),
-        (f"rules:\n  - name: a\n    says: b\n    always: '{HOLDS}'\n    finally: '{HOLDS}'\n", 2, ["either"]),
-        (f"rules:\n  - name: Big\n    says: b\n    always: '{HOLDS}'\n", 2, ['"name"']),
+        (
+            f"rules:\n  - name: a\n    says: b\n    always: '{HOLDS}'\n    finally: '{HOLDS}'\n",
+            5,
+            ["has both"],
+        ),
+        (f"rules:\n  - name: Big\n    says: b\n    always: '{HOLDS}'\n", 2, ['"name"', "small letters"]),
+        (
+            f"rules:\n  - name: a\n    say: b\n    always: '{HOLDS}'\n",
+            3,
+            ['"say" is unknown', 'mean "says"?'],
+        ),
+        (
+            f"rules:\n  name: a\n  says: b\n  always: '{HOLDS}'\n",
+            1,
+            ['"rules" is a mapping', 'each entry with "- "'],
+        ),
+        ("rules:\n  - name: a\n    says: b\n    always: not tr.Exists(go_to('x'))\n", 4, ["mean goto?"]),
+        (
+            "rules:\n  - name: a\n    says: b\n    always: not tr.Exists(is_in_room('x'))\n",
+            4,
+            ["mean check?"],
+        ),
+        (
+            "rules:\n  - name: a\n    says: b\n    always: not tr.Exists(goto(hall))\n",
+            4,
+            ["quotes around it"],
+        ),
         (f"rules:\n  - name: a\n    always: '{HOLDS}'\n", 2, ['"says"', "missing"]),
         (f"rules:\n  - name: a\n    says: b\n    whenever: '{HOLDS}'\n", 4, ['"whenever"']),
         (
             "rules:\n  - name: a\n    says: b\n    always: not tr.Exist(goto('x'))\n",
             4,
-            ["column 8", "Exists?"],
+            ["column 8, at Exist(goto(", "Exists?"],
         ),
         ("rules:\n  - name: a\n    says: b\n    always: tr.Exists(fly('x'))\n", 4, ["unknown element fly"]),
         (
@@ -109,8 +134,8 @@ def test_a_rule_that_is_broken_somewhere_is_a_problem_with_line_rule_and_world(t
         tmp_path, "go_to('kitchen')", "if is_in_room('mug'):", "    go_to('server room')", *RETURNS
     )
     assert problem == (
-        'line 4: RuleViolation: the rule "server-room" forbids going to "server room": Never go into the server room, '
-        'where "mug" is in "kitchen"'
+        'line 4: RuleViolation: the rule "server-room" forbids going to "server room": '
+        'Never go into the server room, where "mug" is in "kitchen"'
     )
 
 

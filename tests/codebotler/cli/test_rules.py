@@ -63,7 +63,18 @@ def test_a_program_that_breaks_a_rule_is_rejected_and_not_run(files: Path, named
     for arguments in (["check", "sly.py"], ["run", "sly.py", "--yes", "--speed", "0"]):
         ended = codebotler(files, *arguments, "--world", "world.yaml", *more, **variables)
         assert ended.status == 1
-        assert told in ended.out
+        assert told in " ".join(ended.out.split())
+
+
+@pytest.mark.parametrize("command", [["check"], ["run", "--yes", "--speed", "0"]])
+def test_a_room_that_a_rule_names_and_the_world_lacks_is_told(files: Path, command: list[str]) -> None:
+    (files / "typo.yaml").write_text(
+        (files / "rules.yaml").read_text().replace('goto("vault")', 'goto("valut")')
+    )
+    ended = codebotler(
+        files, command[0], "sly.py", *command[1:], "--world", "world.yaml", "--rules", "typo.yaml"
+    )
+    assert 'the rule "vault" names the room "valut", which is not there' in ended.err
 
 
 def test_a_rule_ends_a_program_that_runs_all_the_same(files: Path) -> None:

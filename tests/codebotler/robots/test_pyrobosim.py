@@ -477,9 +477,7 @@ def test_command_keeps_a_house_rule(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", "pyrobosim", "--yes"]
     command += ["--world", "world.yaml", "--speed", "0", "--rules", "house.yaml", "--despite-problems"]
     environment = {**os.environ, "CODEBOTLER_HOME": str(tmp_path / "home"), "NO_COLOR": "1"}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert "stopped by rule study" in done.stdout, done.stderr
     assert "picks up" in done.stdout
     assert "puts down" not in done.stdout

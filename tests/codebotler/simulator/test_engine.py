@@ -309,7 +309,10 @@ def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
 
 LONG_RUNS = [
     *((saying(str(number)), WORLD) for number in range(FEW)),  # the first batch, whose results come at once
-    *((f"def task_program():\n    sum(range(10**12))\n    say('{number}')\n", WORLD) for number in range(2 * FEW)),
+    *(
+        (f"def task_program():\n    sum(range(10**12))\n    say('{number}')\n", WORLD)
+        for number in range(2 * FEW)
+    ),
 ]
 
 

@@ -130,7 +130,9 @@ def test_what_depends_on_a_result_is_noticed_when_it_is_known() -> None:
 
 def test_an_option_that_is_no_text_is_refused() -> None:
     one = robot(rule('not tr.Exists(ask("tea", "^no$"))'))
-    refused(one, "ask", "ann", "tea?", (Option("1", is_text=False),))
+    error = refused(one, "ask", "ann", "tea?", (Option("1", is_text=False),))
+    told = 'the rule "vault" cannot judge asking "tea?", which offers an option that is no text: '
+    assert str(error).startswith(told.replace("vault", error.rule.name))
 
 
 def test_rules_of_the_end() -> None:
@@ -175,7 +177,7 @@ def test_a_refusal_may_be_caught(worker: Worker) -> None:
     outcome = ran(worker, program, [rule('not tr.Exists(goto("vault"))', refuse=True)])
     assert outcome.status is Status.FINISHED
     assert [event.kind for event in outcome.trace] == ["say"]
-    assert "forbids going to \"vault\"" in outcome.trace[0].text
+    assert 'forbids going to "vault"' in outcome.trace[0].text
 
 
 def test_a_rule_of_the_end_is_reported(worker: Worker) -> None:
