@@ -118,3 +118,25 @@ def test_the_regexes_of_a_suite_take_linear_time(suite: str) -> None:
 )
 def test_a_slow_regex_is_found(pattern: str) -> None:
     assert slow_text(pattern) is not None
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        *("(?:a|aa){40}b", r"(?:\w{1,20} ?){1,12}!", "(?:a?){30}a{30}", "(?:(?=a)a|(?!b)a){25}b"),
+        *(r"\w{0,20}" * 8 + "!", "(?:(?:(?:x{0,99}){0,99}){0,99}){0,99}y", "a?" * 30 + "a{30}"),
+    ],
+)
+def test_a_regex_that_is_slow_although_bounded_is_found_at_once(pattern: str) -> None:
+    assert slow_text(pattern) is not None
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        *(r"\bserver room\b", r"[.!?]\s*$", "^(person|people|someone)?$", "knock.{0,20}door", "colou?rs?"),
+        *(r"(?:\d{1,2}:)?\d{1,2} (?:am|pm)", "(?:mug|cup)s?(?:,? (?:and )?(?:mug|cup)s?)*", r"room \d{3}-\d{2}"),
+    ],
+)
+def test_what_people_write_is_not_found_slow(pattern: str) -> None:
+    assert slow_text(pattern) is None

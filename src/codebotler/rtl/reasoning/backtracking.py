@@ -10,7 +10,7 @@ from random import Random
 from typing import Any, NamedTuple
 
 from codebotler.rtl.pattern import compile_regex
-from codebotler.rtl.reasoning.regex_samples import Tree, inner_trees, parse_tree, spelled
+from codebotler.rtl.reasoning.regex_samples import Tree, failing, inner_trees, parse_tree, spelled
 
 SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)  # of texts, in characters
 FACTOR = 3  # how much longer one text is than another, about
@@ -22,7 +22,8 @@ ENOUGH = 0.02  # seconds beyond which no longer text is needed
 LONG = 0.1  # seconds beyond which a measurement is hardly disturbed
 TRIES = 10  # of a shorter one that seems to be superlinear
 MOST = 40  # texts that are tried with a regex
-MANY = 50  # repetitions from which a repeat counts as endless
+MANY, TWICE = 50, 1  # repetitions from which a repeat counts as endless, and as one at all
+SHORT_SIZES, TOO_LONG = range(4, 41, 2), 0.01  # characters in which, and seconds after which, a regex explodes
 
 FILLERS = (" ", "\n", "1", "a", "a ", "1 ", "a, ", "-", ",", "'", "no ", "not ")
 SUFFIXES = ("", "\0 x y z x y z")
@@ -75,20 +76,36 @@ def _seconds(read: Callable[[str], object], text: str) -> float:
 @cache
 def slow_text(pattern: str) -> Attack | None:
     """A text on which finding a regex takes more than linear time; None if none was found."""
+    every = failing(pattern).findall
+    for attack in sampled_attacks(pattern, TWICE):
+        if explodes(every, attack):
+            return attack
     find = compile_regex(pattern).findall
     return next((attack for attack in sampled_attacks(pattern) if is_superlinear(find, attack)), None)
 
 
-def sampled_attacks(pattern: str) -> list[Attack]:
-    """Some texts that may take a regex long, the same each time."""
-    every = [*_attacks(pattern)]
+def explodes(read: Callable[[str], object], attack: Attack) -> bool:
+    """Whether a function that finds nothing takes long to read even a short text.
+
+    What is bounded, such as `(?:a|aa){40}b`, takes no longer from some length on, but seconds until then.
+    """
+    for size in SHORT_SIZES:
+        text = attack.text(size)[:size]
+        if (spent := _seconds(read, text)) > TOO_LONG and min(spent, _seconds(read, text)) > TOO_LONG:
+            return True
+    return False
+
+
+def sampled_attacks(pattern: str, repeated: int = MANY) -> list[Attack]:
+    """Some texts that may take a regex long, the same each time, from what it may repeat so many times."""
+    every = [*_attacks(pattern, repeated)]
     return Random(pattern).sample(every, min(MOST, len(every)))  # noqa: S311 - no secret
 
 
-def _attacks(pattern: str) -> Iterator[Attack]:
+def _attacks(pattern: str, repeated: int) -> Iterator[Attack]:
     """Near misses that repeat what the regex repeats; none if it repeats nothing."""
     tree = parse_tree(pattern)
-    repeats = [*_repeats(list(tree), ("",))]
+    repeats = [*_repeats(list(tree), ("",), repeated)]
     units = dict.fromkeys(unit for _, several in repeats for unit in several)
     if not units:
         return
@@ -104,21 +121,23 @@ def _attacks(pattern: str) -> Iterator[Attack]:
     yield from (Attack(*pair, SUFFIXES[-1], BLOCKS) for pair in pairs if pair[0])
 
 
-def _repeats(items: Sequence[Tree], before: Sequence[str]) -> Iterator[tuple[Sequence[str], list[str]]]:
-    """For each endless repeat: texts that lead to it, and units that it may repeat."""
+def _repeats(
+    items: Sequence[Tree], before: Sequence[str], repeated: int
+) -> Iterator[tuple[Sequence[str], list[str]]]:
+    """For each repeat of so many times: texts that lead to it, and units that it may repeat."""
     for at, (op, value) in enumerate(items):
-        if (inner := _repeated(str(op), value)) is not None:
+        if (inner := _repeated(str(op), value, repeated)) is not None:
             several = [unit for unit in spelled(inner)[:3] if unit]
             behind = _until_next_repeat(items[at + 1 :])
             yield before, [*several, *(unit + more for unit in several[:1] for more in behind)]
         for part in inner_trees(str(op), value):
-            yield from _repeats(list(part), before)
+            yield from _repeats(list(part), before, repeated)
         following = [text for text in spelled([(op, value)]) if text][:2] or [""]
         before = [*dict.fromkeys(one + other for one in before for other in following)][:2]
 
 
 def _until_next_repeat(items: Sequence[Any]) -> list[str]:
-    until = [*takewhile(lambda item: _repeated(str(item[0]), item[1]) is None, items)]
+    until = [*takewhile(lambda item: _repeated(str(item[0]), item[1], MANY) is None, items)]
     return [*dict.fromkeys(filter(None, (*spelled(until)[:2], *spelled(until, " ")[:2])))]
 
 
@@ -131,5 +150,5 @@ def _denied(items: Sequence[Any]) -> Iterator[str]:
             yield from _denied(part)
 
 
-def _repeated(op: str, value: Any) -> Tree | None:  # noqa: ANN401 - as Python's parser made it
-    return value[2] if op in ("MAX_REPEAT", "MIN_REPEAT") and value[1] >= MANY else None
+def _repeated(op: str, value: Any, repeated: int) -> Tree | None:  # noqa: ANN401 - as Python's parser made it
+    return value[2] if op in ("MAX_REPEAT", "MIN_REPEAT") and value[1] >= repeated else None

@@ -26,6 +26,23 @@ def parse_tree(pattern: str) -> Tree:
     return import_module("re._parser").parse(pattern, _FLAGS)
 
 
+def failing(pattern: str) -> re.Pattern[str]:
+    """A regex that tries all that another one tries, with no repeat that must happen twice, and is never found."""
+    tree = parse_tree(pattern)
+    _loosen(tree)
+    tree.append(parse_tree("(?!)")[0])
+    compiled: re.Pattern[str] = import_module("re._compiler").compile(tree, _FLAGS)
+    return compiled
+
+
+def _loosen(tree: Tree) -> None:
+    for at, (op, arguments) in enumerate(tree):
+        if str(op) in {"MAX_REPEAT", "MIN_REPEAT"} and arguments[2].getwidth()[0]:
+            tree[at] = (op, (min(arguments[0], 1), *arguments[1:]))
+        for inner in inner_trees(str(op), arguments) if str(op) != "ASSERT_NOT" else ():
+            _loosen(inner)
+
+
 def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Python's parser made them
     """The trees directly inside one node."""
     match op:
