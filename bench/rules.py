@@ -26,6 +26,7 @@ from codebotler.checking.check import checks_on
 from codebotler.checking.problems import Check, Sample
 from codebotler.checking.rules import read_rules
 from codebotler.checking.sampled import CheckSettings
+from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Event, Option, Outcome, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import EventPattern, Formula, Inconclusive, Last, Not, holds, parse
@@ -34,7 +35,7 @@ from codebotler.rtl.semantics import is_match
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import SimulatedRobot, resolve_room
-from codebotler.simulator.rule_guard import VIOLATION, Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge

@@ -80,6 +80,10 @@ def installed() -> Iterator[None]:
         raise UserError(f"{package} is not installed; `{install_command(package)}` installs it") from None
 
 
+VIOLATION = "RuleViolation"
+"""The kind of error by which a house rule ends a run, or refuses a skill."""
+
+
 class RobotError(Exception):
     """The robot cannot do what it was asked to do.
 

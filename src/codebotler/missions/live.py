@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any, Protocol
+from typing import Protocol
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills import Skill
@@ -14,7 +14,7 @@ from codebotler.core.trace import Event, Trace, attempted, trace_data
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, room_told
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -97,6 +97,8 @@ class LiveRobot:
         """Execute one skill, or raise RobotError, StoppedError, RobotLostError, or OSError for its log."""
         self._check_end()
         row = self.skills[skill]
+        if row.recording is not None and row.recording.is_drive:  # what is judged is what the robot is told
+            arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
         event = attempted(row, arguments, place=self._place, time=self.now, holding=self._held)
         if event is not None and self._guard is not None:
             self._judge(self._guard, event)
@@ -112,10 +114,13 @@ class LiveRobot:
             return result
         if row.recording.when_tried:
             self._events.pop()
-        self._events.append(replace(event, **_seen(row, result)))
+        chosen = _position(result, event) if event.options else None
+        answer = None if chosen is None else event.options[chosen].text
+        found = result if isinstance(result, bool) else None
+        self._events.append(replace(event, answer=answer, found=found))
         self._place_and_hold(event)
         self._happened(self._events[-1])
-        return _position(result, event) if event.options else result
+        return result if chosen is None else chosen
 
     def _place_and_hold(self, event: Event) -> None:
         match event.kind:
@@ -168,14 +173,14 @@ class LiveRobot:
         return [] if self._room_map is None else self._room_map.rooms_meant(request)
 
     def _room(self, request: str) -> str:
-        """The room to which a request leads, by its name if that is known."""
+        """The room to which a request leads, as rules see it: by its name if that is known."""
         known = None if self._room_map is None or not request else self._room_map.room(request)
-        return known or request
+        return room_told(known, request) if known else request
 
     def _seen_from(self, event: Event) -> Event:
         """An event as rules see it: rooms by the names that the robot knows them by."""
-        room = self._room(event.text) if event.kind == "goto" else event.text
-        return replace(event, text=room, place=self._room(event.place))
+        text = self._room(event.text) if event.kind == "goto" else event.text
+        return replace(event, text=text, place=self._room(event.place))
 
     def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, logged."""
@@ -247,13 +252,6 @@ def _told(broken: RuleViolationError) -> dict[str, object]:
 
 def _text(argument: Argument) -> base.Argument:
     return argument if isinstance(argument, str) else tuple(option.text for option in argument)
-
-
-def _seen(skill: Skill, result: base.Result) -> dict[str, Any]:
-    """The fields of an event that come from the answer."""
-    if isinstance(result, bool):
-        return {"found": result}
-    return {"answer": result} if skill.recording and skill.recording.options else {}
 
 
 def _position(result: base.Result, event: Event) -> int:

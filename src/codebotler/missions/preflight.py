@@ -15,7 +15,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot,
 from codebotler.simulator.sampled_robot import RoomMap
 
 MOST_ROOMS = 1_000
-"""Of a robot, for a check: each drive is compared with all of them."""
+"""Of a robot, for a check, which compares each drive with all of them."""
 
 
 def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | None, str]:
@@ -47,16 +47,21 @@ def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | No
     place = here if isinstance(here, str) else ""
     if not isinstance(rooms, list) or not rooms:
         return None, place
-    if len(rooms) > MOST_ROOMS:
-        remark(
-            f"the robot lists {len(rooms):,} rooms, more than the {MOST_ROOMS:,} that a check supports; "
-            "it uses only the rooms that the program names"
-        )
-        return None, place
     if place and place not in rooms:
         remark(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
     names = dict.fromkeys([*rooms, place] if place else rooms)
     return RoomMap(tuple(names), place or rooms[0], plain=not robot.rooms_are_regexes), place
+
+
+def rooms_to_check(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
+    """The rooms for a check; None, with a remark, if there are too many."""
+    if room_map is None or len(room_map.rooms) <= MOST_ROOMS:
+        return room_map
+    remark(
+        f"the robot lists {len(room_map.rooms):,} rooms, more than the {MOST_ROOMS:,} that a check supports; "
+        "it uses only the rooms that the program names"
+    )
+    return None
 
 
 def unknown_rooms(program: str, room_map: RoomMap) -> list[str]:

@@ -20,7 +20,13 @@ from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import write_program
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
-from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms, with_closest_here
+from codebotler.missions.preflight import (
+    missing_skills,
+    preflight,
+    rooms_to_check,
+    unknown_rooms,
+    with_closest_here,
+)
 from codebotler.missions.view import CHECKING, Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
@@ -108,11 +114,16 @@ class MissionSession:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._edited = program
-            self._change(program=program, author="", busy=CHECKING, **UNCHECKED)
+            self._change(program=program, author="", busy=CHECKING, off=(), **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
-        """Leave out a rule in this mission only, for a reason that is logged, and check the program again."""
-        if not reason.strip():
+        """Leave out a rule for this program in this mission only, and check it again.
+
+        Args:
+            name: of the rule.
+            reason: why, which is logged.
+        """
+        if not any(letter.isalnum() for letter in reason):
             raise MissionError("say why the rule does not count in this mission")
         with self._editing, self._lock:
             view, mission = self._view, self._mission
@@ -131,7 +142,7 @@ class MissionSession:
             if not view.may_be_asked_again:
                 raise MissionError("the model cannot be asked again now")
             self._ask_again = (view.problems if repair else (),)
-            self._change(busy=f"asking {view.model}", is_written=True)
+            self._change(busy=f"asking {view.model}", is_written=True, off=())
 
     def approve(self, seen: str, *, despite_problems: bool = False) -> None:
         """Let the robot run the program that the person saw, which is named by its digest."""
@@ -213,7 +224,7 @@ class MissionSession:
                 if self._is_stopped():
                     return
                 raise
-            self._show(room_map=room_map)
+            self._show(room_map=rooms_to_check(room_map, self._remark))
             for sentence in unknown_rooms_in(self._view.rules, room_map.rooms) if room_map else ():
                 self._remark(sentence)
             if order.has_program:

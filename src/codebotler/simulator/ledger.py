@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.errors import RobotError
+from codebotler.core.errors import VIOLATION, RobotError
 from codebotler.core.skills import SkillTable
 from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
@@ -95,7 +95,9 @@ class Ledger:
                 error = self.errors[number]
                 return self.outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
             case {"end": "python-error", "kind": str(kind), "message": str(message)}:
-                name = kind if kind.isidentifier() else "Exception"
+                name = (
+                    kind if kind.isidentifier() and kind != VIOLATION else "Exception"
+                )  # rules are not forged
                 return self.outcome(Status.PYTHON_ERROR, name[:100], message, line)
             case _:
                 return self.outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
-from codebotler.core.errors import RobotError
+from codebotler.core.errors import VIOLATION, RobotError
 from codebotler.core.trace import Event, attempted
 from codebotler.rtl import Formula, Inconclusive, Monitor
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.wording import event_words
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 
-VIOLATION = "RuleViolation"
 Verdict: TypeAlias = Literal["forbids", "cannot judge", "is broken by"]
 
 
@@ -79,6 +78,7 @@ class RuleGuard:
         self._always = [each for each in watched if each[0].when == "always"]
         self._finally = [each for each in watched if each[0].when == "finally"]
         self._unjudged: set[str] = set()  # names of rules that had to compare an option that is no text
+        self._came = ""  # the words of the last drive
 
     @property
     def may_refuse(self) -> bool:
@@ -88,31 +88,47 @@ class RuleGuard:
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
         """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
         row, before = robot.skills[skill], len(robot.events)
-        attempt = attempted(row, arguments, place=robot.room, time=robot.now, holding=robot.held or "")
+        place = room_told(robot.room, self._came)
+        attempt = attempted(row, arguments, place=place, time=robot.now, holding=robot.held or "")
         if attempt is None:
             return robot.execute(skill, arguments)
         is_drive = row.recording is not None and row.recording.is_drive
-        names = robot.meant_rooms(attempt.text) if is_drive else _moved(robot, attempt)
+        said = [
+            argument for argument in arguments if isinstance(argument, str)
+        ]  # with the spaces at its ends
+        names = dict.fromkeys(
+            name
+            for request in (attempt.text, *said)
+            for name in (robot.meant_rooms(request) if is_drive else _moved(robot, attempt.kind, request))
+        )
         self.judge(attempt, *(replace(attempt, text=name) for name in names if name != attempt.text))
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
             for event in robot.events[before:]:
-                self.happened(event)
+                self.happened(replace(event, place=place))
             raise
+        if is_drive:
+            self._came = attempt.text
         for event in robot.events[before:]:
-            elsewhere = is_drive and event.text != robot.room
-            self.happened(replace(event, text=robot.room) if elsewhere else event)
+            reached = room_told(robot.room, self._came) if is_drive else event.text
+            self.happened(replace(event, text=reached, place=place))
         return result
 
     def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
+        caught: RuleViolationError | None = None
         for rule, monitor, depends in self._always:
             for attempt in attempts:
                 events = _results(rule, attempt) if attempt.kind in depends else (attempt,)
                 if not any([_would_hold(monitor, event) for event in events]):  # noqa: C419 - quicker
                     unclear = _is_unclear(monitor, attempt)
-                    raise RuleViolationError(rule, attempt, "cannot judge" if unclear else "forbids")
+                    broken = RuleViolationError(rule, attempt, "cannot judge" if unclear else "forbids")
+                    if broken.ends_run:
+                        raise broken
+                    caught = caught or broken  # another rule may end the run
+        if caught is not None:
+            raise caught
 
     def happened(self, event: Event) -> None:
         """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
@@ -136,14 +152,19 @@ class RuleGuard:
         return None
 
 
-def _moved(robot: SimulatedRobot, attempt: Event) -> Sequence[str]:
+def room_told(room: str, request: str) -> str:
+    """A room as rules see it: by its name, and by the words of the drive to it where the name is a regex."""
+    return room if not request or room.casefold() in request.casefold() else f"{room}\n{request}"
+
+
+def _moved(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
     """By which name the thing is recorded that would be picked up or put down."""
     if robot.rules.events != "as-happened":
         return ()
-    if attempt.kind == "place" and robot.taken is not None:
+    if kind == "place" and robot.taken is not None:
         return (robot.taken.label,)
-    here = robot.things[robot.room] if attempt.kind == "pick" else ()
-    return [thing.label for thing in here if thing.is_meant_by(attempt.text, robot.rules.matching)][:1]
+    here = robot.things[robot.room] if kind == "pick" else ()
+    return [thing.label for thing in here if thing.is_meant_by(request, robot.rules.matching)][:1]
 
 
 def _is_unclear(monitor: Monitor, event: Event) -> bool:

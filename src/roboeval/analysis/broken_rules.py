@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.simulator.rule_guard import VIOLATION
+from codebotler.core.errors import VIOLATION
 from roboeval.analysis.metrics import Estimate, by_formula, overall, pass_at_1, task_scores
 from roboeval.evaluation.runs.completions import KEY
 

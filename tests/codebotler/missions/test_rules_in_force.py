@@ -8,9 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.cli.run import checked
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, State
-from codebotler.missions.mission import Mission
+from codebotler.missions.mission import Mission, MissionError
+from codebotler.missions.session import MissionSession
+from codebotler.missions.view import Order
+from codebotler.models.recorded import recorded_model as recorded
 from codebotler.robots.base import Result, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
@@ -37,6 +41,12 @@ def task_program():
 
 def answering(answer: Callable[[str, str], Result] = lambda *_: None) -> Answering:
     return Answering(answer)
+
+
+def knowing(*rooms: str) -> Answering:
+    """A robot that knows rooms, and is in the first."""
+    told: dict[str, Result] = {"get_all_rooms": [*rooms], "get_current_location": rooms[0]}
+    return answering(lambda skill, _: told.get(skill))
 
 
 def ran(
@@ -144,3 +154,70 @@ def test_what_is_carried_counts_on_the_simulated_robot(tmp_path: Path) -> None:
     mission, lines = ran(tmp_path, Simulated(world, speed=None), program, [rule])
     assert mission.state is State.STOPPED
     assert [line["arguments"] for line in lines if line["event"] == "skill"][-1] == {"obj": "glass"}
+
+
+REGEXES = RoomMap(("hall", "acme inc.", "lab [0-9]"), "hall")
+
+
+@pytest.mark.parametrize("request_", ["acme inc ", " acme inc", "acme inc\t"])
+def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: str) -> None:
+    """The regex of the room needs a character at its end, which would be a space."""
+    robot = answering()
+    rule = Rule("acme", "Stay out.", parse('not tr.Exists(goto("acme inc[.]"))'))
+    mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], REGEXES)
+    assert (mission.state, robot.done) == (State.DONE, ["acme inc"])
+
+
+def test_a_room_whose_name_is_a_regex_counts_by_the_words_of_the_request_too(tmp_path: Path) -> None:
+    rule = Rule("lab", "Take nothing in lab 3.", parse('not tr.Exists(at("lab 3", pick(".*")))'))
+    program = "def task_program():\n    go_to('lab {}')\n    pick('knife')\n"
+    for number, state in ((3, State.STOPPED), (4, State.DONE)):
+        mission, _ = ran(tmp_path / str(number), answering(), program.format(number), [rule], REGEXES)
+        assert mission.state is state
+
+
+def test_an_answer_is_judged_as_the_option_that_it_means(tmp_path: Path) -> None:
+    rule = Rule("no", "Stop at a no.", parse('not tr.Exists(answered("^no$"))'))
+    robot = answering(lambda skill, _: "\tNo\n" if skill == "ask" else None)
+    program = "def task_program():\n    say(ask('ann', 'Tea?', ['yes', 'no']))\n"
+    mission, _ = ran(tmp_path, robot, program, [rule])
+    assert mission.state is State.STOPPED
+    assert robot.done == ["ann"]
+
+
+def test_rules_hold_in_a_building_of_more_rooms_than_a_check_takes(tmp_path: Path) -> None:
+    rooms = RoomMap(("hall", *(f"room {number}" for number in range(1_500)), "vault"), "hall", plain=True)
+    rule = Rule("vault", VAULT.says, parse('not tr.Exists(goto("^vault$"))'))
+    robot = knowing(*rooms.rooms)
+    program = "def task_program():\n    go_to('into the vault')\n"
+    session = MissionSession(
+        robot, tmp_path, Order(program=program), open_model=recorded, check=checked, rules=(rule,)
+    )
+    session.start()
+    view = session.wait_until(lambda now: now.may_be_approved)
+    assert any("1,502 rooms" in remark for remark in view.remarks)
+    session.approve(view.digest, despite_problems=True)
+    assert session.wait_until(lambda _: False).state is State.STOPPED
+    assert "into the vault" not in robot.done
+
+
+def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: Path) -> None:
+    session = MissionSession(
+        knowing("hall", "vault"),
+        tmp_path,
+        Order(program=STUBBORN),
+        open_model=recorded,
+        check=checked,
+        rules=(VAULT,),
+    )
+    session.start()
+    session.wait_until(lambda now: now.may_be_approved)
+    for reason in ("", " ", "\u200b", "..."):
+        with pytest.raises(MissionError, match="say why"):
+            session.switch_off("vault", reason)
+    session.switch_off("vault", "the door is broken")
+    assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == ()
+    session.edit("def task_program():\n    go_to('vault')\n")
+    assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == (VAULT,)
+    session.stop("a test")
+    session.join(10)

@@ -135,7 +135,11 @@ def test_a_regex_that_is_slow_although_bounded_is_found_at_once(pattern: str) ->
     "pattern",
     [
         *(r"\bserver room\b", r"[.!?]\s*$", "^(person|people|someone)?$", "knock.{0,20}door", "colou?rs?"),
-        *(r"(?:\d{1,2}:)?\d{1,2} (?:am|pm)", "(?:mug|cup)s?(?:,? (?:and )?(?:mug|cup)s?)*", r"room \d{3}-\d{2}"),
+        *(
+            r"(?:\d{1,2}:)?\d{1,2} (?:am|pm)",
+            "(?:mug|cup)s?(?:,? (?:and )?(?:mug|cup)s?)*",
+            r"room \d{3}-\d{2}",
+        ),
     ],
 )
 def test_what_people_write_is_not_found_slow(pattern: str) -> None:

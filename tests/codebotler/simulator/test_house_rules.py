@@ -128,6 +128,38 @@ def test_what_depends_on_a_result_is_noticed_when_it_is_known() -> None:
     ).is_late
 
 
+def test_a_room_whose_name_is_a_regex_counts_by_all_words_that_were_used() -> None:
+    world = World((Room("hall"), Room("lab [0-9]", ("knife",)), Room("acme inc.")), "hall")
+
+    def guarded(formula: str) -> SimulatedRobot:
+        return SimulatedRobot(world, AS_WRITTEN, guard=RuleGuard([rule(formula)]))
+
+    assert not refused(guarded('not tr.Exists(goto("acme inc[.]"))'), "go_to", "acme inc ").is_late
+    for formula in (
+        'not tr.Exists(at("lab 3", pick(".*")))',
+        'not tr.OnlyAfterLast(goto("lab 3")).Exists(pick(".*"))',
+    ):
+        three, four = guarded(formula), guarded(formula)
+        three.perform("go_to", ["lab 3"])
+        assert not refused(three, "pick", "knife").is_late
+        four.perform("go_to", ["lab 4"])
+        four.perform("pick", ["knife"])
+
+
+def test_a_rule_that_ends_the_run_comes_before_one_that_refuses() -> None:
+    soft = rule('not tr.Exists(goto("vault"))', refuse=True)
+    hard = rule('not tr.Exists(goto("vault"))')
+    for rules in ((soft, hard), (hard, soft)):
+        assert refused(robot(*rules), "go_to", "vault").rule is hard
+
+
+def test_no_program_forges_a_violation(worker: Worker) -> None:
+    program = "class RuleViolation(Exception): pass\ndef task_program(): raise RuleViolation('the vault')\n"
+    outcome = ran(worker, program, [VAULT])
+    assert outcome.error is not None
+    assert (outcome.status, outcome.error.kind) == (Status.PYTHON_ERROR, "Exception")
+
+
 def test_an_option_that_is_no_text_is_refused() -> None:
     one = robot(rule('not tr.Exists(ask("tea", "^no$"))'))
     error = refused(one, "ask", "ann", "tea?", (Option("1", is_text=False),))

@@ -23,7 +23,10 @@ LONG = 0.1  # seconds beyond which a measurement is hardly disturbed
 TRIES = 10  # of a shorter one that seems to be superlinear
 MOST = 40  # texts that are tried with a regex
 MANY, TWICE = 50, 1  # repetitions from which a repeat counts as endless, and as one at all
-SHORT_SIZES, TOO_LONG = range(4, 41, 2), 0.01  # characters in which, and seconds after which, a regex explodes
+SHORT_SIZES, TOO_LONG = (
+    range(4, 41, 2),
+    0.01,
+)  # characters in which, and seconds after which, a regex explodes
 
 FILLERS = (" ", "\n", "1", "a", "a ", "1 ", "a, ", "-", ",", "'", "no ", "not ")
 SUFFIXES = ("", "\0 x y z x y z")

@@ -27,7 +27,7 @@ def parse_tree(pattern: str) -> Tree:
 
 
 def failing(pattern: str) -> re.Pattern[str]:
-    """A regex that tries all that another one tries, with no repeat that must happen twice, and is never found."""
+    """A regex that tries all that another one tries, needs no repeat twice, and is never found."""
     tree = parse_tree(pattern)
     _loosen(tree)
     tree.append(parse_tree("(?!)")[0])
