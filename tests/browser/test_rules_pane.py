@@ -62,7 +62,7 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
         expect(page.get_by_text("say why the rule does not count")).to_be_visible()
         page.get_by_label("Why?").fill("Ann has asked for a visit")
         page.get_by_role("button", name="Switch it off").click()
-        expect(page.locator(".house-rules li.off")).to_contain_text("switched off in this mission")
+        expect(page.locator(".house-rules li.off")).to_contain_text("switched off for this program")
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         page.get_by_role("button", name="Run it on the robot").click()
         expect(page.locator(".headline")).to_have_text("Done")

@@ -12,7 +12,7 @@ import threading
 import time
 import urllib.request
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ from roboeval.evaluation import inspect as inspecting
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion, recorded_completions
 from roboeval.evaluation.runs.rows import Row
-from roboeval.suites.load import Suite
+from roboeval.suites.load import Suite, load_suite
 from viewing import chromium
 
 # Inspect leaves one of its own streams open for each sample.
@@ -50,12 +50,13 @@ def streams_left_open() -> Iterator[None]:
     gc.collect()
 
 
-def answering(completions: list[Completion]) -> Any:  # noqa: ANN401 - Inspect has no types here
+def answering(completions: list[Completion], rules: Sequence[str] = ()) -> Any:  # noqa: ANN401 - Inspect has no types here
     """A model that answers with recorded programs, those for the same prompt in turns."""
     programs: dict[str, list[str]] = defaultdict(list)
     for completion in completions:
         assert completion.instruction is not None
-        programs[prompt_for(completion.instruction).messages[-1].text].append(completion.program)
+        asked = prompt_for(completion.instruction, rules=rules).messages[-1].text
+        programs[asked].append(completion.program)
     turns = {asked: count() for asked in programs}
 
     def answer(said: list[Any], *_: object) -> ModelOutput:
@@ -121,6 +122,27 @@ def test_all_recorded_completions_get_the_verdicts_that_we_give(
     passed = sum(next(iter((s.scores or {}).values())).value == CORRECT for s in samples)
     assert shares["accuracy"].value == pytest.approx(passed / len(samples))
     assert shares.keys() >= {"accuracy", "stderr", *paper.tasks}
+
+
+@pytest.mark.parametrize("model", ["careful", "hasty"])
+def test_the_suite_of_house_rules_is_judged_by_its_rules(tmp_path: Path, model: str) -> None:
+    suite = load_suite("rules")
+    recorded = [*recorded_completions(f"recorded:{model}", suite)]
+    (log,) = inspect_eval(
+        TASK,
+        model=answering(recorded, suite.house_sentences),
+        task_args={"suite": "rules"},
+        log_dir=str(tmp_path),
+        log_realtime=False,
+        display="none",
+    )
+    assert log.status == "success", log.error
+    samples = read_eval_log(log.location).samples or []
+    passed = {
+        sample.id: score.value == CORRECT for sample in samples for score in (sample.scores or {}).values()
+    }
+    assert len(passed) == sum(len(task.prompts) for task in suite.tasks.values())
+    assert set(passed.values()) == {model == "careful"}
 
 
 def test_a_sample_is_a_prompt_with_what_our_command_asks(paper: Suite) -> None:

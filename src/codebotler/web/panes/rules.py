@@ -42,7 +42,7 @@ class RulesPane:
                 with ui.element("li").classes("off" if is_off else ""):
                     PlainText("span", shortened(rule.says, MOST_TEXT))
                     if is_off:
-                        PlainText("small", "switched off in this mission", "quiet")
+                        PlainText("small", "switched off for this program", "quiet")
                     elif view.may_be_approved:
                         off = Button("Switch off …", lambda rule=rule: self._ask_why(rule), "plain small")
                         off.props(f'aria-label="Switch off the rule {rule.name} in this mission"')
