@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, TypeAlias
@@ -93,26 +93,18 @@ class RuleGuard:
         if attempt is None:
             return robot.execute(skill, arguments)
         is_drive = row.recording is not None and row.recording.is_drive
-        said = [
-            argument for argument in arguments if isinstance(argument, str)
-        ]  # with the spaces at its ends
-        names = dict.fromkeys(
-            name
-            for request in (attempt.text, *said)
-            for name in (robot.meant_rooms(request) if is_drive else _moved(robot, attempt.kind, request))
-        )
-        self.judge(attempt, *(replace(attempt, text=name) for name in names if name != attempt.text))
+        self.judge(*_attempts(robot, attempt, arguments, is_drive=is_drive))
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
             for event in robot.events[before:]:
-                self.happened(replace(event, place=place))
+                self.happened(_seen(event, event.text, place))
             raise
         if is_drive:
             self._came = attempt.text
         for event in robot.events[before:]:
             reached = room_told(robot.room, self._came) if is_drive else event.text
-            self.happened(replace(event, text=reached, place=place))
+            self.happened(_seen(event, reached, place))
         return result
 
     def judge(self, *attempts: Event) -> None:
@@ -150,6 +142,25 @@ class RuleGuard:
             if rule.name in self._unjudged or not monitor.holds:
                 return RuleViolationError(rule, None)
         return None
+
+
+def _attempts(
+    robot: SimulatedRobot, attempt: Event, arguments: Sequence[Argument], *, is_drive: bool
+) -> Iterator[Event]:
+    """An attempt, and the same with the other rooms or things that it may mean, outer spaces or not."""
+    yield attempt
+    names: list[str] = []
+    for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
+        names += robot.meant_rooms(request) if is_drive else _moved(robot, attempt.kind, request)
+    for name in dict.fromkeys(names):
+        if name != attempt.text:
+            yield replace(attempt, text=name)
+
+
+def _seen(event: Event, text: str, place: str) -> Event:
+    """An event as rules see it."""
+    is_so = event.text == text and event.place == place
+    return event if is_so else replace(event, text=text, place=place)
 
 
 def room_told(room: str, request: str) -> str:
