@@ -18,6 +18,7 @@ import pytest
 
 import codebotler
 import roboeval
+from codebotler.core.skills import SKILLS, Skill
 from roboeval import Suite, load_suite
 
 ROOT = Path(__file__).parent.parent
@@ -247,7 +248,10 @@ def test_a_single_text_is_no_list_of_rooms() -> None:
     [
         ({"samples": 0}, "samples must be from 1 to .*, not 0$"),
         ({"samples": 10**9}, "samples must be .* 10,000, not 1,000,000,000$"),
-        ({"behaviours": {"fly": print}}, '"get_current_location" has no behaviour'),
+        (
+            {"skills": SKILLS.with_skill(Skill("fly", (), "None", "Fly."))},
+            '"fly" cannot be simulated: nothing says what it does',
+        ),
     ],
 )
 def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], named: str) -> None:

@@ -1,4 +1,4 @@
-"""One more skill is one row of the table and one behaviour; everything else follows from them."""
+"""One more skill is one function; everything else follows from it."""
 
 import shutil
 from collections.abc import Iterator
@@ -10,40 +10,30 @@ from codebotler.checking.check import check
 from codebotler.checking.storyboard import step_text, steps_of
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.program import Flaw, Program
-from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable, Verb
+from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable, Verb, skill
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
-from codebotler.simulator.sampled_robot import SAMPLED
+from codebotler.simulator.robot import SimulatedRobot
 from roboeval.suites.load import SUITES, load_suite
 
-TABLE = SKILLS.with_skill(
-    Skill(
-        "wave",
-        (Parameter("person"),),
-        "None",
-        "Wave at a person in the room.",
-        Recording("wave", "person"),
-        RosAction("Wave", "/wave_server", ("string person",)),
-    )
-)
 
-
+@skill(ros=RosAction("Wave", "/wave_server", ("string person",)))
 def wave(robot: SimulatedRobot, person: str) -> None:
+    """Wave at a person in the room."""
     robot.record("wave", person)
     if not robot.people[robot.room]:
         raise RobotError("WaveNoPerson", f'nobody is here to be waved at as "{person}"')
 
 
-DOES: dict[str, Behaviour] = {**BEHAVIOURS, "wave": wave}
+TABLE = SKILLS.with_skill(wave)
 WORLD = World((Room("hall"), Room("lab", people=(Person("alice"),))), "hall")
 
 
 def test_simulated_robot_performs_it() -> None:
-    robot = SimulatedRobot(WORLD, skills=TABLE, behaviours=DOES)
+    robot = SimulatedRobot(WORLD, skills=TABLE)
     with pytest.raises(RobotError, match="nobody is here"):
         robot.perform("wave", ["alice"])
     robot.perform("go_to", ["lab"])
@@ -53,14 +43,14 @@ def test_simulated_robot_performs_it() -> None:
 
 def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> None:
     verb = Verb("open", "opens", "opened", "opening", results=("it would not move", "it moved"))
-    row = Skill("open_door", (Parameter("door"),), "bool", "Open it.", Recording("open", "door"), verb=verb)
 
+    @skill(event="open", verb=verb)
     def open_door(robot: SimulatedRobot, door: str) -> bool:
+        """Open it."""
         robot.record("open", door)
         return door == "glass door"
 
-    table, does = SKILLS.with_skill(row), {**BEHAVIOURS, "open_door": open_door}
-    robot = SimulatedRobot(WORLD, skills=table, behaviours=does)
+    robot = SimulatedRobot(WORLD, skills=SKILLS.with_skill(open_door))
     assert [robot.perform("open_door", [door]) for door in ("glass door", "gate")] == [True, False]
     assert [(event.text, event.found) for event in robot.trace] == [("glass door", True), ("gate", False)]
     robot.perform("say", ["done"])
@@ -88,7 +78,7 @@ PROGRAMS = {
 @pytest.fixture(scope="module")
 def outcomes() -> dict[str, Outcome]:
     pairs: Iterator[tuple[str, World]] = ((program, WORLD) for program in PROGRAMS.values())
-    return dict(zip(PROGRAMS, run(pairs, workers=1, skills=TABLE, behaviours=DOES), strict=True))
+    return dict(zip(PROGRAMS, run(pairs, workers=1, skills=TABLE), strict=True))
 
 
 def test_program_calls_it_and_it_stands_in_the_trace(outcomes: dict[str, Outcome]) -> None:
@@ -174,8 +164,8 @@ def test_a_check_in_imagined_worlds_knows_it() -> None:
     def wave_at_anybody(robot: SimulatedRobot, person: str) -> None:
         robot.record("wave", person)
 
-    does = {**SAMPLED, "wave": wave_at_anybody}
-    found = check(PROGRAMS["waves"], rooms=["hall", "lab"], skills=TABLE, behaviours=does)
+    table = TABLE.doing(wave=wave_at_anybody)
+    found = check(PROGRAMS["waves"], rooms=["hall", "lab"], skills=table)
     assert found.problems == ()
     assert found.data(TABLE)["samples"][0]["trace"][1] == ["wave", "alice"]
     assert [problem.kind for problem in check(PROGRAMS["waves"]).problems] == ["NameError", "NameError"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -26,7 +26,6 @@ from codebotler.core.trace import Outcome
 from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Worker
@@ -46,7 +45,6 @@ def check(
     seed: int = 0,
     strict: bool = False,
     skills: SkillTable = SKILLS,
-    behaviours: Mapping[str, Behaviour] | None = None,
     workers: int = 1,
     pool: WorkerPool | None = None,
     room_map: RoomMap | None = None,
@@ -63,7 +61,6 @@ def check(
         seed: of the worlds: the same ones on every machine.
         strict: whether to draw also what the program takes for granted.
         skills: what the program may call.
-        behaviours: what each skill does; those of the eight skills by default.
         workers: how many runs go on at the same time.
         pool: what runs the programs, to be used for many checks; by default a new one.
         room_map: the rooms and the start, in place of those two, where more is known of them.
@@ -75,7 +72,7 @@ def check(
         EngineError: no isolated process could be started.
     """
     expect_list(rooms, "the rooms")
-    settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, behaviours, tuple(house_rules))
+    settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules))
     known = room_map or _room_map(program, rooms, start, skills)
     with nullcontext(pool) if pool else WorkerPool(workers) as opened:
 

@@ -14,7 +14,6 @@ from codebotler.core.trace import Outcome, Status
 from codebotler.core.words import listed
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.isolated_process import PROCESSOR_TIME
-from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rule_guard import Rule, RuleGuard
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
@@ -35,7 +34,6 @@ class CheckSettings:
     strict: bool = False  # whether to draw also what the program takes for granted
     rules: Rules = AS_WRITTEN
     skills: SkillTable = SKILLS
-    behaviours: Mapping[str, Behaviour] | None = None  # by default those of the eight skills
     house_rules: tuple[Rule, ...] = ()  # what a program must keep to in every world
 
     def __post_init__(self) -> None:
@@ -73,7 +71,7 @@ class SampledRuns:
         how = self._settings
         guard = RuleGuard(how.house_rules) if how.house_rules else None
         sampler = self._samplers[number]
-        robot = SampledRobot(self._room_map, sampler, how.rules, how.skills, how.behaviours, guard=guard)
+        robot = SampledRobot(self._room_map, sampler, how.rules, how.skills, guard=guard)
         self._robots[number] = robot
         return robot
 

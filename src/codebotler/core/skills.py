@@ -1,12 +1,13 @@
 """The skill table: what a robot can do, from its Python signature to its ROS action and its verbs.
 
-Prompts, messages, checks and robots read it; what a skill does to a world is in `codebotler.simulator.robot`.
+Prompts, messages, checks and robots read it. A skill is declared by a function that does it to a simulation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,8 @@ class Skill:
         ros: the action on a robot.
         verb: for people; without one, they read the skill's name and its arguments.
         seconds: how long the simulated robot takes by its clock, besides driving.
+        is_idle: whether it leaves the robot and its world as they are, however often it is executed.
+        does: what it does to a simulated robot, its first argument.
     """
 
     name: str
@@ -92,12 +95,48 @@ class Skill:
     ros: RosAction | None = None
     verb: Verb | None = None
     seconds: float = 0.0
+    is_idle: bool = False
+    does: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+
+    def doing(self, does: Callable[..., Any]) -> Skill:
+        """The same skill, which does something else."""
+        return replace(self, does=does, is_idle=False)
 
     @property
     def signature(self) -> str:
         """The skill as a Python signature, such as `go_to(location: str) -> None`."""
         arguments = ", ".join(f"{p.name}: {p.annotation}" for p in self.parameters)
         return f"{self.name}({arguments}) -> {self.returns}"
+
+
+class Simulation(Protocol):
+    """What a skill can do to a robot in a simulated world; whatever fails is a RobotError."""
+
+    @property
+    def room(self) -> str:
+        """The room that the robot is in."""
+
+    @property
+    def rooms(self) -> Sequence[str]:
+        """All rooms."""
+
+    def drive(self, location: str) -> None:
+        """Go to the room that a request means."""
+
+    def look(self, entity: str) -> bool:
+        """Whether an object or a person is here."""
+
+    def ask(self, person: str, question: str, options: Sequence[Any]) -> Any:  # noqa: ANN401 - an option, or its number
+        """Ask somebody here, who chooses one of the options."""
+
+    def take(self, obj: str) -> None:
+        """Pick up an object that is here."""
+
+    def put(self, obj: str) -> None:
+        """Put down what the robot holds."""
+
+    def record(self, kind: str, text: str) -> None:
+        """Add an event that happens here and now."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +155,7 @@ class SkillTable(Mapping[str, Skill]):
     _by_name: Mapping[str, Skill] = field(init=False, repr=False, compare=False)
     recordings: Mapping[str, Recording] = field(init=False, repr=False, compare=False)
     _hash: int = field(init=False, repr=False, compare=False)
+    _idle: frozenset[str] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         by_name = {skill.name: skill for skill in self.rows}
@@ -125,6 +165,7 @@ class SkillTable(Mapping[str, Skill]):
         object.__setattr__(self, "_by_name", by_name)
         recordings = {skill.recording.kind: skill.recording for skill in self.rows if skill.recording}
         object.__setattr__(self, "recordings", recordings)
+        object.__setattr__(self, "_idle", frozenset(s.name for s in self.rows if s.is_idle))
         object.__setattr__(self, "_hash", hash(self.rows))  # once, since tables are keys of caches
 
     def __getitem__(self, name: str) -> Skill:
@@ -146,98 +187,179 @@ class SkillTable(Mapping[str, Skill]):
         """This table and one more row."""
         return SkillTable((*self.rows, skill))
 
+    def doing(self, **does: Callable[..., Any]) -> SkillTable:
+        """The same skills, of which some do something else."""
+        return SkillTable(tuple(s.doing(does[s.name]) if s.name in does else s for s in self.rows))
+
+    @property
+    def idle(self) -> frozenset[str]:
+        """The skills that leave a robot and its world as they are."""
+        return self._idle
+
     @property
     def verbs(self) -> Mapping[str, Verb]:
         """The verbs of events, by kind; kinds without a verb are absent."""
         return {s.recording.kind: s.verb for s in self.rows if s.recording and s.verb}
 
 
+def skill(
+    *,
+    verb: Verb | None = None,
+    event: str | None = "",
+    text: str = "",
+    names: str = "",
+    to: str | None = None,
+    when_tried: bool = False,
+    ros: RosAction | None = None,
+    seconds: float = 0.0,
+    is_idle: bool = False,
+) -> Callable[[Callable[..., Any]], Skill]:
+    """Declare a skill by a function that does it to a robot, its first parameter.
+
+    The other parameters, their annotations and the docstring are what programs and models see.
+
+    Args:
+        verb: for people.
+        event: the kind of its event; by default the name of the function; None if it leaves no event.
+        text: the parameter whose value is the text of the event; by default the first one that is a text.
+        names: the sort of thing that the text names, such as `room`; empty for what is spoken.
+        to: the parameter that says whom it is for.
+        when_tried: whether an attempt that fails is an event, too.
+        ros: the action on a robot.
+        seconds: how long the simulated robot takes by its clock, besides driving.
+        is_idle: whether it leaves the robot and its world as they are, however often it is executed.
+    """
+
+    def declared(does: Callable[..., Any]) -> Skill:
+        code, annotations = does.__code__, {n: _written(a) for n, a in does.__annotations__.items()}
+        named = code.co_varnames[1 : code.co_argcount]
+        parameters = tuple(Parameter(name, TYPES[annotations[name]], annotations[name]) for name in named)
+        lists = [each.name for each in parameters if each.type is list]
+        texts = [each.name for each in parameters if each.type is str]
+        recording = None
+        if event is not None:
+            options = lists[0] if lists else None
+            recording = Recording(event or does.__name__, text or texts[0], options, to, names, when_tried)
+        doc = (does.__doc__ or "").partition("\n")[0]
+        row = (does.__name__, parameters, annotations["return"], doc, recording, ros, verb, seconds)
+        return Skill(*row, is_idle=is_idle, does=does)
+
+    return declared
+
+
+def _written(annotation: object) -> str:
+    """An annotation as it is written, which it is already where annotations are not evaluated."""
+    return annotation.__name__ if type(annotation) is type else str(annotation)
+
+
+TYPES: Mapping[str, type[str | list[object]]] = {"str": str, "list[str]": list}
+"""What a program must pass, by the annotation of a parameter."""
+
+
+# --- the eight skills of the paper (figure 2a)
+
+
 def _verb(base: str, rest: str) -> Verb:
     return Verb(f"{base} {rest}", f"{base}s {rest}", f"{base}ed {rest}", f"{base}ing {rest}")
 
 
-SKILLS = SkillTable(
-    (
-        Skill(
-            "get_current_location",
-            (),
-            "str",
-            "Name the room the robot is in.",
-            ros=RosAction("GetCurrentLocation", "/get_current_location_server", result="string"),
-            verb=_verb("look", "up where it is"),
-        ),
-        Skill(
-            "get_all_rooms",
-            (),
-            "list[str]",
-            "List the names of all rooms.",
-            ros=RosAction("GetAllRooms", "/get_all_rooms_server", result="string[]"),
-            verb=_verb("look", "up which rooms there are"),
-        ),
-        Skill(
-            "is_in_room",
-            (Parameter("entity"),),
-            "bool",
-            "Look whether an object or a person is in the room the robot is in.",
-            Recording("check", "entity", names="object or person"),
-            RosAction("IsInRoom", "/is_in_room_server", ("string object",), "bool"),
-            Verb(
-                *("look for", "looks for", "looked for", "looking for", "looked around"),
-                results=("not found", "found"),
-            ),
-            seconds=1.0,
-        ),
-        Skill(
-            "go_to",
-            (Parameter("location"),),
-            "None",
-            "Drive to a room.",
-            Recording("goto", "location", names="room", when_tried=True),
-            RosAction("GoTo", "/go_to_server", ("string location",), failure="GoToInvalidLocation"),
-            Verb("go to", "drives to", "went to", "going to"),
-        ),
-        Skill(
-            "ask",
-            (Parameter("person"), Parameter("question"), Parameter("options", list, "list[str]")),
-            "str",
-            "Ask a person in the same room a question and return the option that they choose.",
-            Recording("ask", "question", "options", to="person", when_tried=True),
-            RosAction(
-                "Ask", "/ask_server", ("string person", "string question", "string[] options"), "string"
-            ),
-            Verb("ask", "asks", "asked", "asking", "asked something"),
-            seconds=3.0,
-        ),
-        Skill(
-            "say",
-            (Parameter("message"),),
-            "None",
-            "Say a message aloud in the room the robot is in.",
-            Recording("say", "message", when_tried=True),
-            RosAction("Say", "/say_server", ("string message",)),
-            Verb("say", "says", "said", "saying", "spoke"),
-            seconds=1.0,
-        ),
-        Skill(
-            "pick",
-            (Parameter("obj"),),
-            "None",
-            "Pick up an object in the room; the robot can hold one at a time.",
-            Recording("pick", "obj", names="object"),
-            RosAction("Pick", "/pick_server", ("string obj",)),
-            Verb("pick up", "picks up", "picked up", "picking up", "picked something up"),
-            seconds=5.0,
-        ),
-        Skill(
-            "place",
-            (Parameter("obj"),),
-            "None",
-            "Put down the object that the robot holds.",
-            Recording("place", "obj", names="object"),
-            RosAction("Place", "/place_server", ("string obj",), failure="PlaceNoObject"),
-            Verb("put down", "puts down", "put down", "putting down", "put something down"),
-            seconds=3.0,
-        ),
-    )
+@skill(
+    verb=_verb("look", "up where it is"),
+    event=None,
+    ros=RosAction("GetCurrentLocation", "/get_current_location_server", result="string"),
+    is_idle=True,
 )
+def get_current_location(sim: Simulation) -> str:
+    """Name the room the robot is in."""
+    return sim.room
+
+
+@skill(
+    verb=_verb("look", "up which rooms there are"),
+    event=None,
+    ros=RosAction("GetAllRooms", "/get_all_rooms_server", result="string[]"),
+    is_idle=True,
+)
+def get_all_rooms(sim: Simulation) -> list[str]:
+    """List the names of all rooms."""
+    return list(sim.rooms)
+
+
+@skill(
+    verb=Verb(
+        *("look for", "looks for", "looked for", "looking for", "looked around"),
+        results=("not found", "found"),
+    ),
+    event="check",
+    names="object or person",
+    ros=RosAction("IsInRoom", "/is_in_room_server", ("string object",), "bool"),
+    seconds=1.0,
+    is_idle=True,
+)
+def is_in_room(sim: Simulation, entity: str) -> bool:
+    """Look whether an object or a person is in the room the robot is in."""
+    return sim.look(entity)
+
+
+@skill(
+    verb=Verb("go to", "drives to", "went to", "going to"),
+    event="goto",
+    names="room",
+    when_tried=True,
+    ros=RosAction("GoTo", "/go_to_server", ("string location",), failure="GoToInvalidLocation"),
+)
+def go_to(sim: Simulation, location: str) -> None:
+    """Drive to a room."""
+    sim.drive(location)
+
+
+@skill(
+    verb=Verb("ask", "asks", "asked", "asking", "asked something"),
+    text="question",
+    to="person",
+    when_tried=True,
+    ros=RosAction("Ask", "/ask_server", ("string person", "string question", "string[] options"), "string"),
+    seconds=3.0,
+)
+def ask(sim: Simulation, person: str, question: str, options: list[str]) -> str:
+    """Ask a person in the same room a question and return the option that they choose."""
+    chosen: str = sim.ask(person, question, options)  # by its position, since options may look alike
+    return chosen
+
+
+@skill(
+    verb=Verb("say", "says", "said", "saying", "spoke"),
+    when_tried=True,
+    ros=RosAction("Say", "/say_server", ("string message",)),
+    seconds=1.0,
+    is_idle=True,
+)
+def say(sim: Simulation, message: str) -> None:
+    """Say a message aloud in the room the robot is in."""
+    sim.record("say", message)
+
+
+@skill(
+    verb=Verb("pick up", "picks up", "picked up", "picking up", "picked something up"),
+    names="object",
+    ros=RosAction("Pick", "/pick_server", ("string obj",)),
+    seconds=5.0,
+)
+def pick(sim: Simulation, obj: str) -> None:
+    """Pick up an object in the room; the robot can hold one at a time."""
+    sim.take(obj)
+
+
+@skill(
+    verb=Verb("put down", "puts down", "put down", "putting down", "put something down"),
+    names="object",
+    ros=RosAction("Place", "/place_server", ("string obj",), failure="PlaceNoObject"),
+    seconds=3.0,
+)
+def place(sim: Simulation, obj: str) -> None:
+    """Put down the object that the robot holds."""
+    sim.put(obj)
+
+
+SKILLS = SkillTable((get_current_location, get_all_rooms, is_in_room, go_to, ask, say, pick, place))
 """The eight skills of the paper."""

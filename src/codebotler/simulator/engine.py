@@ -12,7 +12,7 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world import World
 from codebotler.simulator.pool import WorkerPool, cores
-from codebotler.simulator.robot import Behaviour, SimulatedRobot
+from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
 
 
@@ -22,7 +22,6 @@ def run(
     workers: int | None = None,
     rules: Rules = PAPER,
     skills: SkillTable = SKILLS,
-    behaviours: dict[str, Behaviour] | None = None,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
     """Run programs in worlds, read as they are needed, and yield their outcomes in the order of the pairs."""
@@ -30,7 +29,7 @@ def run(
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:
             jobs = [
-                (source, [partial(SimulatedRobot, world, rules, skills, behaviours) for _, world in same])
+                (source, [partial(SimulatedRobot, world, rules, skills) for _, world in same])
                 for source, same in groupby(pairs, key=itemgetter(0))
             ]
             return [outcome for outcomes in pool.here().run_all(jobs) for outcome in outcomes]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 Argument: TypeAlias = str | tuple[Option, ...]
 Result: TypeAlias = str | list[str] | bool | int | None
-Behaviour: TypeAlias = Callable[..., Result]
 Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # of a copy: `simulated` or `sampled`, and the arguments
 
 
@@ -75,18 +74,15 @@ class SimulatedRobot:
         world: World,
         rules: Rules = PAPER,
         skills: SkillTable = SKILLS,
-        behaviours: Mapping[str, Behaviour] | None = None,
         *,
         guard: RuleGuard | None = None,
     ) -> None:
         self.guard = guard
         self.world, self.rules, self.skills = world, rules, skills
-        self.behaviours = BEHAVIOURS if behaviours is None else behaviours
         self.setup: Setup = ("simulated", (world, rules))
-        is_usual = skills is SKILLS and behaviours is None
-        missing = () if is_usual else [name for name in skills if name not in self.behaviours]
+        missing = () if skills is SKILLS else [name for name, row in skills.items() if row.does is None]
         if missing:
-            raise UserError(f'the skill "{missing[0]}" has no behaviour: say in `behaviours` what it does')
+            raise UserError(f'the skill "{missing[0]}" cannot be simulated: nothing says what it does')
         self.rooms = tuple(room.name for room in world.rooms)
         self.room = world.robot
         self.held: str | None = None
@@ -115,18 +111,13 @@ class SimulatedRobot:
     @property
     def own_skills(self) -> tuple[str, ...]:
         """The skills that a copy made from `setup` would not have: their behaviours were given."""
-        return own_skills(self, SimulatedRobot, BEHAVIOURS)
+        return own_skills(self, SimulatedRobot)
 
     @property
     def idle_skills(self) -> frozenset[str]:
         """The skills that leave the robot and its world as they are, however often they are executed."""
-        if any(somebody.looks_before for here in self.people.values() for somebody in here):
-            return self.skills_that(IDLE - {is_in_room})
-        return IDLE_SKILLS if self.behaviours is BEHAVIOURS else self.skills_that(IDLE)
-
-    def skills_that(self, behave: frozenset[Behaviour]) -> frozenset[str]:
-        """The skills that behave in one of some ways."""
-        return frozenset(name for name, does in self.behaviours.items() if does in behave)
+        someone_may_come = any(one.looks_before for here in self.people.values() for one in here)
+        return self.skills.idle - {"is_in_room"} if someone_may_come else self.skills.idle
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill; a question is answered by the position of the chosen option."""
@@ -145,7 +136,9 @@ class SimulatedRobot:
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """The same, whatever rules say."""
-        result = self.behaviours[skill](self, *arguments)
+        does = self.skills[skill].does
+        assert does is not None, "the robot was made with it"
+        result: Result = does(self, *arguments)
         if isinstance(result, bool) and self.events and self.events[-1].found is None:
             self._add_result(skill, found=result)
         return result
@@ -155,6 +148,80 @@ class SimulatedRobot:
         recording, last = self.skills[skill].recording, self.events[-1]
         if recording is not None and last.kind == recording.kind:
             self.events[-1] = replace(last, found=found)
+
+    # --- what skills do
+
+    def drive(self, location: str) -> None:
+        """Drive to the first room whose name is found in the request."""
+        room = resolve_room(self.rooms, location, self.rules.matching)
+        if self.rules.events == "as-requested":
+            self.record("goto", location)
+        elif room is not None:
+            self.record("goto", room)
+        if room is None:
+            raise no_room(location)
+        self.room = room
+
+    def look(self, entity: str) -> bool:
+        """Look for an object, else for a person; who was not there may come after looks in vain."""
+        rules, here = self.rules, self.people[self.room]
+        seen = any(thing.is_meant_by(entity, rules.matching) for thing in self.things[self.room])
+        seen = seen or any(one.is_here and is_called(one.person, entity, rules) for one in here)
+        self.record("check", entity, found=seen)
+        if not any(one.is_here for one in here) and (
+            coming := next((o for o in here if not o.is_gone), None)
+        ):
+            coming.looks_before -= 1
+        return seen
+
+    def ask(self, person: str, question: str, options: tuple[Option, ...]) -> int:
+        """Ask the first person here who is meant, and return the position of the option they choose."""
+        self.record("ask", question, options, to=person)
+        if not options:
+            raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
+        here = (one for one in self.people[self.room] if one.is_here)
+        asked = next((one for one in here if is_called(one.person, person, self.rules)), None)
+        if asked is None:
+            raise RobotError("AskNoPerson", f'nobody is in "{self.room}" to be asked "{question}"')
+        answer = asked.answer(question, self.rules)
+        chosen = None if answer is None else choose(answer, question, options, self.rules)
+        if chosen is None:
+            offered = ", ".join(option.text for option in options)
+            raise RobotError(
+                "AskInvalidOptions", f'none of the options ({offered}) fits the answer to "{question}"'
+            )
+        self.amend(options[chosen].text)
+        return chosen
+
+    def take(self, obj: str) -> None:
+        """Take the first object here that the request finds."""
+        if self.held is not None:
+            raise RobotError(
+                "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
+            )
+        here = self.things[self.room]
+        thing = next((thing for thing in here if thing.is_meant_by(obj, self.rules.matching)), None)
+        if thing is None:
+            raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
+        here.remove(thing)
+        self.record("pick", obj if self.rules.events == "as-requested" else thing.label)
+        self.held, self.taken = obj, thing
+
+    def put(self, obj: str) -> None:
+        """Put down what the robot holds, which must be named as it was picked up.
+
+        Where events are recorded as they happened, any name that finds what it holds will do.
+        """
+        taken = self.taken if self.rules.events == "as-happened" else None
+        is_meant = taken is not None and taken.is_meant_by(obj, self.rules.matching)
+        if self.held is None or (self.held != obj and not is_meant):
+            holds = "nothing" if self.held is None else f'"{self.held}"'
+            raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
+        self.things[self.room].append(taken or Thing(obj, is_pattern=False))
+        self.record("place", taken.label if taken else obj)
+        self.held = self.taken = None
+
+    # --- the trace
 
     def sleep_until(self, now: float) -> None:
         """Let simulated time pass, until `now` seconds since the start."""
@@ -186,15 +253,16 @@ class SimulatedRobot:
         self.events[-1] = Event(*asked, last.place, last.time, last.holding, last.to)
 
 
-def own_skills(
-    robot: SimulatedRobot, kind: type[SimulatedRobot], usual: Mapping[str, Behaviour]
-) -> tuple[str, ...]:
-    """The skills of a robot that behave in another way than those of its kind usually do."""
+def own_skills(robot: SimulatedRobot, kind: type[SimulatedRobot]) -> tuple[str, ...]:
+    """The skills of a robot that those of its kind do not have, or have in another way."""
     if type(robot) is not kind:
         return tuple(robot.skills)
-    if robot.behaviours is usual:
+    if robot.skills is SKILLS:
         return ()
-    return tuple(name for name in robot.skills if robot.behaviours[name] is not usual.get(name))
+    return tuple(name for name, row in robot.skills.items() if row.does is not _USUAL.get(name))
+
+
+_USUAL = {name: row.does for name, row in SKILLS.items()}
 
 
 def found_in(label: str, request: str) -> bool:
@@ -237,28 +305,6 @@ def is_called(person: Person, request: str, rules: Rules) -> bool:
     return any(finds(request, name, rules.matching) for name in (person.name, *rules.words_for_people))
 
 
-def get_current_location(robot: SimulatedRobot) -> str:
-    """Name the room, as the world does and not as it was asked for."""
-    return robot.room
-
-
-def get_all_rooms(robot: SimulatedRobot) -> list[str]:
-    """List the rooms in the order of the world, the start included."""
-    return list(robot.rooms)
-
-
-def go_to(robot: SimulatedRobot, location: str) -> None:
-    """Drive to the first room whose name is found in the request."""
-    room = resolve_room(robot.rooms, location, robot.rules.matching)
-    if robot.rules.events == "as-requested":
-        robot.record("goto", location)
-    elif room is not None:
-        robot.record("goto", room)
-    if room is None:
-        raise no_room(location)
-    robot.room = room
-
-
 def no_room(location: str) -> RobotError:
     """The error of a drive to what is no room."""
     return RobotError("GoToInvalidLocation", f'there is no room "{location}"')
@@ -274,42 +320,6 @@ def _resolved(rooms: tuple[str, ...], request: str, matching: Matching) -> str |
     if matching == "whole-words" and request in rooms:
         return request
     return next((room for room in rooms if finds(request, room, matching)), None)
-
-
-def is_in_room(robot: SimulatedRobot, entity: str) -> bool:
-    """Look for an object, else for a person; who was not there may come after looks in vain."""
-    rules, here = robot.rules, robot.people[robot.room]
-    seen = any(thing.is_meant_by(entity, rules.matching) for thing in robot.things[robot.room])
-    seen = seen or any(one.is_here and is_called(one.person, entity, rules) for one in here)
-    robot.record("check", entity, found=seen)
-    if not any(one.is_here for one in here) and (coming := next((o for o in here if not o.is_gone), None)):
-        coming.looks_before -= 1
-    return seen
-
-
-def say(robot: SimulatedRobot, message: str) -> None:
-    """Speak; nobody need be there."""
-    robot.record("say", message)
-
-
-def ask(robot: SimulatedRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
-    """Ask the first person here who is meant, and return the position of the option they choose."""
-    robot.record("ask", question, options, to=person)
-    if not options:
-        raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
-    here = (one for one in robot.people[robot.room] if one.is_here)
-    asked = next((one for one in here if is_called(one.person, person, robot.rules)), None)
-    if asked is None:
-        raise RobotError("AskNoPerson", f'nobody is in "{robot.room}" to be asked "{question}"')
-    answer = asked.answer(question, robot.rules)
-    chosen = None if answer is None else choose(answer, question, options, robot.rules)
-    if chosen is None:
-        offered = ", ".join(option.text for option in options)
-        raise RobotError(
-            "AskInvalidOptions", f'none of the options ({offered}) fits the answer to "{question}"'
-        )
-    robot.amend(options[chosen].text)
-    return chosen
 
 
 def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Rules = PAPER) -> int | None:
@@ -350,49 +360,3 @@ def _first_saying(words: tuple[str, ...], options: tuple[Option, ...], matching:
 @lru_cache(maxsize=65_536)
 def _says(text: str, words: tuple[str, ...], matching: Matching) -> bool:
     return any(finds(text, word, matching) for word in words)
-
-
-def pick(robot: SimulatedRobot, obj: str) -> None:
-    """Take the first object here that the request finds."""
-    if robot.held is not None:
-        raise RobotError(
-            "PickWhileHolding", f'the robot holds "{robot.held}" and cannot pick up "{obj}" as well'
-        )
-    here = robot.things[robot.room]
-    thing = next((thing for thing in here if thing.is_meant_by(obj, robot.rules.matching)), None)
-    if thing is None:
-        raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{robot.room}"')
-    here.remove(thing)
-    robot.record("pick", obj if robot.rules.events == "as-requested" else thing.label)
-    robot.held, robot.taken = obj, thing
-
-
-def place(robot: SimulatedRobot, obj: str) -> None:
-    """Put down what the robot holds, which must be named as it was picked up.
-
-    Where events are recorded as they happened, any name that finds what it holds will do.
-    """
-    taken = robot.taken if robot.rules.events == "as-happened" else None
-    is_meant = taken is not None and taken.is_meant_by(obj, robot.rules.matching)
-    if robot.held is None or (robot.held != obj and not is_meant):
-        holds = "nothing" if robot.held is None else f'"{robot.held}"'
-        raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
-    robot.things[robot.room].append(taken or Thing(obj, is_pattern=False))
-    robot.record("place", taken.label if taken else obj)
-    robot.held = robot.taken = None
-
-
-BEHAVIOURS: Mapping[str, Behaviour] = {
-    "get_current_location": get_current_location,
-    "get_all_rooms": get_all_rooms,
-    "is_in_room": is_in_room,
-    "go_to": go_to,
-    "ask": ask,
-    "say": say,
-    "pick": pick,
-    "place": place,
-}
-IDLE: frozenset[Behaviour] = frozenset(
-    {get_current_location, get_all_rooms, is_in_room, say}
-)  # the robot stays as it is
-IDLE_SKILLS = frozenset(does.__name__ for does in IDLE)

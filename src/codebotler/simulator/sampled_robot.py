@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
@@ -17,7 +17,6 @@ from codebotler.core.world import Room, World
 from codebotler.simulator import robot as real
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.robot import (
-    Behaviour,
     SimulatedRobot,
     Thing,
     own_skills,
@@ -161,13 +160,11 @@ class SampledRobot(SimulatedRobot):
         sampler: FactSampler,
         rules: Rules = AS_WRITTEN,
         skills: SkillTable = SKILLS,
-        behaviours: Mapping[str, Behaviour] | None = None,
         *,
         guard: RuleGuard | None = None,
     ) -> None:
-        does = SAMPLED if behaviours is None else behaviours
         world = World(tuple(map(Room, room_map.rooms)), room_map.start)
-        super().__init__(world, rules, skills, does, guard=guard)
+        super().__init__(world, rules, skills, guard=guard)
         self.setup = "sampled", (room_map, sampler, rules)
         self.room_map, self.sampler = room_map, sampler
         self.things = defaultdict(list)
@@ -182,12 +179,12 @@ class SampledRobot(SimulatedRobot):
     @property
     def own_skills(self) -> tuple[str, ...]:
         """The skills that a copy made from `setup` would not have."""
-        return own_skills(self, SampledRobot, SAMPLED)
+        return own_skills(self, SampledRobot)
 
     @property
     def idle_skills(self) -> frozenset[str]:
         """The skills that leave the robot and its world as they are, once the first has drawn its facts."""
-        return self.skills_that(real.IDLE | {look})
+        return self.skills.idle
 
     def meant_rooms(self, request: str) -> Sequence[str]:
         """All rooms that a request may mean."""
@@ -242,6 +239,83 @@ class SampledRobot(SimulatedRobot):
         self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))
         return options[drawn]
 
+    # --- what skills do
+
+    def drive(self, location: str) -> None:
+        """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
+        self.record("goto", location)
+        room = self.room_map.room(location)
+        if room is None:
+            raise real.no_room(location)
+        self.room = room
+
+    def look(self, entity: str) -> bool:
+        """Look for an object or for somebody; whether they are there is drawn at the first look."""
+        name, room = meant(entity), self.here
+        found = self.is_here(name)
+        if found is None and (name in room.gone or (is_name(entity) and room.lacks(SOMEBODY))):
+            found = False
+            room.missed.add(name)
+        if found is None:
+            found = self.settle(name, by_lot=True)
+            if found and (name == SOMEBODY or is_name(entity)):
+                room.people |= {name, SOMEBODY}
+            if found and name != SOMEBODY:
+                self.things[self.room].append(Thing(name, is_pattern=False))
+        search = self.searches[name]
+        (search.found if found else search.vain).add(self.room)
+        self.record("check", entity, found=found)
+        return found
+
+    def ask(self, person: str, question: str, options: tuple[Option, ...]) -> int:
+        """Ask somebody, who is there unless the program saw that they are not; they choose by chance."""
+        who = meant(person)
+        if not options or not self._answers(who):
+            lost = self.search(who).is_lost or self.search(SOMEBODY).is_lost
+            with self.excused(when=bool(options) and lost):
+                return super().ask(person, question, options)
+        self.record("ask", question, options, to=person)
+        asked = (self.room, who, question.strip())
+        texts = [option.text for option in options]
+        if self.answers.get(asked) not in texts:
+            self.answers[asked] = self.answer(texts, *asked)
+            self.facts.append(GivenAnswer(self.room, question, self.answers[asked]))
+        chosen = texts.index(self.answers[asked])
+        self.amend(texts[chosen])
+        return chosen
+
+    def _answers(self, who: str) -> bool:
+        is_there = self.is_here(who)
+        if is_there is None and self.here.lacks(SOMEBODY):
+            is_there = False
+        if is_there is None:
+            is_there = self.settle(who, by_lot=self.sampler.strict)
+        if is_there:
+            self.here.people |= {who, SOMEBODY}
+        return is_there
+
+    def take(self, obj: str) -> None:
+        """Take an object, which is there unless the program saw that it is not."""
+        name = meant(obj)
+        if self.held is None and self.is_here(name) is None and self._lies_there(name):
+            self.things[self.room].append(Thing(name, is_pattern=False))
+        search = self.search(name)
+        again = self.held is not None and meant(self.held) == name and len(search.found) > 1
+        with self.excused(when=again or search.is_lost):
+            super().take(obj)
+        self.here.gone.add(name)
+        self.here.people.discard(name)
+
+    def _lies_there(self, name: str) -> bool:
+        if name in self.here.gone:  # it may have been one of several, if nobody has looked since
+            return not self.sampler.strict
+        return self.settle(name, by_lot=self.sampler.strict)
+
+    def put(self, obj: str) -> None:
+        """Put down what the robot holds, which must be named exactly as it was picked up."""
+        with self.excused(when=self.held is None and self.search(meant(obj)).is_lost):
+            super().put(obj)
+
 
 def meant(request: str) -> str:
     """Who or what a request means: without an article, and the same for all words for people."""
@@ -253,98 +327,3 @@ def meant(request: str) -> str:
 def is_name(request: str) -> bool:
     """Whether a request names a person, as far as its spelling tells; whoever is found by it is somebody."""
     return request.strip()[:1].isupper()
-
-
-# --- what each skill does
-
-
-def drive(robot: SampledRobot, location: str) -> None:
-    """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
-    robot.record("goto", location)
-    room = robot.room_map.room(location)
-    if room is None:
-        raise real.no_room(location)
-    robot.room = room
-
-
-def look(robot: SampledRobot, entity: str) -> bool:
-    """Look for an object or for somebody; whether they are there is drawn at the first look."""
-    name, room = meant(entity), robot.here
-    found = robot.is_here(name)
-    if found is None and (name in room.gone or (is_name(entity) and room.lacks(SOMEBODY))):
-        found = False
-        room.missed.add(name)
-    if found is None:
-        found = robot.settle(name, by_lot=True)
-        if found and (name == SOMEBODY or is_name(entity)):
-            room.people |= {name, SOMEBODY}
-        if found and name != SOMEBODY:
-            robot.things[robot.room].append(Thing(name, is_pattern=False))
-    search = robot.searches[name]
-    (search.found if found else search.vain).add(robot.room)
-    robot.record("check", entity, found=found)
-    return found
-
-
-def ask(robot: SampledRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
-    """Ask somebody, who is there unless the program saw that they are not; they choose by chance."""
-    who = meant(person)
-    if not options or not _answers(robot, who):
-        lost = robot.search(who).is_lost or robot.search(SOMEBODY).is_lost
-        with robot.excused(when=bool(options) and lost):
-            return real.ask(robot, person, question, options)
-    robot.record("ask", question, options, to=person)
-    asked = (robot.room, who, question.strip())
-    texts = [option.text for option in options]
-    if robot.answers.get(asked) not in texts:
-        robot.answers[asked] = robot.answer(texts, *asked)
-        robot.facts.append(GivenAnswer(robot.room, question, robot.answers[asked]))
-    chosen = texts.index(robot.answers[asked])
-    robot.amend(texts[chosen])
-    return chosen
-
-
-def _answers(robot: SampledRobot, who: str) -> bool:
-    is_there = robot.is_here(who)
-    if is_there is None and robot.here.lacks(SOMEBODY):
-        is_there = False
-    if is_there is None:
-        is_there = robot.settle(who, by_lot=robot.sampler.strict)
-    if is_there:
-        robot.here.people |= {who, SOMEBODY}
-    return is_there
-
-
-def pick(robot: SampledRobot, obj: str) -> None:
-    """Take an object, which is there unless the program saw that it is not."""
-    name = meant(obj)
-    if robot.held is None and robot.is_here(name) is None and _lies_there(robot, name):
-        robot.things[robot.room].append(Thing(name, is_pattern=False))
-    search = robot.search(name)
-    again = robot.held is not None and meant(robot.held) == name and len(search.found) > 1
-    with robot.excused(when=again or search.is_lost):
-        real.pick(robot, obj)
-    robot.here.gone.add(name)
-    robot.here.people.discard(name)
-
-
-def _lies_there(robot: SampledRobot, name: str) -> bool:
-    if name in robot.here.gone:  # it may have been one of several, if nobody has looked since
-        return not robot.sampler.strict
-    return robot.settle(name, by_lot=robot.sampler.strict)
-
-
-def place(robot: SampledRobot, obj: str) -> None:
-    """Put down what the robot holds, which must be named exactly as it was picked up."""
-    with robot.excused(when=robot.held is None and robot.search(meant(obj)).is_lost):
-        real.place(robot, obj)
-
-
-SAMPLED: Mapping[str, Behaviour] = {
-    **real.BEHAVIOURS,
-    "go_to": drive,
-    "is_in_room": look,
-    "ask": ask,
-    "pick": pick,
-    "place": place,
-}

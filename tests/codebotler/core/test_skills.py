@@ -2,8 +2,9 @@ import inspect
 
 import pytest
 
-from codebotler.core.skills import SKILLS, Parameter, Recording, Skill, SkillTable
-from codebotler.simulator.robot import BEHAVIOURS
+from codebotler.core.skills import SKILLS, Parameter, Recording, Simulation, Skill, SkillTable
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.sampled_robot import SampledRobot
 
 
 def test_eight_skills_stand_as_the_paper_writes_them() -> None:
@@ -48,9 +49,13 @@ def test_every_skill_travels_as_a_ros_action_with_one_goal_field_a_parameter() -
         assert skill.ros.server == f"/{skill.name}_server"
 
 
-def test_behaviours_take_what_the_table_says() -> None:
-    for skill in SKILLS.values():
-        assert len(inspect.signature(BEHAVIOURS[skill.name]).parameters) == 1 + len(skill.parameters)
+def test_a_simulated_robot_does_what_skills_ask_of_it() -> None:
+    """Which nothing else compares: a robot is any object to them."""
+    for kind in (SimulatedRobot, SampledRobot):
+        for name, asked in inspect.getmembers(Simulation, inspect.isfunction):
+            if not name.startswith("_"):
+                wanted = [*inspect.signature(asked).parameters]
+                assert [*inspect.signature(getattr(kind, name)).parameters][: len(wanted)] == wanted
 
 
 WAVE = Skill("wave", (Parameter("person"),), "None", "Wave.", Recording("wave", "person"))

@@ -24,7 +24,7 @@ from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import FEW, LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool
-from codebotler.simulator.robot import BEHAVIOURS, Argument, Behaviour, Result, SimulatedRobot
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
 from codebotler.simulator.worker import EngineError, Job, Worker
@@ -327,13 +327,13 @@ def test_nothing_is_left_of_one_program_for_the_next(worker: Worker) -> None:
 class Waves:
     """Makes robots with one skill more, and knows who did that skill when and where."""
 
-    def __init__(self, wave: Behaviour, **others: Behaviour) -> None:
+    def __init__(self, wave: Callable[..., Result], **others: Callable[..., Result]) -> None:
         self.processes: list[int] = []
         self.people: list[str] = []
         self.wave, self.others = wave, others
 
     def robot(self) -> SimulatedRobot:
-        return SimulatedRobot(WORLD, RULES, TABLE, {**BEHAVIOURS, "wave": self._waved, **self.others})
+        return SimulatedRobot(WORLD, RULES, TABLE.doing(wave=self._waved, **self.others))
 
     def _waved(self, robot: SimulatedRobot, person: str) -> Result:
         self.processes.append(os.getpid())

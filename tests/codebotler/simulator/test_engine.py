@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import count, islice, takewhile
@@ -26,7 +26,7 @@ from codebotler.simulator.fork_server import BatchServer
 from codebotler.simulator.isolated_process import SIMULATION, LostProcessError, compiled_file
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import FEW, WorkerPool
-from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
+from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
@@ -48,9 +48,9 @@ def said(outcome: Outcome) -> list[str]:
     return [event.text for event in outcome.trace]
 
 
-def doing(say: Behaviour) -> dict[str, Behaviour]:
-    """Behaviours of which one is another."""
-    return {**BEHAVIOURS, "say": say}
+def doing(say: Callable[..., None]) -> SkillTable:
+    """The eight skills, of which one does something else."""
+    return SKILLS.doing(say=say)
 
 
 def links_in(folder: Path) -> list[Path]:
@@ -94,7 +94,7 @@ def test_equal_pairs_are_run_once_and_have_equal_outcomes() -> None:
 
     same_world = World((Room("start_loc"), Room("lab")), "start_loc")
     pairs = [(saying("a"), WORLD), (saying("b"), WORLD), (saying("a"), OTHER), (saying("a"), same_world)]
-    outcomes = list(run(pairs * 30, workers=2, behaviours=doing(say)))
+    outcomes = list(run(pairs * 30, workers=2, skills=doing(say)))
     assert [said(outcome) for outcome in outcomes] == [["a"], ["b"], ["a"], ["a"]] * 30
     assert sorted(ran) == ["elsewhere a", "start_loc a", "start_loc b"]
 
@@ -354,7 +354,7 @@ def test_nothing_is_left_after_a_behaviour_failed() -> None:
         raise LookupError(message + robot.room)
 
     with pytest.raises(LookupError, match="astart_loc"):
-        list(run([(saying("a"), WORLD), (saying("b"), WORLD)], workers=1, behaviours=doing(say)))
+        list(run([(saying("a"), WORLD), (saying("b"), WORLD)], workers=1, skills=doing(say)))
 
 
 def script_with_the_engine() -> tuple[subprocess.Popen[str], set[int]]:
@@ -412,7 +412,7 @@ def test_fork_server_that_was_killed_while_idle_is_replaced_and_no_socket_is_los
     gc.collect()  # a socket that nobody closed would be told of here, as an error
 
 
-def killing(times: int) -> Behaviour:
+def killing(times: int) -> Callable[..., None]:
     """A way to speak that kills the fork server in the middle of a run, the first few times."""
     left = iter(range(times))
 
@@ -430,14 +430,14 @@ def killing(times: int) -> Behaviour:
 @pytest.mark.usefixtures("nothing_is_left")
 def test_run_whose_fork_server_is_killed_is_run_again() -> None:
     program = "def task_program():\n    say('a')\n    say('b')\n"
-    outcomes = list(run([(program, WORLD), (saying("c"), WORLD)], workers=1, behaviours=doing(killing(1))))
+    outcomes = list(run([(program, WORLD), (saying("c"), WORLD)], workers=1, skills=doing(killing(1))))
     assert [said(outcome) for outcome in outcomes] == [["a", "b"], ["c"]]
 
 
 @pytest.mark.usefixtures("nothing_is_left")
 def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
     with pytest.raises(EngineError, match="lost twice"):
-        list(run([(saying("a"), WORLD)], workers=1, behaviours=doing(killing(99))))
+        list(run([(saying("a"), WORLD)], workers=1, skills=doing(killing(99))))
 
 
 def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -447,7 +447,7 @@ def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pyt
         time.sleep(2.5)
         robot.record("say", message)
 
-    (outcome,) = run([(saying("a"), WORLD)], workers=1, behaviours=doing(slow))
+    (outcome,) = run([(saying("a"), WORLD)], workers=1, skills=doing(slow))
     assert said(outcome) == ["a"]
 
 
@@ -461,9 +461,7 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
 
     worker = Worker()
     with ThreadPoolExecutor(1) as thread:
-        running = thread.submit(
-            worker.run, saying("a"), lambda: SimulatedRobot(WORLD, behaviours=doing(busy))
-        )
+        running = thread.submit(worker.run, saying("a"), lambda: SimulatedRobot(WORLD, skills=doing(busy)))
         assert is_busy.wait(30)
         family = engine_processes()
         worker.stop()
@@ -524,7 +522,7 @@ def test_child_that_is_killed_from_outside_is_told_so() -> None:
                 os.kill(child, signal.SIGKILL)
 
     first, second = run(
-        [(saying("a"), WORLD), ("def task_program(): pass", WORLD)], workers=1, behaviours=doing(say)
+        [(saying("a"), WORLD), ("def task_program(): pass", WORLD)], workers=1, skills=doing(say)
     )
     assert (first.status, second.status) == (Status.KILLED, Status.FINISHED)
     assert [event.text for event in first.trace] == ["a"]

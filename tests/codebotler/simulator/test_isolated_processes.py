@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.simulator.robot import BEHAVIOURS, SimulatedRobot
+from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox.isolation import NOBODY
 from codebotler.simulator.worker import Worker
 from processes import children_of, lives
@@ -76,7 +77,7 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
                 found[message] = Enclosed.of(pid)
 
     def new_robot() -> SimulatedRobot:
-        return SimulatedRobot(WORLD, behaviours={**BEHAVIOURS, "say": say})
+        return SimulatedRobot(WORLD, skills=SKILLS.doing(say=say))
 
     program = "def task_program():\n    say('child')\n"
     worker.run(program.replace("child", "child of a batch"), new_robot)

@@ -270,7 +270,7 @@ def test_events_say_where_and_when_they_happened() -> None:
 
 
 def test_every_skill_of_the_table_has_a_behaviour() -> None:
-    assert set(robot_in().behaviours) == set(SKILLS)
+    assert set(robot_in().skills) == set(SKILLS)
 
 
 # --- questions (section 4)

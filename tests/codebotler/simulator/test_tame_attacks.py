@@ -22,7 +22,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
-from codebotler.simulator.robot import BEHAVIOURS, SimulatedRobot
+from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.sandbox.fuel import prepared
@@ -417,10 +417,9 @@ def test_a_skill_of_ones_own_is_felt_by_its_own_run_only(
     lines: tuple[str, ...], batches: Worker, alone: Worker
 ) -> None:
     skills = SKILLS.with_skill(
-        Skill("wave", (Parameter("person"),), "None", "Wave.", Recording("wave", "person"))
+        Skill("wave", (Parameter("person"),), "None", "Wave.", Recording("wave", "person"), does=wave)
     )
-    does = {**BEHAVIOURS, "wave": wave}
-    new = [partial(SimulatedRobot, world, AS_WRITTEN, skills, does) for world in WORLDS]
+    new = [partial(SimulatedRobot, world, AS_WRITTEN, skills) for world in WORLDS]
     source = "\n    ".join(("def task_program():", *lines))
     together = batches.run_all([(source, new), (HONEST, new)])[0]
     wanted = [alone.run_alone(source, new_robot) for new_robot in new]
