@@ -1,6 +1,6 @@
-"""The skill table: what a robot can do, from its Python signature to its ROS action and its verbs.
+"""The skills: what a robot can do, each declared by one function.
 
-Prompts, messages, checks and robots read it. A skill is declared by a function that does it to a simulation.
+Prompts, messages, checks and robots read the declarations; the body of a function does the skill to a simulation.
 """
 
 from __future__ import annotations
