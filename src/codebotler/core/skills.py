@@ -1,6 +1,7 @@
 """The skills: what a robot can do, each declared by one function.
 
-Prompts, messages, checks and robots read the declarations; the body of a function does the skill to a simulation.
+Prompts, messages, checks and robots read the declarations; the body of a function does the skill to a
+simulation.
 """
 
 from __future__ import annotations
