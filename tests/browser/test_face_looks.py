@@ -96,7 +96,7 @@ def test_face(office: PageServer, opened: OpenPage, shoot: Shoot, screen: Screen
     operator.locator(".asking").scroll_into_view_if_needed()
     look("operator-asked", operator)
     page.get_by_role("switch", name="Answer by voice").click()
-    ends = time.monotonic() + 20
+    ends = time.monotonic() + 60
     while not page.evaluate("window.listening.length"):
         assert time.monotonic() < ends
     page.evaluate("hear('yes please')")

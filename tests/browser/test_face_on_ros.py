@@ -73,7 +73,7 @@ def virtual(graph: Graph, tmp_path: Path) -> Iterator[Path]:
         assert "the robot is ready" in robot.stderr.readline()
         yield said
         robot.terminate()
-        robot.communicate(timeout=20)
+        robot.communicate(timeout=60)
 
 
 def test_from_an_instruction_to_an_answer_on_a_real_graph(

@@ -71,7 +71,7 @@ def test_no_text_becomes_more_than_text(server: PageServer, opened: OpenPage, ev
         expect_unharmed(page, count)
     voice = face.get_by_role("switch", name="Answer by voice")
     voice.click()
-    ends = time.monotonic() + 20
+    ends = time.monotonic() + 60
     while not face.evaluate("window.listening.length"):
         assert time.monotonic() < ends
     face.evaluate("text => hear(text)", evil.encode(errors="replace").decode())

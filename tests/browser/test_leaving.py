@@ -29,7 +29,7 @@ def state(server: PageServer) -> str:
 
 
 def until_over(server: PageServer) -> None:
-    ends = time.monotonic() + 20
+    ends = time.monotonic() + 60
     while not server.call("GET", "/api/robot").data["is_over"]:
         assert time.monotonic() < ends
         time.sleep(0.02)

@@ -23,7 +23,7 @@ from codebotler.robots.ros.worker import WORKERS
 HERE = Path(__file__).parent
 MASTER = HERE / "ros_master.py"
 SERVER = HERE / "action_servers.py"
-LONG = 30.0  # seconds after which what is waited for has failed
+LONG = 60.0  # seconds after which what is waited for has failed
 GO_TO, SAY = SKILLS["go_to"], SKILLS["say"]
 
 

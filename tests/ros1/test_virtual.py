@@ -156,7 +156,7 @@ def test_command_starts_a_master_that_ends_with_it(tmp_path: Path) -> None:
         robot.perform("go_to", ["moon"])
     robot.disconnect()
     process.send_signal(signal.SIGINT)
-    said, errors = process.communicate(timeout=20)
+    said, errors = process.communicate(timeout=60)
     *calls, failed = said.splitlines()
     assert calls == ["go_to(kitchen)", "  succeed None", "go_to(moon)"]
     assert re.match('  abort GoToInvalidLocation: .*"moon"', failed)

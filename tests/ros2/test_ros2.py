@@ -45,7 +45,7 @@ def robot() -> Iterator[RosRobot]:
 
 
 def until(noted: Callable[[], bool]) -> None:
-    ends = time.monotonic() + 20
+    ends = time.monotonic() + 60
     while not noted():
         assert time.monotonic() < ends
         time.sleep(0.01)

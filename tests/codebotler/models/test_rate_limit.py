@@ -358,7 +358,7 @@ def test_control_c_stops_all_requests_at_once_and_without_a_word(name: str, serv
             time.sleep(0.01)
         time.sleep(0.1)
         process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=20)
+        output, errors = process.communicate(timeout=60)
     assert output == "closed\nstopped\n", errors
     assert not [line for line in errors.splitlines() if not line.startswith("Executing <")]
     assert len(server.requests) == 4

@@ -84,7 +84,7 @@ def face_of(
 
 def until(page: Page, holds: str) -> None:
     """Wait until a script says so; the page's policy forbids Playwright's own way of waiting."""
-    ends = time.monotonic() + 20
+    ends = time.monotonic() + 60
     while not page.evaluate(holds):
         assert time.monotonic() < ends, holds
         page.wait_for_timeout(20)

@@ -74,7 +74,7 @@ class PageServer:
     @property
     def face_token(self) -> str:
         """The token of the robot's face, where it has one."""
-        ends = time.monotonic() + 10
+        ends = time.monotonic() + 60
         while (found := re.search(r"/face\?token=(\S+)\n", self.said)) is None:
             assert time.monotonic() < ends, self.said
             time.sleep(0.02)
@@ -101,7 +101,7 @@ class PageServer:
     def end(self, number: int = signal.SIGTERM) -> int:
         """End it, and give its status."""
         self._process.send_signal(number)
-        self._process.communicate(timeout=20)
+        self._process.communicate(timeout=60)
         return self._process.wait()
 
     def ask(self, method: str, path: str, body: object = None, **headers: str) -> Answer:
@@ -110,7 +110,7 @@ class PageServer:
         text = body if isinstance(body, bytes | str) else None if body is None else json.dumps(body)
         if text is not None:
             given.setdefault("content-type", "application/json")
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=20)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         try:
             connection.request(method, path, text, given)
             answer = connection.getresponse()
@@ -136,7 +136,7 @@ class PageServer:
         """Have the robot run a program, as the API's clients do."""
         begun = self.call("POST", "/api/missions", {"program": program})
         assert begun.status == 201, begun.text
-        ends = time.monotonic() + 20
+        ends = time.monotonic() + 60
         while (view := self.call("GET", "/api/missions/current").data)["check"] is None:
             assert time.monotonic() < ends, view
             time.sleep(0.01)

@@ -77,7 +77,7 @@ def console(tmp_path: Path) -> Iterator[Console]:
         yield console
 
 
-def until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 10.0) -> SessionView:
+def until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 60.0) -> SessionView:
     """The first view of which something holds."""
     ends = time.monotonic() + seconds
     while not holds(console.view):

@@ -53,7 +53,7 @@ def at_rest(server: PageServer) -> None:
     until(server, lambda now: now["is_over"])
 
 
-def until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds: float = 20.0) -> Any:  # noqa: ANN401 - JSON
+def until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON
     """What the face shows as soon as something holds of it."""
     ends = time.monotonic() + seconds
     while not holds(now := server.call("GET", "/api/face").data):
@@ -64,7 +64,7 @@ def until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds
 
 def opened(server: PageServer, path: str = LIVE, **headers: str) -> ClientConnection:
     return connect(
-        f"ws://127.0.0.1:{server.port}{path}", additional_headers=headers, proxy=None, open_timeout=5
+        f"ws://127.0.0.1:{server.port}{path}", additional_headers=headers, proxy=None, open_timeout=30
     )
 
 
@@ -77,7 +77,7 @@ def watching(server: PageServer) -> ClientConnection:
 def heard(socket: ClientConnection, holds: Callable[[dict[str, Any]], object]) -> Any:  # noqa: ANN401 - JSON
     """The first message of which something holds."""
     while True:
-        now = json.loads(socket.recv(timeout=20))
+        now = json.loads(socket.recv(timeout=60))
         if holds(now):
             return now
 

@@ -35,7 +35,7 @@ def socket(server: PageServer, **headers: str) -> int:
     given = {name.replace("_", "-"): value for name, value in headers.items()}
     try:
         with connect(
-            f"ws://127.0.0.1:{server.port}{SOCKET}", additional_headers=given, proxy=None, open_timeout=5
+            f"ws://127.0.0.1:{server.port}{SOCKET}", additional_headers=given, proxy=None, open_timeout=30
         ):
             return 101
     except InvalidStatus as error:

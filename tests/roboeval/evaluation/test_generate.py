@@ -420,7 +420,7 @@ def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path,
     process = started(run, log, count=60, seconds=0.05)
     wait_for_notes(log, 50)
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=60)
     assert b"KeyboardInterrupt" in err
     done = set(keys(run))
     under_way = asked_of(log, process.pid, paper) - done
@@ -462,7 +462,7 @@ def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper
         "resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))\n"
     )
     process = started(run, log, count=20, seconds=0.0, before=limit)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=60)
     assert process.returncode == 1
     assert b"OSError: [Errno 27] File too large" in err
     assert run.completions.read_bytes().endswith(b"}\n")
