@@ -18,8 +18,9 @@ WAITS = "it waits for something that can never come"
 LAST_LINE = 1_000_000
 LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 SkillAnswer: TypeAlias = tuple[str, Any]
-"""`ok` and a result, `error` and its number, kind and message, or `stop`."""
+"""`ok` and a result, `error` and its number, kind and message, or `stop` and whether a rule is the reason."""
 STOP: SkillAnswer = ("stop", None)
+REFUSED: SkillAnswer = ("stop", True)
 
 
 class SkillPerformer(Protocol):
@@ -65,7 +66,7 @@ class Ledger:
         except RobotError as error:
             if error.ends_run:
                 self.broken, self.limit = error, str(error)
-                return STOP
+                return REFUSED
             self.errors.append(error)
             return ("error", (len(self.errors) - 1, error.kind, str(error)))
         return ("ok", result)

@@ -204,6 +204,21 @@ def test_a_rule_ends_a_run(worker: Worker) -> None:
     assert [event.text for event in outcome.trace] == ["office"]
 
 
+@pytest.mark.parametrize(
+    "rest",
+    [
+        "    except BaseException: say('again')",
+        "    except BaseException: pass",
+        "    finally:\n      for n in range(9): pass",
+    ],
+)
+def test_the_line_is_that_of_the_call_whatever_a_program_does_afterwards(worker: Worker, rest: str) -> None:
+    program = f"def task_program():\n    try:\n        go_to('vault')\n{rest}\n    say('done')\n"
+    outcome = ran(worker, program, [VAULT])
+    assert outcome.error is not None
+    assert (outcome.error.kind, outcome.line, outcome.trace) == ("RuleViolation", 3, ())
+
+
 def test_a_refusal_may_be_caught(worker: Worker) -> None:
     program = "def task_program():\n    try: go_to('vault')\n    except Exception as e: say(str(e))\n"
     outcome = ran(worker, program, [rule('not tr.Exists(goto("vault"))', refuse=True)])

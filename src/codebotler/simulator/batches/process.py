@@ -130,6 +130,7 @@ class TranscribedRun(ProgramRun):
         vars(self.namespace).update(self.provided)
         self.now = self._told = 0.0
         self.spent = self.entered = self.is_odd = False
+        self.refused_at = None
         self.codes.clear()
         self.refuel()
         self._forget_calls()

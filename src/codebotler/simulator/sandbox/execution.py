@@ -42,6 +42,7 @@ class ProgramRun:
         self.skills: Skills = ()  # name, and parameters: name, and type `str` or `list`
         self.now = 0.0
         self.spent = self.entered = False
+        self.refused_at: int | None = None  # the line that asked for what a rule ended the run for
         self.codes: set[types.CodeType] = set()
         self.fuel = 0
         self.start = self.seconds = 0.0
@@ -73,12 +74,13 @@ class ProgramRun:
         except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
             setrecursionlimit(self.recursion_limit + HEADROOM)
             return self.ended_by(error)
-        return '{"end":"timeout","line":null}' if self.spent else '{"end":"finished"}'
+        return self.ended_by(LimitReachedError()) if self.spent else '{"end":"finished"}'
 
     def forget(self, names: dict[str, Any]) -> None:
         """Be as before the run of a program, which could use these names."""
         self.now = 0.0
         self.spent = self.entered = False
+        self.refused_at = None
         self.codes.clear()
         RAISED.clear()
         self.refuel()
@@ -88,7 +90,7 @@ class ProgramRun:
 
     def ended_by(self, error: BaseException) -> str:
         """Describe what ended the program; the exception's class may be the program's own."""
-        kind, line = type(error), last_line(error)
+        kind, line = type(error), self.refused_at or last_line(error)
         message = str.__getitem__(message_of(error), slice(1000))  # it may use fuel
         where = f'"line":{"null" if line is None else line}'
         if self.spent or issubclass(kind, LimitReachedError):
@@ -232,6 +234,7 @@ class ProgramRun:
         if kind == "error":
             raise robot_error(*value)
         self.spent = True
+        self.refused_at = (line_at_work() or None) if value else None
         raise LimitReachedError
 
 
