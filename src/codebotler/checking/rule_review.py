@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 from codebotler.core.skills import SKILLS
-from codebotler.core.trace import Trace
+from codebotler.core.trace import Option, Trace
 from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided, samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.robot import found_in
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.sampled_robot import PEOPLE
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
 ALWAYS_BROKEN = "all that a robot can do breaks it"
@@ -26,6 +27,7 @@ DETECTED = (
     "it depends on what a look finds or a person answers, so it can only be noticed: "
     "the mission stops right after that"
 )
+OTHER = "something else"  # an answer that rules do not name
 ANYTHING = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
 
 
@@ -70,8 +72,11 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
     guard = RuleGuard([rule])
     for event in breaks[:-1]:
         guard.happened(event)
+    last = breaks[-1]
+    if last.answer is not None:  # a question always has another option
+        last = replace(last, options=(*last.options, Option(last.answer), Option(OTHER)))
     try:
-        guard.judge(replace(breaks[-1], found=None, answer=None))
+        guard.judge(replace(last, found=None, answer=None))
     except RuleViolationError:
         return False
     return True
@@ -186,11 +191,15 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         named: list[tuple[str, Text | None, list[str]]] = [("thing", element.holding, things)]
         named.append(("person", element.to, people))
         named.append(("room", None if element.place is None else Regex(element.place), rooms))
-        sort = {"goto": "room", "pick": "thing", "place": "thing"}.get(element.kind)
-        named.append((sort or "", element.text if sort else None, rooms if sort == "room" else things))
+        sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *PEOPLE - {""}]}
+        sort = SKILLS.recordings[element.kind].names
+        named.append((SORTS.get(sort, sort), element.text if sort else None, sorts.get(sort, [])))
         for what, text, known in named:
             if isinstance(text, Regex) and not may_mean(text.pattern, known):
                 yield f'it names the {what} "{text.pattern}", which is not in this world'
+
+
+SORTS = {"object": "thing", "object or person": "thing or person"}
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TypeAlias
 
 from codebotler.checking.problems import Problem, Sample, no_room
-from codebotler.core.errors import UserError
+from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.words import listed
@@ -160,15 +160,16 @@ def _only_computed(sample: Sample) -> bool:
 
 
 def failures(ran: Sequence[Sample], room_map: RoomMap) -> Iterator[Problem]:
-    """One problem for the runs that ended at the same line in the same way."""
+    """One problem for the runs that ended at the same line in the same way, by the same rule if by one."""
     in_vain = all(sample.in_vain for sample in ran)
-    groups: dict[tuple[int | None, str], list[Sample]] = {}
+    groups: dict[tuple[int | None, str, str], list[Sample]] = {}
     for sample in ran:
         outcome = sample.outcome
         if outcome.error is not None and (in_vain or not sample.in_vain):
             line = None if outcome.status is Status.TIMEOUT else outcome.line  # any of those where it waits
-            groups.setdefault((line, outcome.error.kind), []).append(sample)
-    for (_, kind), same in groups.items():
+            rule = outcome.error.message.split('"')[1] if outcome.error.kind == VIOLATION else ""
+            groups.setdefault((line, outcome.error.kind, rule), []).append(sample)
+    for (_, kind, _), same in groups.items():
         numbers = tuple(sample.number for sample in same)
         yield Problem(kind, _message(same, ran, room_map), same[0].outcome.line, _where(same, ran), numbers)
 

@@ -21,7 +21,7 @@ from codebotler.missions.pictures import Pictures
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.rule_guard import Rule, RuleGuard
+from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
@@ -71,6 +71,7 @@ class Mission:
         self._gate = threading.Lock()  # held for moments only
         self._has_program = False  # which may be empty
         self._stopped_by: str | None = None
+        self._broken_at: int | None = None  # the line that asked for what a rule forbade
         self._asked, self._passed_on = 0.0, math.inf  # when a stop was first asked for; when the robot knew
         self._live: LiveRobot | None = None
         self._worker: Worker | None = None
@@ -225,7 +226,12 @@ class Mission:
         """
         guard = RuleGuard(rules) if rules else None
         live = LiveRobot(reserved.robot, self._write, place=place, guard=guard, room_map=room_map)
-        live.on_broken = lambda broken: self.stop(f"rule {broken.rule.name}")
+
+        def on_broken(broken: RuleViolationError) -> None:
+            self._broken_at = live.line
+            self.stop(f"rule {broken.rule.name}")
+
+        live.on_broken = on_broken
         with self._writing:
             if self.state is State.APPROVED:
                 reserved.use()
@@ -281,7 +287,7 @@ class Mission:
                 if self._live is not None:
                     self.trace = self._live.trace
                 if self._stopped_by is not None and reason != UNCONFIRMED:
-                    state, reason, line = State.STOPPED, stop_text(self._stopped_by), None
+                    state, reason, line = State.STOPPED, stop_text(self._stopped_by), self._broken_at
                 if self._stopped_by is not None and self.state is State.RUNNING:
                     self._be_stopping()
                 self._step(state, "end", reason=reason, line=line)

@@ -202,6 +202,7 @@ def open_run(
 
     The completions are taken over from `beside`, another evaluation of the same run.
     """
+    from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
 
@@ -215,6 +216,12 @@ def open_run(
         see=see,
         watch=lambda lines, total: watched(lines, "reading", total),
     )
+    if suite.house is not None and rules is not None:
+        judged_by = results.head.get("house_rules") or {}
+        if judged_by.get(suite.house.name) != suite.house.digest:
+            raise UserError(
+                f"has changed since the run was judged; `{again} --redo` judges by it", file=rules
+            )
     if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     more = _to_go_on(results, suite)

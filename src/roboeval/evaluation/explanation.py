@@ -10,6 +10,7 @@ from functools import cache, lru_cache, partial
 from typing import Any
 
 from codebotler.checking.storyboard import steps_of
+from codebotler.core.errors import VIOLATION
 from codebotler.core.program import parsed
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event, Trace, trace_from
@@ -158,9 +159,10 @@ class _Capitals:
     def world(self, world: Mapping[str, Any]) -> dict[str, Any]:
         """What is told of a world."""
         error = world["error"]
+        is_rule = error is not None and error["kind"] == VIOLATION  # whose names are not the program's
         return {
             **world,
-            "error": error and {**error, "message": self._sentence(error["message"])},
+            "error": error if is_rule else error and {**error, "message": self._sentence(error["message"])},
             "steps": [self._step(step) for step in world["steps"]],
             "failed_checks": [
                 {**check, "explanation": self._sentence(check["explanation"])}

@@ -43,6 +43,11 @@ def _named(
             yield from ((what, one, known) for one in found)
         else:
             yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
+        if element.holding is not None:
+            yield from (("object", one, objects) for one in patterns(element.holding))
+        if element.to is not None:
+            known = [*people, *_owners(rooms), *ANYBODY]
+            yield from (("person", one, known) for one in patterns(element.to))
         if element.place is not None:
             yield from (("room", one, there["room"]) for one in _alternatives(element.place))
     check = next(check for check in task.checks if check.name == requirement.check)

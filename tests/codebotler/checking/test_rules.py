@@ -139,6 +139,18 @@ def test_a_rule_that_is_broken_somewhere_is_a_problem_with_line_rule_and_world(t
     )
 
 
+def test_two_rules_that_are_broken_at_one_line_are_two_problems(tmp_path: Path) -> None:
+    found = problems(
+        tmp_path,
+        "room = 'server room' if is_in_room('mug') else \"alice's office\"",
+        "for _ in range(2):",
+        "    go_to(room)",
+        *RETURNS,
+    )
+    assert [problem.split('"')[1] for problem in found] == ["knock", "server-room"]
+    assert all(problem.startswith("line 4: RuleViolation: ") for problem in found)
+
+
 def test_a_rule_that_is_not_kept_at_the_end_is_a_problem_without_a_line(tmp_path: Path) -> None:
     (problem,) = problems(tmp_path, "go_to('kitchen')")
     assert problem.startswith('RuleViolation: the rule "report" is not kept at the end: At the end, tell')

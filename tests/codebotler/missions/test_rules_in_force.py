@@ -73,6 +73,7 @@ def test_the_robot_is_not_told_what_a_rule_forbids_and_the_mission_stops(tmp_pat
     assert told["says"] == VAULT.says
     assert told["formula"] == str(VAULT.formula)
     assert (told["what"], told["prevented"], told["line"]) == (["goto", "vault"], True, 6)
+    assert mission.summary.line == 6
 
 
 def test_the_robot_is_stopped_before_anything_is_logged(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     plain = (folder / "run" / "evaluations" / "paper.jsonl").read_bytes()
     ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
-    assert "of programs break a rule of the house (95% interval" in ended.out
+    assert "of the programs of a prompt break a rule of the house, on average (95% interval" in ended.out
     assert "knock" in ended.out
     assert "pass@1 with the rules less pass@1 without: -" in ended.out
     assert re.search(r"show run \w+/\d/\d --rules house.yaml", ended.err)
@@ -71,6 +71,12 @@ def test_other_rules_do_not_go_on_with_an_evaluation(folder: Path) -> None:
     told = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
     assert "judged with another set of house rules" in told.sentence
     assert "--redo starts over" in told.sentence
+    for command in (("show", "run"), ("report", "run", "--out", "report")):
+        told = refused(*command, "--rules", "house.yaml", cwd=folder)
+        assert told.file == "house.yaml"
+        assert re.search(
+            "has changed since the run was judged; `.* --rules house.yaml --redo` judges", told.sentence
+        )
 
 
 def test_rules_are_read_before_anything_is_judged(folder: Path) -> None:

@@ -315,7 +315,10 @@ def test_a_visit_that_leads_nowhere(linted: Lint) -> None:
 
 @pytest.mark.parametrize(
     "formula",
-    ['goto("lobby")', 'pick("cup")', 'place("cup")', 'check("cup")', 'goto(without("lobby"))'],
+    [
+        *('goto("lobby")', 'pick("cup")', 'place("cup")', 'check("cup")', 'goto(without("lobby"))'),
+        *('holding("cup", say(".*"))', 'to("lobby", ask(".*", ".*"))'),
+    ],
 )
 def test_something_that_is_not_in_the_world(linted: Lint, formula: str) -> None:
     found = linted({"does": f"not tr.Exists({formula})", "speaks": SPEAKS}, ["speaks", "does"])
@@ -335,6 +338,8 @@ def test_something_that_is_not_in_the_world(linted: Lint, formula: str) -> None:
         'check("red mug")',
         'check("person")',
         'check("ann")',
+        'holding("mug", say(".*"))',
+        'to("ann|somebody", ask(".*", ".*"))',
         'say("lobby")',
     ],
 )

@@ -60,7 +60,8 @@ def house_view(found: BrokenRules) -> RenderableType:
     table = grid("right", "left")
     for rule, count in found.by_rule.items():
         table.add_row(f"{count:,}", Text(visible(rule)))
-    share = f"{found.broken.mean:.1%} of programs break a rule of the house ({_interval(found.broken)})"
+    share = f"{found.broken.mean:.1%} of the programs of a prompt break a rule of the house, on average"
+    share += f" ({_interval(found.broken)})"
     parts: list[RenderableType] = [Text(), Text(share, "bold"), table]
     if found.cost is None:
         parts.append(Text("evaluate the run without --rules, too, to see what the rules cost", "dim"))
