@@ -6,9 +6,11 @@ simulation.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from importlib import import_module
+from typing import Any, Protocol, SupportsIndex
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,13 @@ class Skill:
     is_idle: bool = False
     does: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
+        """By its name where that is in its module: there, the name of the function is that of the skill."""
+        module = getattr(self.does, "__module__", "")
+        if getattr(sys.modules.get(module), self.name, None) is self:
+            return _declared_in, (module, self.name)
+        return super().__reduce_ex__(protocol)
+
     def doing(self, does: Callable[..., Any]) -> Skill:
         """The same skill, which does something else."""
         return replace(self, does=does, is_idle=False)
@@ -108,6 +117,11 @@ class Skill:
         """The skill as a Python signature, such as `go_to(location: str) -> None`."""
         arguments = ", ".join(f"{p.name}: {p.annotation}" for p in self.parameters)
         return f"{self.name}({arguments}) -> {self.returns}"
+
+
+def _declared_in(module: str, name: str) -> Skill:
+    found: Skill = getattr(import_module(module), name)
+    return found
 
 
 class Simulation(Protocol):

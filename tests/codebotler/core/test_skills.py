@@ -1,4 +1,6 @@
+import copy
 import inspect
+import pickle
 
 import pytest
 
@@ -86,3 +88,11 @@ def test_two_skills_share_neither_a_name_nor_a_kind_of_event(row: Skill) -> None
 def test_table_knows_only_its_rows() -> None:
     with pytest.raises(KeyError):
         SkillTable((WAVE,))["say"]
+
+
+def test_skills_can_be_sent_and_copied() -> None:
+    assert pickle.loads(pickle.dumps(SKILLS["go_to"])) is SKILLS["go_to"]
+    assert copy.deepcopy(SKILLS["go_to"]) is SKILLS["go_to"]
+    assert pickle.loads(pickle.dumps(SKILLS)) == SKILLS
+    assert pickle.loads(pickle.dumps(WAVE)) == WAVE
+    assert pickle.loads(pickle.dumps(WAVE.doing(print))).does is print
