@@ -14,7 +14,7 @@ import statistics
 import sys
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
@@ -34,7 +34,7 @@ from codebotler.rtl.formulas import And, Or, Test
 from codebotler.rtl.semantics import is_match
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.robot import SimulatedRobot, resolve_room
+from codebotler.simulator.robot import SimulatedRobot, finds, resolve_room
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import NewRobot, Worker
@@ -113,7 +113,8 @@ class House:
     def concerns(self, events: Iterable[Event]) -> bool:
         """Whether an event is of a kind, and has a text, of which a rule speaks."""
         about = [element for rule in self.rules for element in speaks_of(rule.formula)]
-        return any(is_match(element, event, 0) for event in events for element in about)
+        all_meant = set(chain.from_iterable(map(meant, events)))
+        return any(is_match(element, event, 0) for event in all_meant for element in about)
 
 
 def houses() -> list[House]:
@@ -146,17 +147,30 @@ def tests_of(formula: Formula) -> Iterator[Test]:
 # --- what is true
 
 
-def seen(trace: Trace, room_of: Callable[[str], str | None]) -> Trace:
-    """A trace as rules are about it: a drive has the room that it reached."""
-    return tuple(
-        replace(event, text=room_of(event.text) or event.text) if event.kind == "goto" else event
-        for event in trace
-    )
+def seen(trace: Trace, rooms: Sequence[str]) -> Trace:
+    """A trace as rules are about it: a drive has the room that it reached, and knows which it may mean."""
+    return tuple(driven(event, rooms) if event.kind == "goto" else event for event in trace)
+
+
+def driven(event: Event, rooms: Sequence[str]) -> Event:
+    """A drive to the room that it reached; all that its words may mean stand in a field of questions."""
+    reached = resolve_room(rooms, event.text) or event.text
+    wanted = event.text.strip().lower()
+    named = [room for room in rooms if room.lower() == wanted]
+    may_be = named or [room for room in rooms if finds(event.text, room, "label-in-request")]
+    return replace(event, text=reached, to="\n".join(dict.fromkeys([reached, *may_be])))
+
+
+def meant(event: Event) -> list[Event]:
+    """An event once for each room that it may mean, if it is a drive."""
+    names = (event.to or "").split("\n") if event.kind == "goto" else [event.text]
+    return [replace(event, text=name) for name in names]
 
 
 def breaking(rule: Rule, trace: Trace) -> int | None:
-    """The position of the first event that breaks a rule; one that cannot be judged breaks it."""
-    return next((at for at in range(len(trace)) if not is_kept(rule, trace[: at + 1])), None)
+    """The position of the first event that breaks a rule, in some room; one that cannot be judged does."""
+    each = ([(*trace[:at], event) for event in meant(trace[at])] for at in range(len(trace)))
+    return next((at for at, ends in enumerate(each) if not all(is_kept(rule, end) for end in ends)), None)
 
 
 def is_kept(rule: Rule, trace: Trace) -> bool:
@@ -170,6 +184,8 @@ def is_kept(rule: Rule, trace: Trace) -> bool:
 def is_foreseeable(rule: Rule, trace: Trace, at: int) -> bool:
     """Whether an event breaks a rule however it turns out."""
     event = trace[at]
+    if event.kind == "goto":
+        return True
     results: Iterable[Event] = [event]
     if event.kind == "check":
         results = [replace(event, found=True), replace(event, found=False)]
@@ -306,9 +322,7 @@ class Measuring:
         """What a program does in each world of a task, as rules are about it."""
         scenarios = self.suite.tasks[task].scenarios
         rooms = [[room.name for room in scenario.world.rooms] for scenario in scenarios]
-        return [
-            seen(one.trace, partial(resolve_room, here)) for one, here in zip(outcomes, rooms, strict=True)
-        ]
+        return [seen(one.trace, here) for one, here in zip(outcomes, rooms, strict=True)]
 
     def passed(self, task: str, outcomes: Sequence[Outcome]) -> bool:
         """Whether a program is right in all worlds."""
@@ -399,7 +413,7 @@ class Measuring:
         """Whether a program breaks the rules in a sampled world, if nothing keeps it from that."""
         sampler = FactSampler(found.seed, sample.number, forced=sample.draws)
         outcome = self.worker.run(effect.source[1], partial(SampledRobot, plan, sampler))
-        return self.first_break(house, seen(outcome.trace, plan.room)) is not None
+        return self.first_break(house, seen(outcome.trace, plan.rooms)) is not None
 
 
 def would_fail(attempt: Event, follows: Trace, rooms: Sequence[str]) -> bool:
