@@ -459,11 +459,12 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
         assert may_go_on.wait(30)
         robot.record("say", message)
 
+    others = engine_processes()  # which other tests keep open
     worker = Worker()
     with ThreadPoolExecutor(1) as thread:
         running = thread.submit(worker.run, saying("a"), lambda: SimulatedRobot(WORLD, skills=doing(busy)))
         assert is_busy.wait(30)
-        family = engine_processes()
+        family = engine_processes() - others
         worker.stop()
         assert are_gone(family)
         may_go_on.set()

@@ -52,7 +52,13 @@ class Machine:
 
 
 @pytest.fixture
-def worker() -> Iterator[Worker]:
+def others() -> set[int]:
+    """The processes of engines that other tests keep open."""
+    return engine_processes()
+
+
+@pytest.fixture
+def worker(others: set[int]) -> Iterator[Worker]:  # noqa: ARG001 - told before it starts
     worker = Worker()
     yield worker
     worker.close()
@@ -201,7 +207,7 @@ def test_run_whose_process_is_lost_is_not_run_again(worker: Worker) -> None:
     assert done(worker, "def task_program(): say('next')")[0] == ["next"]
 
 
-def test_stop_ends_a_run_that_sleeps(worker: Worker) -> None:
+def test_stop_ends_a_run_that_sleeps(worker: Worker, others: set[int]) -> None:
     sleeps, may_go_on = threading.Event(), threading.Event()
 
     class Sleeper(Machine):
@@ -215,7 +221,8 @@ def test_stop_ends_a_run_that_sleeps(worker: Worker) -> None:
         program = "def task_program():\n    time.sleep(3600)\n    say('a')\n"
         running = thread.submit(worker.run_live, program, machine)
         assert sleeps.wait(30)
-        family = engine_processes()
+        family = engine_processes() - others
+        assert family
         worker.stop()
         assert are_gone(family)
         may_go_on.set()
