@@ -21,7 +21,7 @@ CHOSEN = {
 }
 """Each picture, and what it is made from."""
 
-WIDEST, TALLEST, COLOURS = 1200, 850, 256
+WIDEST, TALLEST, COLOURS = 1200, 850, 208
 """Pixels of a picture; those of a tablet are half as wide and not cut off."""
 
 
