@@ -1,4 +1,4 @@
-"""House rules on the page: what a person sees of them, and how one is switched off for one mission."""
+"""House rules on the page: what a person sees of them, and how one is switched off for one program."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
 
         write(page, VISIT)
         expect(page.locator(".problems")).to_contain_text('the rule "study" forbids going to "study"')
-        page.get_by_role("button", name="Switch off the rule study in this mission").click()
+        page.get_by_role("button", name="Switch off the rule study for this program").click()
         page.get_by_role("button", name="Switch it off").click()
         expect(page.get_by_text("say why the rule does not count")).to_be_visible()
         page.get_by_label("Why?").fill("Ann has asked for a visit")

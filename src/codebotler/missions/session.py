@@ -124,14 +124,14 @@ class MissionSession:
             reason: why, which is logged.
         """
         if not any(letter.isalnum() for letter in reason):
-            raise MissionError("say why the rule does not count in this mission")
+            raise MissionError("say why the rule does not count for this program")
         with self._editing, self._lock:
             view, mission = self._view, self._mission
             if mission is None or not view.may_be_approved:
                 raise MissionError("rules can be switched off only while a program waits for approval")
             if name not in {rule.name for rule in view.rules_in_force}:
                 raise MissionError(f'there is no rule "{name}" in force')
-            mission.note(f'a person switched off the rule "{name}" in this mission: {reason.strip()}')
+            mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             self._edited = view.program
             self._change(off=(*view.off, name), busy=CHECKING, **UNCHECKED)
 

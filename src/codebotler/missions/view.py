@@ -67,7 +67,7 @@ class SessionView:
     room_map: RoomMap | None = None  # of the robot, as far as it says
     remarks: tuple[str, ...] = ()  # what is odd about the robot, in sentences
     rules: tuple[Rule, ...] = ()  # of the house
-    off: tuple[str, ...] = ()  # names of those that a person has switched off in this mission
+    off: tuple[str, ...] = ()  # names of those that a person has switched off for this program
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True
 

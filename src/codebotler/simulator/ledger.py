@@ -96,9 +96,8 @@ class Ledger:
                 error = self.errors[number]
                 return self.outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
             case {"end": "python-error", "kind": str(kind), "message": str(message)}:
-                name = (
-                    kind if kind.isidentifier() and kind != VIOLATION else "Exception"
-                )  # rules are not forged
+                is_own = kind.isidentifier() and kind != VIOLATION  # which only rules have
+                name = kind if is_own else "Exception"
                 return self.outcome(Status.PYTHON_ERROR, name[:100], message, line)
             case _:
                 return self.outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")

@@ -110,7 +110,7 @@ class SimulatedRobot:
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The skills that a copy made from `setup` would not have: their behaviours were given."""
+        """The skills that a copy made from `setup` would not have: they were declared elsewhere."""
         return own_skills(self, SimulatedRobot)
 
     @property

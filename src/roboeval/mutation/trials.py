@@ -44,7 +44,6 @@ def mutation_score(
     Raises UserError if a number of worlds is given, but the suite's are written by hand.
     """
     scenarios = worlds_of(suite, task, worlds, seed)
-
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
 
     def run(program: str) -> Iterator[Outcome]:
@@ -61,9 +60,6 @@ def mutation_score(
             return Result(MutantStatus.EQUIVALENT, why=equivalent[mutant.key])
         return found
 
-    def results_of(some: Sequence[Mutant]) -> list[Result]:
-        return [result(mutant) for mutant in some]
-
     equivalent = equivalent_mutants(task)
     programs = originals(task, further)
     ran = pool.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
@@ -78,7 +74,9 @@ def mutation_score(
     right = tuple(original for original in programs if original in judges)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
     made = drawn(mutants(right, context), most, seed)
-    tried = pool.map_distinct(results_of, made, name=lambda mutant: digest(mutant.program))
+    tried = pool.map_distinct(
+        lambda some: [*map(result, some)], made, name=lambda mutant: digest(mutant.program)
+    )
     results = watched(tried, f"mutating {task.name}", len(made))
     return MutationScore(
         task=task.name,

@@ -83,6 +83,7 @@ def test_a_rule_ends_a_program_that_runs_all_the_same(files: Path) -> None:
     assert ended.status == 1
     assert 'kept from going to "vault" by the rule "vault": Never go into the vault.' in ended.out
     assert "stopped by rule vault" in ended.out
+    assert "stopped: stopped" not in ended.out + codebotler(files, "missions", "last").out
     shown = codebotler(files, "missions", "last")
     assert 'kept from going to "vault"' in shown.out
 

@@ -373,6 +373,12 @@ def test_texts_have_the_capitals_of_the_program_where_they_are_clear(
     assert as_written([told(text)], program) == [told(shown)]
 
 
+def test_the_name_of_a_rule_keeps_its_own_letters() -> None:
+    error = {"kind": "RuleViolation", "message": 'the rule "no-office" forbids going to "office": No'}
+    world = {"error": error, "steps": [], "failed_checks": []}
+    assert as_written([world], "say('No')") == [world]
+
+
 def test_a_program_whose_texts_were_lowered_is_shown_with_its_capitals() -> None:
     said = Outcome(Status.FINISHED, (GOTO, Event("say", "good day")))
     for rules, told in ((Rules(), '"Good Day"'), (Rules(literals="as-written"), '"good day"')):

@@ -164,20 +164,20 @@ def _within(scope: formulas.Scope, inner: Machine) -> Machine:
 
         case "AfterFirst":
 
-            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401
+            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401 - of whichever part it is
                 came, here = state
                 return (True, start) if not came and at in letter else (came, step(here, letter))
 
         case "AfterLast":
 
-            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401
+            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401 - of whichever part it is
                 came, here = state
                 return (True, start) if at in letter else (came, step(here, letter))
 
         case _:
             return _before_last(scope, inner)
 
-    def accepted(state: Any) -> bool:  # noqa: ANN401
+    def accepted(state: Any) -> bool:  # noqa: ANN401 - of whichever part it is
         came, here = state
         return accepts(start if scope.is_only and not came else here)
 

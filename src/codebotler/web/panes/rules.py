@@ -1,4 +1,4 @@
-"""The rules of the house that count in a mission, and how a person switches one off."""
+"""The rules of the house that count for a program, and how a person switches one off."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class RulesPane:
                         PlainText("small", "switched off for this program", "quiet")
                     elif view.may_be_approved:
                         off = Button("Switch off …", lambda rule=rule: self._ask_why(rule), "plain small")
-                        off.props(f'aria-label="Switch off the rule {rule.name} in this mission"')
+                        off.props(f'aria-label="Switch off the rule {rule.name} for this program"')
 
     def _ask_why(self, rule: Rule) -> None:
-        """Have the person say why the rule does not count in this mission."""
+        """Have the person say why the rule does not count for the program that waits."""
         with ui.dialog() as dialog, ui.card().classes("pane"):
-            PlainText("h3", f'Switch off "{shortened(rule.says, MOST_TEXT)}" in this mission?')
-            PlainText("p", "The robot may break it until this mission ends. The reason is logged.", "quiet")
+            PlainText("h3", f'Switch off "{shortened(rule.says, MOST_TEXT)}" for this program?')
+            PlainText("p", "The robot may break it while this program runs. The reason is logged.", "quiet")
             reason = ui.input("Why?").props(f"outlined autofocus maxlength={MOST_REASON}").classes("why")
 
             async def switch_off() -> None:
