@@ -100,15 +100,10 @@ def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None)
     finally_ = [rule.formula for rule in kept if rule.when == "finally"]
     moves = None if world is None else {room.name: room.name for room in world.rooms}
     start = "" if world is None else world.robot
-    possible = [
-        *dict.fromkeys(chain.from_iterable(map(_holding_needs_a_pick, [*wanted, *always, *finally_])))
-    ]
-    for physics in (possible, []) if possible else ([],):  # an example may need what no robot can do
-        reasoner = Reasoner([*wanted, *always, *finally_, *physics], moves, start)
-        found = reasoner.trace([*wanted, *finally_], always=[*always, *physics], shortest=True)
-        if found is not None:
-            return found
-    return None
+    spoken_of = [*wanted, *always, *finally_]
+    possible = [*dict.fromkeys(chain.from_iterable(map(_holding_needs_a_pick, spoken_of)))]
+    reasoner = Reasoner([*spoken_of, *possible], moves, start)
+    return reasoner.trace([*wanted, *finally_], always=[*always, *possible], shortest=True)
 
 
 def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:

@@ -79,8 +79,13 @@ def test_a_robot_picks_up_what_it_holds_in_an_example() -> None:
         ("pick", "glass"),
     ]
     assert review.breaks[2].holding == "glass"
-    (odd,) = reviewed(rules('not tr.Exists(pick("mug")) and not tr.Exists(holding("mug", say(".*")))'), WORLD)
-    assert odd.breaks is not None
+    (impossible,) = reviewed(
+        rules('tr.Exists(pick("mug")) or not tr.Exists(holding("mug", say(".*")))'), WORLD
+    )
+    assert NEVER_BROKEN in impossible.warnings
+    (anything,) = reviewed(rules('not tr.Exists(holding(".*", goto("kitchen")))'), WORLD)
+    assert anything.breaks is not None
+    assert [event.kind for event in anything.breaks] == ["pick", "goto"]
 
 
 def test_examples_of_a_world_are_of_its_rooms() -> None:

@@ -222,3 +222,18 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
     assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == (VAULT,)
     session.stop("a test")
     session.join(10)
+
+
+def test_a_rule_that_was_switched_off_is_in_force_for_what_a_model_writes_next(tmp_path: Path) -> None:
+    order = Order(next(iter(recorded("recorded").replies)), "recorded")
+    session = MissionSession(
+        knowing("hall", "vault"), tmp_path, order, open_model=recorded, check=checked, rules=(VAULT,)
+    )
+    session.start()
+    session.wait_until(lambda now: now.may_be_approved)
+    session.switch_off("vault", "the door is broken")
+    session.wait_until(lambda now: now.may_be_asked_again)
+    session.ask_again(repair=False)
+    assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == (VAULT,)
+    session.stop("a test")
+    session.join(10)

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.robot import Result, SimulatedRobot, Thing, _pattern, choose, resolve_room
@@ -269,8 +268,11 @@ def test_events_say_where_and_when_they_happened() -> None:
     assert [(event.place, event.time) for event in robot.trace] == [("hall", 0.0), ("lab", 2.5)]
 
 
-def test_every_skill_of_the_table_has_a_behaviour() -> None:
-    assert set(robot_in().skills) == set(SKILLS)
+def test_a_look_changes_something_where_somebody_may_come() -> None:
+    for looks in (0, 2):
+        people = (Person("ann", after_looks=looks),)
+        robot = SimulatedRobot(World((Room("hall", people=people),), "hall"))
+        assert ("is_in_room" in robot.idle_skills) == (looks == 0)
 
 
 # --- questions (section 4)
