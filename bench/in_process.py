@@ -19,6 +19,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
 from codebotler.simulator.fork_server import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
+from codebotler.simulator.ledger import texts_in
 from codebotler.simulator.robot import Argument, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.sandbox import REFUSED, execution
@@ -160,7 +161,7 @@ class Unwalled(Bare):
 
     def reached(self, arguments: list[Argument]) -> str | None:
         """The limit that a skill call goes beyond, in words."""
-        texts = [t for a in arguments for t in ([a] if isinstance(a, str) else [o.text for o in a])]
+        texts = [t for a in arguments for t in (texts_in(a) if isinstance(a, tuple) else [str(a)])]
         if late := self.too_late():
             return late
         self.asked += 1

@@ -14,7 +14,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.simulator.sandbox.fuel import nodes_of
 from codebotler.simulator.sandbox.tame import is_tame
 

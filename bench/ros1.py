@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median, quantiles
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options, Robot
 from codebotler.robots.open import open_robot

@@ -18,7 +18,8 @@ from typing import Any
 from PIL.Image import Image
 
 from codebotler import UserError
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.models.base import SamplingSettings
 from codebotler.perception import (
     Detector,

@@ -10,7 +10,11 @@ from codebotler.checking.check import check
 from codebotler.checking.storyboard import step_text, steps_of
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.program import Flaw, Program
-from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable, Verb, skill
+from codebotler.core.skills.declaration import skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, SkillTable
+from codebotler.core.skills.values import TEXT, TRUTH, ValueType
+from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
@@ -20,10 +24,9 @@ from codebotler.simulator.robot import SimulatedRobot
 from roboeval.suites.load import SUITES, load_suite
 
 
-@skill(ros=RosAction("Wave", "/wave_server", ("string person",)))
+@skill(ros=RosAction("Wave", "/wave_server", ("string person",)), when_tried=True)
 def wave(robot: SimulatedRobot, person: str) -> None:
     """Wave at a person in the room."""
-    robot.record("wave", person)
     if not robot.people[robot.room]:
         raise RobotError("WaveNoPerson", f'nobody is here to be waved at as "{person}"')
 
@@ -45,9 +48,8 @@ def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> No
     verb = Verb("open", "opens", "opened", "opening", results=("it would not move", "it moved"))
 
     @skill(event="open", verb=verb)
-    def open_door(robot: SimulatedRobot, door: str) -> bool:
+    def open_door(_: SimulatedRobot, door: str) -> bool:
         """Open it."""
-        robot.record("open", door)
         return door == "glass door"
 
     robot = SimulatedRobot(WORLD, skills=SKILLS.with_skill(open_door))
@@ -55,7 +57,7 @@ def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> No
     assert [(event.text, event.found) for event in robot.trace] == [("glass door", True), ("gate", False)]
     robot.perform("say", ["done"])
     assert robot.trace[-1].found is None
-    assert str(step_text(steps_of(robot.trace)[1])) == 'open "gate"'
+    assert str(step_text(steps_of(robot.trace)[1])) == 'opened "gate": it would not move'
 
 
 def test_a_question_of_its_own_is_shown_with_its_options_and_its_answer() -> None:
@@ -125,12 +127,12 @@ def test_formula_judges_it(outcomes: dict[str, Outcome]) -> None:
 def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others() -> None:
     asks = Skill(
         "vote",
-        (Parameter("about"), Parameter("options", list, "list[str]")),
-        "str",
+        (Parameter("about"), Parameter("options", ValueType(is_list=True), is_options=True)),
+        TEXT,
         "Let all in the room vote.",
         Recording("vote", "about", "options"),
     )
-    smells = Skill("smells", (Parameter("what"),), "bool", "Smell.", Recording("smell", "what"))
+    smells = Skill("smells", (Parameter("what"),), TRUTH, "Smell.", Recording("smell", "what"))
     table = SkillTable((*SKILLS.rows, asks, smells))
     trace = (
         Event("vote", "tea?"),
@@ -161,8 +163,8 @@ def test_models_are_told_of_it() -> None:
 
 
 def test_a_check_in_imagined_worlds_knows_it() -> None:
-    def wave_at_anybody(robot: SimulatedRobot, person: str) -> None:
-        robot.record("wave", person)
+    def wave_at_anybody(_: SimulatedRobot, person: str) -> None:
+        assert person
 
     table = TABLE.doing(wave=wave_at_anybody)
     found = check(PROGRAMS["waves"], rooms=["hall", "lab"], skills=table)

@@ -14,7 +14,7 @@ from typing import Any
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros.robot import actions_of
 from codebotler.robots.ros.worker import WORKERS

@@ -14,7 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from codebotler.core.skills import SKILLS, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import ros1
 from codebotler.robots.ros.robot import RosRobot, Waits

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import CancelledError
 from codebotler.robots.ros.ros1 import MEND
 from ros_graph import GO_TO, Graph, Process, free_port, installed, started

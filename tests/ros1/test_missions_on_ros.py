@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from bridges import bridge, over_ros
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from ros_graph import GO_TO, Graph
 
 FETCH = 'def task_program():\n    go_to("the hall")\n    if is_in_room("mug"):\n        pick("mug")\n'

@@ -21,7 +21,7 @@ from mcap.reader import make_reader
 from PIL import Image
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.missions.log import events_of
 from codebotler.perception import image_of
 from codebotler.robots.base import ROS_PYTHON, CancelledError, Picture

@@ -16,7 +16,9 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills import SKILLS, Parameter, RosAction, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, RosAction, Skill
+from codebotler.core.skills.values import TRUTH, ValueType
 from codebotler.robots.base import ROS_PYTHON, CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros.robot import RosRobot, Waits
@@ -497,8 +499,8 @@ def test_five_hundred_goals_in_a_row_and_none_is_lost(graph: Graph) -> None:
 def test_ninth_skill_is_performed(graph: Graph) -> None:
     wave = Skill(
         "wave",
-        (Parameter("person"), Parameter("ways", list, "list[str]")),
-        "bool",
+        (Parameter("person"), Parameter("ways", ValueType(is_list=True), is_options=True)),
+        TRUTH,
         "Wave at a person.",
         ros=RosAction("Wave", "/wave_server", ("string person", "string[] ways"), "bool"),
     )

@@ -21,7 +21,7 @@ from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import rosbridge

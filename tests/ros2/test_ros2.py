@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import ros2

@@ -21,7 +21,8 @@ from codebotler.checking.sampled import (
 from codebotler.checking.static import static_problems
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import Flaw, parsed, tree_of
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler

@@ -6,7 +6,8 @@ import difflib
 from dataclasses import dataclass, field
 from typing import Any
 
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, outcome_data
 from codebotler.core.words import brief, counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler

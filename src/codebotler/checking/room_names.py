@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from typing import TypeAlias
 
 from codebotler.core.program import names_bound, nodes
-from codebotler.core.skills import SKILLS, Skill, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
 
 DRIVE, LIST, HERE = "goto", "get_all_rooms", "get_current_location"
 MOST_ROOMS = 100

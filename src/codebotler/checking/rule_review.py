@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Option, Trace
 from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
@@ -187,7 +188,8 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         named.append(("person", element.to, people))
         named.append(("room", None if element.place is None else Regex(element.place), rooms))
         sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *PEOPLE - {""}]}
-        sort = SKILLS.recordings[element.kind].names
+        row = by_event(element.kind)
+        sort = row.recording.names if row is not None and row.recording is not None else ""
         named.append((SORTS.get(sort, sort), element.text if sort else None, sorts.get(sort, [])))
         for what, text, known in named:
             if isinstance(text, Regex) and not may_mean(text.pattern, known):

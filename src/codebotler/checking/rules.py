@@ -98,7 +98,7 @@ def _parsed(text: str, file: YamlFile, at: Place) -> Formula:
 
 
 def _regexes(element: EventPattern) -> Iterator[str]:
-    texts = (element.text, element.options, element.answer, element.holding, element.to)
+    texts = (element.text, element.options, element.answer, element.holding, element.to, *element.more)
     yield from (pattern for text in texts if text is not None for pattern in patterns(text))
     if element.place is not None:
         yield element.place

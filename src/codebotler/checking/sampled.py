@@ -9,7 +9,8 @@ from typing import TypeAlias
 
 from codebotler.checking.problems import Problem, Sample, no_room
 from codebotler.core.errors import VIOLATION, UserError
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.words import listed
 from codebotler.simulator.fact_sampler import FactSampler

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from codebotler.checking.problems import Problem, no_room
 from codebotler.checking.room_names import fixed_drives
 from codebotler.core.program import TASK, Flaw, flaws_of, nodes
-from codebotler.core.skills import SkillTable
+from codebotler.core.skills.table import SkillTable
 from codebotler.simulator.sampled_robot import RoomMap
 
 EVERYTHING = frozenset({"Exception", "BaseException"})

@@ -10,12 +10,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace
-
-VERBS = SKILLS.verbs
-ASKING = frozenset(kind for kind, recording in SKILLS.recordings.items() if recording.options is not None)
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20
@@ -34,10 +31,17 @@ def _step_data(number: int, event: Event, room: Callable[[str], str | None] | No
             data["to"] = room(event.text)
     if event.found is not None:
         data["found"] = event.found
-    if event.kind in ASKING or event.answer is not None:
+    if event.more:
+        data["more"] = [*event.more]
+    if _asks(event.kind) or event.answer is not None:
         data["options"] = [o.text if o.is_text else {"no text": o.text} for o in event.options]
         data["answer"] = event.answer
     return data
+
+
+def _asks(kind: str) -> bool:
+    row = by_event(kind)
+    return row is not None and row.recording is not None and row.recording.options is not None
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
@@ -89,14 +93,23 @@ def step_text(step: Mapping[str, Any]) -> Text:
     if step["kind"] == "goto":
         return _drive(step, text)
     kind, result = step["kind"], step.get("found")
-    verb = VERBS.get(kind)
-    told = f"{visible(kind) if verb is None else verb.past} {text}"
+    verb = verb_for(kind)
+    told = f"{visible(kind)} {text}" if verb is None else step_words(step, verb.past)
     if "answer" in step:
         answer = "no answer" if step["answer"] is None else shortened(step["answer"])
         told += f" {_options(step['options'])} → {answer}"
     elif verb and result is not None:
         told += f": {verb.results[result]}"
     return Text(told)
+
+
+def step_words(step: Mapping[str, Any], form: str) -> str:
+    """A form of a step's verb, and to what it is done."""
+    row = by_event(step["kind"])
+    assert row is not None, "it has a verb"
+    assert row.verb is not None, "the same"
+    given = [shortened(text) for text in (step["text"], *step.get("more", ()))]
+    return row.verb.with_object(form, given if row.recording is not None and row.recording.text else [])
 
 
 def _drive(step: Mapping[str, Any], request: str) -> Text:

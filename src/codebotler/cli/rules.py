@@ -12,11 +12,12 @@ from rich.text import Text
 from codebotler.checking.rule_review import Review, unknown_rooms_in
 from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import listed
 from codebotler.core.world import World
+from codebotler.rtl.wording import verb as verb_of
 from codebotler.simulator.rule_guard import Rule
 
 MADE_UP = ("", "x")  # texts in examples that stand for any other
@@ -63,13 +64,14 @@ def _steps(trace: Trace) -> RenderableType:
 
 def step_sentence(event: Event) -> str:
     """A step of an example, with all that a rule may speak of; any text will do where it is made up."""
-    recording, verb = SKILLS.recordings[event.kind], SKILLS.verbs[event.kind]
-    made_up = "another room" if recording.is_drive else "something"
+    row, verb = by_event(event.kind), verb_of(event.kind)
+    is_drive = row is not None and row.recording is not None and row.recording.is_drive
+    made_up = "another room" if is_drive else "something"
     told = [verb.third, made_up if event.text in MADE_UP else f'"{visible(event.text)}"']
     offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
     told += [f"offering {listed(offered)}"] if offered else []
     told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []
-    told += [f"in {visible(event.place)}"] if event.place not in MADE_UP and not recording.is_drive else []
+    told += [f"in {visible(event.place)}"] if event.place not in MADE_UP and not is_drive else []
     held = "something" if event.holding in MADE_UP else f'"{visible(event.holding)}"'
     told += [f"holding {held}"] if event.holding else []
     if event.found is not None:

@@ -15,7 +15,9 @@ from functools import lru_cache
 from itertools import islice
 from typing import Any
 
-from codebotler.core.skills import SKILLS, Parameter, Skill, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Skill, SkillTable
+from codebotler.core.skills.values import TEXT
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
@@ -287,8 +289,10 @@ def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
     given = dict(zip((p.name for p in skill.parameters), node.args, strict=False))
     given |= {k.arg: k.value for k in node.keywords if k.arg}
     for parameter in skill.parameters:
-        if parameter.type is list:
+        if parameter.is_options:
             yield from _wrong_options(given[parameter.name], skill, parameter)
+        elif parameter.type != TEXT:
+            yield from _wrong_value(given[parameter.name], skill, parameter)
 
 
 def _mismatch(node: ast.Call, skill: Skill) -> str | None:
@@ -305,6 +309,18 @@ def _mismatch(node: ast.Call, skill: Skill) -> str | None:
     if count == len(names):
         return None
     return f"{takes}, but got {counted(count, 'argument') if count else 'none'}"
+
+
+def _wrong_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
+    """A value that is written where it is passed, and that a skill does not take."""
+    try:
+        value = ast.literal_eval(node)
+    except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):
+        return
+    if type(value) is tuple or not parameter.type.fits(value):
+        is_choice = type(value).__name__ == parameter.type.base and not parameter.type.is_list
+        message = f"{skill.name}: {parameter.name} must be {parameter.words}, not {value!r:.60}"
+        yield Flaw(node.lineno, "ValueError" if is_choice else "TypeError", message)
 
 
 def _wrong_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:

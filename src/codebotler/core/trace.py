@@ -8,7 +8,9 @@ from enum import StrEnum
 from typing import Any, NamedTuple, TypeAlias
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills import SKILLS, Skill, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.skills.values import Scalar, as_text
 
 
 class Option(NamedTuple):
@@ -37,6 +39,7 @@ class Event:
         time: simulated seconds since the start of the run.
         holding: what the robot held when it began; empty for nothing. Rows of evaluations do not keep it.
         to: whom a question was for, as the program said; None for other kinds. Rows do not keep it either.
+        more: what else a skill with several arguments was given, as texts.
     """
 
     kind: str
@@ -48,6 +51,7 @@ class Event:
     time: float = field(default=0.0, compare=False)
     holding: str = field(default="", compare=False)
     to: str | None = field(default=None, compare=False)
+    more: tuple[str, ...] = ()
 
     def __init__(  # noqa: PLR0917 - as the generated one would have it
         self,
@@ -60,16 +64,17 @@ class Event:
         time: float = 0.0,
         holding: str = "",
         to: str | None = None,
+        more: tuple[str, ...] = (),
     ) -> None:
         values = self.__dict__  # by far the quickest way to fill what is frozen, and a trace has many events
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
-        values["holding"], values["to"] = holding, to
+        values["holding"], values["to"], values["more"] = holding, to, more
 
 
 def attempted(
     skill: Skill,
-    arguments: Sequence[str | tuple[Option, ...]],
+    arguments: Sequence[Scalar | tuple[Option, ...] | tuple[Scalar, ...]],
     *,
     place: str,
     time: float,
@@ -78,13 +83,11 @@ def attempted(
     """The event that a skill leaves if it is executed now; None for skills without one."""
     if skill.recording is None:
         return None
-    given = dict(zip((p.name for p in skill.parameters), arguments, strict=True))
-    text, options = given[skill.recording.text], given.get(skill.recording.options or "", ())
-    to = given.get(skill.recording.to or "")
-    assert isinstance(text, str)
-    assert not isinstance(options, str)
-    assert not isinstance(to, tuple)
-    return Event(skill.recording.kind, text.strip(), options, place=place, time=time, holding=holding, to=to)
+    row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))
+    text, options = as_text(given.get(row.text, "")).strip(), given.get(row.options or "", ())
+    to = as_text(given[row.to]) if row.to else None
+    more = tuple(as_text(given[name]).strip() for name in row.more)
+    return Event(row.kind, text, options, place=place, time=time, holding=holding, to=to, more=more)  # type: ignore[arg-type]  # options
 
 
 Trace: TypeAlias = tuple[Event, ...]
@@ -130,7 +133,11 @@ class Outcome:
 
 
 def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
-    """A trace as a list of `[kind, text]`, `[kind, text, found]` and `[kind, text, options, answer]`."""
+    """A trace as a list of events.
+
+    An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`; where a skill has
+    several arguments, `[kind, text, more]` or `[kind, text, more, found]`.
+    """
     asking = frozenset(kind for kind, recording in skills.recordings.items() if recording.options is not None)
     return [_event_data(event, asking) for event in trace]
 
@@ -154,9 +161,12 @@ def outcome_data(outcome: Outcome, skills: SkillTable = SKILLS) -> dict[str, Any
 def _event_data(event: Event, asking: frozenset[str]) -> list[Any]:
     if event.kind in asking or event.options or event.answer is not None:
         return [event.kind, event.text, [_option_data(option) for option in event.options], event.answer]
+    data: list[Any] = [event.kind, event.text]
+    if event.more:
+        data.append(list(event.more))
     if event.found is not None:
-        return [event.kind, event.text, event.found]
-    return [event.kind, event.text]
+        data.append(event.found)
+    return data
 
 
 def _event_from(element: object) -> Event:
@@ -165,6 +175,10 @@ def _event_from(element: object) -> Event:
             return Event(kind, text)
         case [str(kind), str(text), bool(found)]:
             return Event(kind, text, found=found)
+        case [str(kind), str(text), [*more]] if all(isinstance(each, str) for each in more):
+            return Event(kind, text, more=tuple(map(str, more)))
+        case [str(kind), str(text), [*more], bool(found)] if all(isinstance(each, str) for each in more):
+            return Event(kind, text, found=found, more=tuple(map(str, more)))
         case [str(kind), str(text), list(options), (str() | None) as answer]:
             return Event(kind, text, tuple(map(_option_from, options)), answer=answer)
     forms = "[kind, text], [kind, text, true or false] or [kind, question, options, answer or null]"

@@ -6,6 +6,7 @@ import warnings
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from codebotler.core.skills.values import Scalar
 from codebotler.core.words import counted
 
 TYPE_CHECKING = False
@@ -59,12 +60,14 @@ class World:
         robot: the room in which the robot starts.
         about: what is special here, in a few words.
         may_wait_forever: whether a program may wait here for something that never comes.
+        truths: what else is true or false here, and what calls of a user's own skills return.
     """
 
     rooms: tuple[Room, ...]
     robot: str
     about: str = ""
     may_wait_forever: bool = False
+    truths: tuple[tuple[str, Scalar], ...] = ()
 
     def __repr__(self) -> str:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
@@ -91,6 +94,7 @@ class World:
             "objects": {room.name: list(room.objects) for room in self.rooms if room.objects},
             "people": {room.name: [*map(_person_data, room.people)] for room in self.rooms if room.people},
             "may_wait_forever": self.may_wait_forever,
+            "truths": dict(self.truths),
         }
         return {key: value for key, value in data.items() if value or key == "about"}
 

@@ -13,6 +13,10 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
     StringConstraints,
     Tag,
     model_validator,
@@ -121,6 +125,7 @@ class WorldFile(_Form):
     objects: dict[Text, list[NamePattern]] = {}
     people: dict[Text, list[PersonFile]] = {}
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
+    truths: dict[Name, StrictBool | StrictInt | StrictFloat | StrictStr] = {}
 
     def world(self, file: YamlFile, at: Place = ()) -> World:
         """The world that it describes, or a UserError about a room or a regex."""
@@ -157,6 +162,7 @@ class WorldFile(_Form):
             robot=self.robot,
             about=self.about,
             may_wait_forever=self.may_wait_forever,
+            truths=tuple(self.truths.items()),
         )
 
 

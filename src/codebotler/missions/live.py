@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Protocol
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import Skill
-from codebotler.core.trace import Event, Trace, attempted, trace_data
+from codebotler.core.skills.table import Skill
+from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, room_told
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
-
-RETURNS: Mapping[str, type] = {"str": str, "bool": bool, "list[str]": list, "None": type(None)}
 
 
 class Note(Protocol):
@@ -235,10 +233,10 @@ class LiveRobot:
 
 def answered(skill: Skill, result: base.Result) -> base.Result:
     """A robot's answer; raises RobotLostError if it does not fit the skill."""
-    is_one = isinstance(result, RETURNS.get(skill.returns, object))
-    if not is_one or (isinstance(result, list) and not all(isinstance(text, str) for text in result)):
+    if not skill.returns.fits(result):
+        expected = skill.returns.annotation
         raise RobotLostError(
-            f"the robot answered {skill.name} with {result!r:.100}, where {skill.returns} is expected"
+            f"the robot answered {skill.name} with {result!r:.100}, where {expected} is expected"
         )
     return result
 
@@ -251,7 +249,9 @@ def _told(broken: RuleViolationError) -> dict[str, object]:
 
 
 def _text(argument: Argument) -> base.Argument:
-    return argument if isinstance(argument, str) else tuple(option.text for option in argument)
+    if not isinstance(argument, tuple):
+        return argument
+    return tuple(each.text if isinstance(each, Option) else each for each in argument)
 
 
 def _position(result: base.Result, event: Event) -> int:

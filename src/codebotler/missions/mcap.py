@@ -15,7 +15,9 @@ from mcap.writer import Writer
 
 from codebotler import __version__
 from codebotler.core.files import expect_replaceable, written_whole
-from codebotler.core.skills import SKILLS, Skill, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.skills.values import ValueType
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.pictures import picture_of
 
@@ -23,9 +25,7 @@ Clock: TypeAlias = Literal["wall", "robot"]
 Schema: TypeAlias = Mapping[str, Any]
 
 TEXT: Schema = {"type": "string"}
-TEXTS: Schema = {"type": "array", "items": TEXT}
 NUMBER: Schema = {"type": "number"}
-TYPES: Mapping[str, Schema] = {"str": TEXT, "list[str]": TEXTS, "bool": {"type": "boolean"}}
 SECOND = 1_000_000_000
 LATEST = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
 STATES, NOTES = "/mission/state", "/mission/log"
@@ -91,9 +91,17 @@ def write_mcap(
 
 def schema_of(skill: Skill) -> dict[str, Schema]:
     """The properties of messages about a skill: arguments, result and feedback."""
-    arguments = {p.name: TYPES[p.annotation] for p in skill.parameters}
-    result = {"result": TYPES[skill.returns]} if skill.returns in TYPES else {}
+    arguments = {p.name: _schema(p.type) for p in skill.parameters}
+    result = {} if skill.returns.base is None else {"result": _schema(skill.returns)}
     return {**GOES_ON, **arguments, **result}
+
+
+def _schema(value: ValueType) -> Schema:
+    one: Schema = {"str": TEXT, "int": WHOLE, "float": NUMBER, "bool": {"type": "boolean"}}[
+        value.base or "str"
+    ]
+    one = {**one, "enum": list(value.choices)} if value.choices else one
+    return {"type": "array", "items": one} if value.is_list else one
 
 
 def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema], dict[str, object]]:

@@ -49,8 +49,9 @@ def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | No
         return None, place
     if place and place not in rooms:
         remark(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
-    names = dict.fromkeys([*rooms, place] if place else rooms)
-    return RoomMap(tuple(names), place or rooms[0], plain=not robot.rooms_are_regexes), place
+    listed = list(map(str, rooms))
+    names = dict.fromkeys([*listed, place] if place else listed)
+    return RoomMap(tuple(names), place or listed[0], plain=not robot.rooms_are_regexes), place
 
 
 def rooms_to_check(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:

@@ -11,7 +11,8 @@ from functools import lru_cache
 from typing import Any
 
 from codebotler.core.program import parsed
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_name
+from codebotler.core.skills.table import Recording
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point
 from codebotler.missions.log import SKILL_ENDS, Line, State
@@ -104,7 +105,7 @@ class Progress:
     def with_skill(self, line: Line, program: str) -> Progress:
         """The progress when a skill begins."""
         name = line["skill"]
-        recording = SKILLS[name].recording if name in SKILLS else None
+        recording = _recording(name)
         drives = recording is not None and recording.is_drive
         arguments = tuple(map(_plain, line["arguments"].values()))
         now = replace(
@@ -127,7 +128,7 @@ class Progress:
 
     def with_result(self, result: object) -> Progress:
         """The progress when the skill under way has ended well."""
-        recording = SKILLS[self.skill].recording if self.skill in SKILLS else None
+        recording = _recording(self.skill)
         now = self
         match recording and recording.kind:
             case "goto":
@@ -147,7 +148,7 @@ class Progress:
 
     def with_failure(self, event: str) -> Progress:
         """The progress when the skill under way has failed or was cut short."""
-        recording = SKILLS[self.skill].recording if self.skill in SKILLS else None
+        recording = _recording(self.skill)
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")
         if recording is not None and recording.options and event == "error":
@@ -159,10 +160,15 @@ class Progress:
         return replace(self, finds=(*known, find)[-MOST_STEPS:])
 
 
+def _recording(name: str) -> Recording | None:
+    skill = by_name(name)
+    return None if skill is None else skill.recording
+
+
 def _moment(line: Line, words: str) -> Moment:
     event, clock = line["event"], line["clock"]
-    skill = SKILLS.get(line.get("skill", ""))
-    spoken = skill.recording if skill and skill.recording and skill.recording.is_spoken else None
+    recording = _recording(line.get("skill", ""))
+    spoken = recording if recording is not None and recording.is_spoken else None
     if event == "skill" and spoken:
         arguments = line["arguments"]
         options = arguments.get(spoken.options or "")
@@ -205,7 +211,7 @@ def _calls(program: str) -> Mapping[str, Sequence[tuple[int, tuple[object, ...]]
 
 def _name_of(function: ast.expr) -> str:
     """The name of a skill, or `sleep`; empty for other functions."""
-    if isinstance(function, ast.Name) and function.id in {*SKILLS, "sleep"}:
+    if isinstance(function, ast.Name) and (function.id == "sleep" or by_name(function.id)):
         return function.id
     is_sleep = isinstance(function, ast.Attribute) and function.attr == "sleep"
     return "sleep" if is_sleep else ""

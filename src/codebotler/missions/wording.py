@@ -6,7 +6,9 @@ import ast
 from collections.abc import Callable, Mapping, Sequence
 
 from codebotler.core.program import nodes, tree_of
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_name
+from codebotler.core.skills.table import Recording
+from codebotler.core.skills.values import as_text
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import trace_from
 from codebotler.core.words import brief, room_name
@@ -27,11 +29,13 @@ def activity(line: Line) -> str:
     """What a robot is at during a skill or while the program sleeps, such as `driving to supply room`."""
     if line["event"] == "sleep":
         return f"waiting for {line['seconds']:g} s"
-    skill = SKILLS.get(line["skill"])
+    skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
         return f"executing {visible(line['skill'])}"
     if skill.recording is None:
         return skill.verb.ing
+    if skill.recording.more or not skill.recording.text:
+        return skill.verb.with_object(skill.verb.ing, _given(skill.recording, line))
     text = shortened(room_name(str(line["arguments"][skill.recording.text])), 100)
     if skill.recording.is_drive:
         return f"driving to {text}"
@@ -58,12 +62,18 @@ def title(summary: Summary) -> str:
     calls = [
         node
         for node in nodes(tree_of(summary.program))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in SKILLS
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and by_name(node.func.id)
     ]
     calls.sort(key=lambda call: (call.lineno, call.col_offset))
     shown = [brief(ast.get_source_segment(summary.program, call) or "") for call in calls[:FIRST_CALLS]]
     more = ["…"] * (len(calls) > FIRST_CALLS)
     return f"typed: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
+
+
+def _given(recording: Recording, line: Line) -> list[str]:
+    """What a skill was given, in the order in which its event has it."""
+    names = [name for name in (recording.text, *recording.more) if name]
+    return [shortened(as_text(line["arguments"][name]), 100) for name in names]
 
 
 def call_text(skill: str, arguments: Sequence[str | Sequence[str]]) -> str:
@@ -76,11 +86,13 @@ def call_text(skill: str, arguments: Sequence[str | Sequence[str]]) -> str:
 
 
 def _skill(line: Line) -> str:
-    skill, arguments = SKILLS.get(line["skill"]), line["arguments"]
+    skill, arguments = by_name(line["skill"]), line["arguments"]
     if skill is None or skill.verb is None:
         return shortened(call_text(line["skill"], list(arguments.values())))
     if skill.recording is None:
         return skill.verb.third
+    if skill.recording.more or not skill.recording.text:
+        return skill.verb.with_object(skill.verb.third, _given(skill.recording, line))
     text = str(arguments[skill.recording.text])
     words = f'{skill.verb.third} "{shortened(room_name(text) if skill.recording.is_drive else text)}"'
     options = arguments.get(skill.recording.options or "")
@@ -92,7 +104,7 @@ def _result(line: Line) -> str:
         case None:
             return ""
         case bool(result):
-            skill = SKILLS.get(line["skill"])
+            skill = by_name(line["skill"])
             return f"→ {skill.verb.results[result]}" if skill and skill.verb else f"→ {result}"
         case list(texts):
             return f"→ {shortened(', '.join(room_name(str(text)) for text in texts))}"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from codebotler.core.program import TASK, Flaw, Program, bound_names, entries, parsed, undefined_names
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 
 HELPER_ROUNDS = 20  # helpers of helpers, of which a reply to one instruction has two or three
 

@@ -15,7 +15,8 @@ from typing import Literal
 
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import TASK, Flaw, parsed
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 
 FOLDER = Path(__file__).parent
 OPENING = f"def {TASK}():\n"

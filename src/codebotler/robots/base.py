@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.skills.values import Scalar
 from codebotler.core.world import World
 from codebotler.robots.clock import Clock
 
-Argument: TypeAlias = str | tuple[str, ...]
-"""An argument of a skill: a text, or the options of a question."""
+Argument: TypeAlias = Scalar | tuple[Scalar, ...]
+"""An argument of a skill: a text or another value, a list of these, or the options of a question."""
 
-Result: TypeAlias = str | list[str] | bool | None
+Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
 """What a skill returns; for a question the text of the chosen option."""
 
 ROS_PYTHON = Path("/usr/bin/python3")

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS, Recording, Skill, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Recording, Skill, SkillTable
 from codebotler.core.words import counted
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
 from codebotler.robots.clock import Clock
@@ -212,7 +213,9 @@ class RobotWithFace:
         if spoken.options is None:
             self._say(text)
             return None
-        options = tuple(given.pop(spoken.options))
+        offered = given.pop(spoken.options)
+        assert isinstance(offered, tuple), "a mission checks what a program passes"
+        options = tuple(map(str, offered))
         return options[self._face.ask(", ".join(map(str, given.values())), text, options)]
 
     def cancel(self) -> None:

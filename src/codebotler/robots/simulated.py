@@ -8,7 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Option
 from codebotler.core.world import World, laid_out
 from codebotler.robots.base import (
@@ -118,11 +119,15 @@ class Simulated:
 
 def performed(robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
     """A skill in the simulator, with texts for options."""
-    given = tuple(a if isinstance(a, str) else tuple(map(Option, a)) for a in arguments)
+    taken = robot.skills[skill].parameters
+    given = [
+        tuple(Option(str(text)) for text in a) if parameter.is_options and isinstance(a, tuple) else a
+        for parameter, a in zip(taken, arguments, strict=True)
+    ]
     result = robot.perform(skill, given)
-    if isinstance(result, int) and not isinstance(result, bool):
-        (options,) = (a for a in given if not isinstance(a, str))
-        return options[result].text
+    for parameter, argument in zip(taken, arguments, strict=True):
+        if parameter.is_options and isinstance(argument, tuple) and isinstance(result, int):
+            return argument[result]
     return result
 
 

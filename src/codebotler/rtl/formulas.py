@@ -102,6 +102,7 @@ class EventPattern:
         found: whether a look must have succeeded or failed; None if that does not matter.
         holding: what the robot must have held when it began; None if that does not matter.
         to: what the person must match whom a question was for; None if that does not matter.
+        more: what the further arguments of a skill that has several must match, in order.
     """
 
     kind: str
@@ -113,6 +114,7 @@ class EventPattern:
     found: bool | None = None
     holding: Text | None = None
     to: Text | None = None
+    more: tuple[Text, ...] = ()
 
     @cached_property
     def place_regex(self) -> re.Pattern[str] | None:
@@ -122,16 +124,18 @@ class EventPattern:
     @cached_property
     def is_about_more(self) -> bool:
         """Whether more than the texts and the room matters."""
-        return (self.answer, self.found, self.holding, self.to) != (None, None, None, None)
+        return bool(self.more) or (self.answer, self.found, self.holding, self.to) != (None, None, None, None)
 
     def __str__(self) -> str:
         if self.answer is not None:
             written = f"answered({self.answer})"
-        elif self.found is not None:
+        elif self.found is not None and self.kind == "check":
             written = f"{'found' if self.found else 'missed'}({self.text})"
         else:
-            texts = [self.text] if self.options is None else [self.text, self.options]
+            texts = [self.text, *self.more] if self.options is None else [self.text, self.options]
             written = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
+        if self.found is not None and self.kind != "check":
+            written = f"returned({self.found}, {written})"
         if self.to is not None:
             written = f"to({self.to}, {written})"
         if self.holding is not None:

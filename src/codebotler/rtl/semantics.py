@@ -101,6 +101,10 @@ def _fits(element: formulas.EventPattern, event: Event) -> bool:
     wanted = (element.answer, event.answer), (element.holding, event.holding or None), (element.to, event.to)
     if any(text is not None and (is_ is None or not text.matches(is_)) for text, is_ in wanted):
         return False
+    if len(event.more) < len(element.more):
+        return False
+    if any(not text.matches(given) for text, given in zip(element.more, event.more, strict=False)):
+        return False
     return element.found is None or event.found is element.found
 
 

@@ -10,7 +10,9 @@ from difflib import get_close_matches
 from typing import get_args
 
 from codebotler.core.program import parse_expression
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.skills.values import ValueType, as_text
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
@@ -21,7 +23,7 @@ TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affi
 QUESTIONS = ("mention", "answered")
 LOOKS = {"found": True, "missed": False}
 SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
-AROUND = ("at", "holding", "to")  # what else an event must be like
+AROUND = ("at", "holding", "to", "returned")  # what else an event must be like
 
 DEEPEST = 50
 """How deep a formula may be nested; few enough for Python's stack wherever it is evaluated."""
@@ -65,6 +67,7 @@ class _Parser:
         self.text = re.sub(r"[\r\n\f]", " ", text).strip()
         self.bytes = self.text.encode(errors="replace")  # in which `ast` counts columns
         self.recordings = skills.recordings
+        self.types = {s.recording.kind: {p.name: p.type for p in s.parameters} for s in skills.rows if s.recording}
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
         looks = (kind for kind, row in self.recordings.items() if row.names == "object or person")
         self.look = next(looks, None)
@@ -145,8 +148,7 @@ class _Parser:
                 return self.around(name, *self.arguments(node, node, name, 2))
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
-                    (text,) = self.arguments(node, node, kind, 1)
-                    return formulas.EventPattern(kind, self.matched(text))
+                    return self.plain_element(kind, node)
                 text, options = self.arguments(node, node, kind, 2)
                 return formulas.EventPattern(kind, self.matched(text), self.matched(options))
             case ast.Call(ast.Name(kind)) if kind in QUESTIONS and self.question is not None:
@@ -161,9 +163,43 @@ class _Parser:
                 raise self.unknown(node, "element", kind, [*self.recordings, *QUESTIONS, *LOOKS, *AROUND])
         raise self.expected('an element such as goto("lobby")', node)
 
+    def plain_element(self, kind: str, node: ast.Call) -> formulas.EventPattern:
+        """An event without options: its text, and further arguments of its skill if there are any."""
+        recording = self.recordings[kind]
+        if not recording.text:
+            self.arguments(node, node, kind, 0)
+            return formulas.EventPattern(kind, formulas.Regex(".*"))
+        if not recording.more:
+            (text,) = self.arguments(node, node, kind, 1)
+            return formulas.EventPattern(kind, self.value(text, self.types[kind][recording.text]))
+        given = self.arguments(node, node, kind)
+        most = 1 + len(recording.more)
+        if not 1 <= len(given) <= most:
+            raise self.error(node, f"{kind} takes 1 to {most} arguments, not {len(given)}")
+        types = [self.types[kind][name] for name in (recording.text, *recording.more)]
+        first, *more = map(self.value, given, types)
+        return formulas.EventPattern(kind, first, more=tuple(more))
+
+    def value(self, node: ast.expr, wanted: ValueType) -> formulas.Text:
+        """A text that matches; for a number or a truth value, also itself."""
+        if wanted.base == "str":
+            return self.matched(node)
+        match node:
+            case ast.Constant(int() | float() as value) | ast.UnaryOp(
+                ast.USub(), ast.Constant(int() | float() as value)
+            ):
+                is_negative = isinstance(node, ast.UnaryOp)
+                return formulas.Regex(f"^{re.escape(as_text(-value if is_negative else value))}$")
+        return self.matched(node)
+
     def around(self, name: str, what: ast.expr, inner: ast.expr) -> formulas.EventPattern:
         element = self.element(inner)
-        nested = {"at": element.place, "holding": element.holding, "to": element.to}[name]
+        nested = {
+            "at": element.place,
+            "holding": element.holding,
+            "to": element.to,
+            "returned": element.found,
+        }[name]
         if nested is not None:
             raise self.error(inner, f"{name} cannot be nested in another {name}")
         match name:
@@ -171,6 +207,10 @@ class _Parser:
                 return replace(element, place=self.word(what))
             case "holding":
                 return replace(element, holding=self.matched(what))
+            case "returned":
+                if not (isinstance(what, ast.Constant) and isinstance(what.value, bool)):
+                    raise self.expected("True or False", what)
+                return replace(element, found=what.value)
         if element.kind != self.question:
             raise self.error(inner, "to is about questions; use ask, mention or answered")
         return replace(element, to=self.matched(what))

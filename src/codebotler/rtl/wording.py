@@ -8,7 +8,8 @@ from itertools import chain
 from typing import Literal, TypeAlias
 
 from codebotler.core import words
-from codebotler.core.skills import SKILLS, Verb
+from codebotler.core.skills.declaration import by_event, verb_for
+from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
 from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
@@ -29,7 +30,7 @@ _WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
 def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
     """What an element asks for, such as `said something with "hello"`; `anything` after a negation."""
     thing = "anything" if negated else "something"
-    if element.found is not None:
+    if element.found is not None and element.kind == "check":
         done = f"{_LOOKS[element.found][form]} {_wanted(element, thing)}"
     elif element.answer is not None:
         got = {"base": "get", "past": "got", "ing": "getting"}[form]
@@ -40,6 +41,10 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
         done += " in the question or an option"
     if element.options is not None and not is_any(element.options):
         done += f" offering an option {described(element.options)}"
+    if element.more:
+        done = f"{done.rstrip()}, {listed([*filter(None, map(described, element.more))])}".rstrip(", ")
+    if element.found is not None and element.kind != "check":
+        done = f"{done.rstrip()}: {verb(element.kind).results[element.found]}"
     if element.to is not None:
         done = f"{done.rstrip()} of somebody {described(element.to)}"
     if element.holding is not None:
@@ -65,7 +70,11 @@ def happening(event: Event, element: EventPattern) -> str:
         thing += (
             " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
         )
-    if element.found is not None:
+    if event.more:
+        thing += f", {', '.join(map(quoted, event.more))}"
+    if element.found is not None and event.kind != "check":
+        thing += "" if event.found is None else f" ({verb(event.kind).results[event.found]})"
+    elif element.found is not None:
         thing += " in vain" if event.found is False else " and found it"
     if element.to is not None:
         thing += f" of {quoted(event.to or '')}"
@@ -76,21 +85,32 @@ def happening(event: Event, element: EventPattern) -> str:
 
 def event_words(event: Event) -> str:
     """What a robot does, such as `driving to "kitchen"`, and what has come of it if that is known."""
-    text = quoted(words.room_name(event.text) if event.kind == "goto" else event.text)
+    text = words.room_name(event.text) if event.kind == "goto" else event.text
     if event.answer is not None:
-        return f"the answer {quoted(event.answer)} to {text}"
+        return f"the answer {quoted(event.answer)} to {quoted(text)}"
     doing = verb(event.kind)
-    return f"{doing.ing} {text}" + ("" if event.found is None else f" ({doing.results[event.found]})")
+    return done_to(event, doing.ing, text) + (
+        "" if event.found is None else f" ({doing.results[event.found]})"
+    )
+
+
+def done_to(event: Event, form: str, text: str | None = None) -> str:
+    """A form of an event's verb, and to what it is done."""
+    given = [brief(event.text if text is None else text), *map(brief, event.more)]
+    row = by_event(event.kind)
+    has_text = row is None or row.recording is None or bool(row.recording.text)
+    return verb(event.kind).with_object(form, given if has_text else [])
 
 
 def verb(kind: str) -> Verb:
     """The verb for a kind of event, also for one of a further skill."""
     other = Verb(f"do {kind}", f"does {kind}", f"did {kind}", f"doing {kind}", f"did {kind}")
-    return SKILLS.verbs.get(kind, other)
+    return verb_for(kind) or other
 
 
 def _is_spoken(kind: str) -> bool:
-    return kind in SKILLS.recordings and SKILLS.recordings[kind].is_spoken
+    row = by_event(kind)
+    return row is not None and row.recording is not None and row.recording.is_spoken
 
 
 def room(text: Text, article: str = "a") -> str:

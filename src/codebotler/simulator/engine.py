@@ -8,7 +8,8 @@ from functools import partial
 from itertools import groupby
 from operator import itemgetter
 
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world import World
 from codebotler.simulator.pool import WorkerPool, cores

@@ -34,6 +34,15 @@ class FactSampler:
             return agreeing
         return self.draw(count, "answer", *question)
 
+    def outcome(self, count: int, statement: str) -> int:
+        """Which of `count` outcomes a statement has, of which the first is the one that is hoped for."""
+        for fact in self.forced:
+            if fact.method == "outcome" and fact.arguments == (count, statement):
+                return fact.result
+        if self.lucky and self.draw(EIGHTS, "is hoped for", statement) < EIGHTS - 1:
+            return 0
+        return self.draw(count, "outcome", statement)
+
     def is_there(self, room: str, name: str) -> bool:
         """Whether somebody or something is in a room."""
         for fact in self.forced:
@@ -46,14 +55,14 @@ class FactSampler:
 class Draw:
     """One fact that was drawn: the sampler's method, its arguments, and its result."""
 
-    method: Literal["answer", "is_there"]
+    method: Literal["answer", "outcome", "is_there"]
     arguments: tuple[Any, ...]
     result: int
 
     @property
     def others(self) -> list[Draw]:
         """The same fact as it might have been."""
-        results = range(self.arguments[0]) if self.method == "answer" else (True, False)
+        results = (True, False) if self.method == "is_there" else range(self.arguments[0])
         return [replace(self, result=result) for result in results if result != self.result]
 
     def is_drawn_by(self, sampler: FactSampler) -> bool:

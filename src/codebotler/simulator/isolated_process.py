@@ -41,11 +41,13 @@ LONGEST = 60.0  # seconds of waiting for a process in all; nothing that computes
 SILENCE = 1  # seconds after which a silent process is looked at
 SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
 SANDBOX = Path(__file__).with_name("sandbox")
+SKILLS = SANDBOX.parents[1] / "core" / "skills"
 CORE, BATCHES = "codebotler.core", f"{__package__}.batches"
 # What a child needs that has robots of its own, besides the sandbox.
 SIMULATION = (
     f"{BATCHES}.process",
-    *(f"{CORE}.{name}" for name in ("cachedproperty", "errors", "skills", "trace", "words", "world")),
+    *(f"{CORE}.{name}" for name in ("cachedproperty", "errors", "trace", "words", "world")),
+    *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py"))),
     *(f"{__package__}.{name}" for name in ("fact_sampler", "ledger", "robot", "rules", "sampled_robot")),
 )
 MODULES = {PREPARER: f"{__package__}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}
@@ -118,7 +120,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes], further: tuple[str, 
             SANDBOX.parents[1].joinpath(*name.split(".")[1:]).with_suffix(".py").read_text("utf-8")
         )
     if further:
-        sources |= {CORE: "", BATCHES: ""}
+        sources |= {CORE: "", f"{CORE}.skills": "", BATCHES: ""}
     codes = {name: compiler(source, name) for name, source in sources.items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 

@@ -7,8 +7,9 @@ from typing import Any, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import VIOLATION, RobotError
-from codebotler.core.skills import SkillTable
-from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.skills.values import Scalar
+from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 
@@ -112,9 +113,9 @@ class Ledger:
         for argument in arguments:
             if isinstance(argument, str):
                 size += len(argument)
-            else:
+            elif isinstance(argument, tuple):
                 size -= OPTION_OVERHEAD
-                for text, _ in argument:
+                for text in texts_in(argument):
                     size += len(text) + OPTION_OVERHEAD
         self.text += size
         self.calls += 1
@@ -141,8 +142,13 @@ def too_long(limits: Limits) -> str:
 
 def longest(arguments: Sequence[Argument]) -> int:
     """How many characters the longest text has that a skill is given."""
-    texts = [[given] if isinstance(given, str) else [text for text, _ in given] for given in arguments]
+    texts = [texts_in(given) if isinstance(given, tuple) else [str(given)] for given in arguments]
     return max((len(text) for each in texts for text in each), default=0)
+
+
+def texts_in(given: tuple[Option, ...] | tuple[Scalar, ...]) -> list[str]:
+    """The texts of options, or of other values."""
+    return [each.text if isinstance(each, Option) else str(each) for each in given]
 
 
 class RememberingLedger(Ledger):

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Sequence
+from _blake2 import blake2b  # of `hashlib`, which would bring OpenSSL into every child
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.trace import Event, Option, Trace
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.skills.values import Scalar, plain, possible, written_call
+from codebotler.core.trace import Event, Option, Trace, attempted
 from codebotler.core.world import Answer, Person, World
+from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.rules import PAPER, Matching, Rules
 
 if TYPE_CHECKING:
     from codebotler.simulator.rule_guard import RuleGuard
 
-Argument: TypeAlias = str | tuple[Option, ...]
-Result: TypeAlias = str | list[str] | bool | int | None
+Argument: TypeAlias = Scalar | tuple[Option, ...] | tuple[Scalar, ...]
+Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
 Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # of a copy: `simulated` or `sampled`, and the arguments
 
 
@@ -136,9 +142,11 @@ class SimulatedRobot:
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """The same, whatever rules say."""
-        does = self.skills[skill].does
-        assert does is not None, "the robot was made with it"
-        result: Result = does(self, *arguments)
+        row = self.skills[skill]
+        assert row.does is not None, "the robot was made with it"
+        if row.adds_event or row.fails:
+            return self._own(row, arguments)
+        result: Result = row.does(self, *arguments)
         if isinstance(result, bool) and self.events and self.events[-1].found is None:
             self._add_result(skill, found=result)
         return result
@@ -221,6 +229,81 @@ class SimulatedRobot:
         self.record("place", taken.label if taken else obj)
         self.held = self.taken = None
 
+    # --- skills of a user's own
+
+    @cached_property
+    def state(self) -> dict[str, Any]:
+        """What skills remember from one call to the next."""
+        return {}
+
+    def truth(self, statement: str) -> bool:
+        """Whether a statement is true in this world."""
+        known = dict(self.world.truths).get(statement)
+        if known is None:
+            return self.lot(f'"{statement}"', ("is true", "is not true")) == 0
+        if not isinstance(known, bool):
+            raise UserError(f'the world says that "{statement}" is {known!r}; write true or false')
+        return known
+
+    def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of the skill's type
+        """What comes of a skill of which nobody says what it does: a result of its type, or its error."""
+        row, call = self.skills[skill], written_call(skill, arguments)
+        known, kinds = dict(self.world.truths).get(call), [kind for kind, _ in row.fails]
+        if known in kinds:
+            self.fail(str(known))
+        if known is not None:
+            if not row.returns.fits(known):
+                raise UserError(
+                    f"the world says that {call} gives {known!r}; {skill} returns {row.returns.words}"
+                )
+            return known
+        results = possible(row.returns)
+        words = [f"gives {result!r}" if result is not None else "works" for result in results]
+        number = self.lot(call, words, [f"fails: {when}" for _, when in row.fails])
+        if number >= len(results):
+            self.fail(kinds[number - len(results)])
+        return results[number]
+
+    def fail(self, kind: str) -> NoReturn:
+        """End a skill with an error that it declares."""
+        for row in self.skills.rows:
+            for declared, when in row.fails:
+                if declared == kind:
+                    raise RobotError(kind, f"{row.name}: {when}")
+        raise UserError(
+            f'no skill declares the error "{kind}"; name it in `fails`, with the clause that says when'
+        )
+
+    def lot(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
+        """Draw which of some outcomes a statement has in this world: the same one each time."""
+        return self._lots.draw(len(outcomes), statement)
+
+    @cached_property
+    def _lots(self) -> FactSampler:
+        world = json.dumps(self.world.to_data(), sort_keys=True)
+        return FactSampler(int.from_bytes(blake2b(world.encode(), digest_size=8).digest(), "big"))
+
+    def _own(self, row: Skill, arguments: Sequence[Argument]) -> Result:
+        """Execute a skill that adds no event by itself, and add it."""
+        event, at = None, len(self.events)
+        if row.adds_event:
+            event = attempted(row, arguments, place=self.room, time=self.now, holding=self.held or "")
+        is_tried = row.recording is not None and row.recording.when_tried
+        if event is not None and is_tried:
+            self.events.append(event)
+        result: Result = called(row, self, arguments)
+        if event is not None:
+            if not is_tried:
+                at = len(self.events)
+                self.events.append(event)
+            if event.options:
+                chosen = next(n for n, option in enumerate(event.options) if option.text == result)
+                self.events[at] = replace(event, answer=event.options[chosen].text)
+                return chosen
+            if isinstance(result, bool):
+                self.events[at] = replace(event, found=result)
+        return result
+
     # --- the trace
 
     def sleep_until(self, now: float) -> None:
@@ -251,6 +334,39 @@ class SimulatedRobot:
         last = self.events[-1]
         asked = last.kind, last.text, last.options, answer, last.found
         self.events[-1] = Event(*asked, last.place, last.time, last.holding, last.to)
+
+
+def called(row: Skill, robot: SimulatedRobot, arguments: Sequence[Argument]) -> Any:  # noqa: ANN401 - of its type
+    """What the function of a skill returns; UserError where it returns or raises what it does not declare."""
+    assert row.does is not None, "the robot was made with it"
+    given = [
+        [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)  # type: ignore[union-attr]  # options
+        for parameter, argument in zip(row.parameters, arguments, strict=True)
+    ]
+    code = getattr(row.does, "__wrapped__", row.does).__code__
+    try:
+        result = plain(row.does(robot, *given))
+    except (RobotError, UserError):
+        raise
+    except Exception as error:
+        lines = [
+            tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
+        ]
+        line = lines[-1] if lines else code.co_firstlineno
+        sentence = f"{row.name} failed: {type(error).__name__}: {error}"
+        raise UserError(sentence, file=code.co_filename, line=line) from error
+    fitting = [option.text for option in arguments[-1]] if row.recording and row.recording.options else None  # type: ignore[union-attr]
+    if (fitting is not None and result not in fitting) or not row.returns.fits(result):
+        sentence = f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}"
+        raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
+    return result
+
+
+def _tracebacks(error: BaseException) -> Iterator[TracebackType]:
+    traceback = error.__traceback__
+    while traceback is not None:
+        yield traceback
+        traceback = traceback.tb_next
 
 
 def own_skills(robot: SimulatedRobot, kind: type[SimulatedRobot]) -> tuple[str, ...]:

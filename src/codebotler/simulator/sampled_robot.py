@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Option
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World
@@ -112,7 +113,21 @@ class GivenAnswer:
         return f'the answer {where} is "{brief(self.answer)}"'
 
 
-Fact: TypeAlias = Whereabouts | GivenAnswer
+@dataclass(frozen=True)
+class Lot:
+    """The fact that a statement is true or not, or that a skill comes to something."""
+
+    statement: str
+    outcome: str
+    by_lot: bool = True
+
+    @property
+    def sentence(self) -> str:
+        """It, in words."""
+        return f"{brief(self.statement)} {self.outcome}"
+
+
+Fact: TypeAlias = Whereabouts | GivenAnswer | Lot
 
 
 # --- what a program has found out; names are those that `meant` gives
@@ -171,6 +186,7 @@ class SampledRobot(SimulatedRobot):
         self.people = defaultdict(list)  # of nobody whom a world file would name
         self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
         self.answers: dict[tuple[str, ...], str] = {}  # by room, person and question
+        self.lots: dict[str, int] = {}  # outcomes of statements
         self.facts: list[Fact] = []
         self.draws: list[Draw] = []
         self.searches: defaultdict[str, Search] = defaultdict(Search)
@@ -238,6 +254,16 @@ class SampledRobot(SimulatedRobot):
         drawn = self.sampler.answer(len(options), agreeing, *question)
         self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))
         return options[drawn]
+
+    def lot(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
+        """Draw which of some outcomes a statement has, once."""
+        possible = [*outcomes, *errors]
+        if statement not in self.lots:
+            drawn = self.sampler.outcome(len(possible), statement)
+            self.draws.append(Draw("outcome", (len(possible), statement), drawn))
+            self.facts.append(Lot(statement, possible[drawn]))
+            self.lots[statement] = drawn
+        return self.lots[statement]
 
     # --- what skills do
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from math import inf
 from typing import TypeAlias
 
-from codebotler.core.skills import Skill
+from codebotler.core.skills.table import Skill
+from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.isolated_process import (
     IsolatedProcess,
@@ -18,7 +19,8 @@ from codebotler.simulator.ledger import LAST_LINE, STOP, WAITS, Ledger, SkillAns
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
-Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
+Taken: TypeAlias = tuple[str, str, tuple[Scalar, ...], str]  # name, kind, choices if any, and words
+Description: TypeAlias = tuple[tuple[str, tuple[Taken, ...]], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 
 
@@ -107,7 +109,7 @@ class SkillProtocol:
 def described(robot: SkillPerformer) -> Description:
     """The skills of a robot for a child: the name and the parameters of each."""
     return tuple(
-        (skill.name, tuple((p.name, p.type.__name__) for p in skill.parameters))
+        (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
         for skill in robot.skills.rows
     )
 
@@ -124,10 +126,10 @@ def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
         raise ProtocolError("a skill has other parameters")
     arguments: list[Argument] = []
     for parameter, value in zip(skill.parameters, values, strict=True):
-        if parameter.type is str and isinstance(value, str):
-            arguments.append(value)
-        elif parameter.type is list and isinstance(value, list):
+        if parameter.is_options and isinstance(value, list):
             arguments.append(tuple(_option(option) for option in value))
+        elif not parameter.is_options and parameter.type.fits(value):
+            arguments.append(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]  # fits
         else:
             raise ProtocolError("an argument is of another type")
     return arguments

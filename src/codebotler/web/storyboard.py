@@ -11,15 +11,13 @@ from nicegui import ui
 
 from codebotler.checking.problems import Check, Sample
 from codebotler.checking.storyboard import cut, steps_of
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.terminal import shortened
 from codebotler.core.words import brief, listed, room_name
-from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Whereabouts
+from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Lot, Whereabouts
 from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
-VERBS = SKILLS.verbs
-SPOKEN = frozenset({*(kind for kind, one in SKILLS.recordings.items() if one.is_spoken), "answer"})
 NO_ANSWER = "no answer"
 LEFT_OUT = "…"  # instead of a room, where steps are left out
 PLAIN = re.compile(r"[\w' -]+")
@@ -140,7 +138,7 @@ def draw_scene(
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:
-            look = f"deed deed-{deed.kind}" if deed.kind in SPOKEN else "deed"
+            look = f"deed deed-{deed.kind}" if is_spoken(deed.kind) else "deed"
             shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
             _number(shown, deed.step, anchor)
 
@@ -197,21 +195,34 @@ def scenes(
 
 def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
     kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
-    verb = VERBS[kind].third if kind in VERBS else shortened(kind)
+    verb = verb_for(kind)
     if "answer" in step:
         heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
         return (Deed(kind, text, number), Deed("answer", heard))
-    if kind in SPOKEN:
+    if is_spoken(kind):
         return (Deed(kind, text, number),)
     if kind == "check" and "found" in step:
         return (Deed(kind, look_text(step["text"], step["found"]), number),)
-    result = f": {VERBS[kind].results[step['found']]}" if kind in VERBS and "found" in step else ""
-    return (Deed(kind, f"{verb} {text}{result}", number),)
+    if verb is None:
+        return (Deed(kind, f"{shortened(kind)} {text}", number),)
+    result = f": {verb.results[step['found']]}" if "found" in step else ""
+    given = [text, *(shortened(each, MOST_TEXT) for each in step.get("more", ()))]
+    return (
+        Deed(kind, f"{verb.with_object(verb.third, [each for each in given if each], '')}{result}", number),
+    )
+
+
+def is_spoken(kind: str) -> bool:
+    """Whether the text of an event is said aloud."""
+    row = by_event(kind)
+    return kind == "answer" or (row is not None and row.recording is not None and row.recording.is_spoken)
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
     """A look and its result in words."""
-    return f"{VERBS['check'].third} {shortened(what, MOST_TEXT)}: {VERBS['check'].results[is_found]}"
+    verb = verb_for("check")
+    assert verb is not None, "it is the paper's"
+    return f"{verb.third} {shortened(what, MOST_TEXT)}: {verb.results[is_found]}"
 
 
 # --- what a world is like
@@ -230,6 +241,8 @@ def _clauses(known: Sequence[Fact]) -> Iterator[str]:
     for one in known:
         if isinstance(one, GivenAnswer):
             yield f"is told {_quoted(one.answer)} when it asks {_quoted(one.question)} in {_room(one.room)}"
+        elif isinstance(one, Lot):
+            yield f"works where {one.sentence}"
         else:
             same = [other for other in known if isinstance(other, Whereabouts) and other.name == one.name]
             yield _found(one.name, same)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from codebotler.checking.rule_review import may_mean
 from codebotler.core.program import parse_expression
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.world import Room
 from codebotler.rtl import EventPattern
 from codebotler.rtl.reasoning.alphabet import elements
@@ -37,7 +37,8 @@ def _named(
         "object or person": [*objects, *people, *ANYBODY],
     }
     for element in elements(requirement.formula):
-        what = SKILLS.recordings[element.kind].names
+        row = by_event(element.kind)
+        what = row.recording.names if row is not None and row.recording is not None else ""
         if (known := there.get(what)) is not None:
             found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
             yield from ((what, one, known) for one in found)

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.program import Flaw, parsed
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_name
 
 Node = TypeVar("Node", bound=ast.AST)
 Edit: TypeAlias = Mapping[Any, ast.AST | list[ast.stmt]]  # replacements of nodes; a list for a statement
@@ -98,7 +98,7 @@ def changed(program: ProgramTree, edit: Edit) -> str | None:
 def skill_of(node: ast.AST) -> str | None:
     """The skill that an expression calls."""
     match node:
-        case ast.Call(ast.Name(name)) if name in SKILLS:
+        case ast.Call(ast.Name(name)) if by_name(name) is not None:
             return name
     return None
 
@@ -113,7 +113,9 @@ def argument(call: ast.Call, position: int) -> ast.expr | None:
     if position < len(call.args):
         starred = any(isinstance(a, ast.Starred) for a in call.args[: position + 1])
         return None if starred else call.args[position]
-    name = SKILLS[skill_of(call) or ""].parameters[position].name
+    skill = by_name(skill_of(call) or "")
+    assert skill is not None, "it calls a skill"
+    name = skill.parameters[position].name
     return next((keyword.value for keyword in call.keywords if keyword.arg == name), None)
 
 

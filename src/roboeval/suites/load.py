@@ -12,7 +12,8 @@ from os import PathLike
 from pathlib import Path
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
 from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.rules import Rules

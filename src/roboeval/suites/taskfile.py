@@ -10,7 +10,8 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.program import parse_expression
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import listed
 from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse

@@ -12,7 +12,7 @@ from nicegui import html, ui
 from nicegui.element import Element
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import all_names
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame, PlainText
 from roboeval.analysis.metrics import Estimate
@@ -79,7 +79,7 @@ class ProgramView(Element, component="static/code.js"):
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()
         shown, self.left_out = shown_lines(program)
-        self._props.update(program=shown, marked=sorted(set(marked)), keywords=kwlist, skills=list(SKILLS))
+        self._props.update(program=shown, marked=sorted(set(marked)), keywords=kwlist, skills=all_names())
 
 
 # --- how a run is doing, from its data in short

@@ -8,7 +8,9 @@ import pytest
 
 from codebotler.core import program
 from codebotler.core.program import Program
-from codebotler.core.skills import SKILLS, Parameter, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Skill
+from codebotler.core.skills.values import NOTHING
 from codebotler.models.recorded import NAMES, recorded_model
 from codebotler.prompts.extract import program_of
 
@@ -128,7 +130,7 @@ def test_many_undefined_names_are_quickly_told() -> None:
 
 
 def test_a_ninth_skill_is_known() -> None:
-    skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), "None", "Wave."))
+    skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NOTHING, "Wave."))
     waves = Program(in_task("wave()"))
     (unknown,) = waves.problems()
     assert (unknown.line, unknown.kind) == (2, "NameError")

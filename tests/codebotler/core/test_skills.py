@@ -4,7 +4,10 @@ import pickle
 
 import pytest
 
-from codebotler.core.skills import SKILLS, Parameter, Recording, Simulation, Skill, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.simulation import Simulation
+from codebotler.core.skills.table import Parameter, Recording, Skill, SkillTable
+from codebotler.core.skills.values import NOTHING, TEXT
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
 
@@ -37,8 +40,8 @@ def test_texts_and_options_of_events_are_parameters_of_their_skills() -> None:
     for skill in SKILLS.values():
         if skill.recording is not None:
             types = {parameter.name: parameter.type for parameter in skill.parameters}
-            assert types[skill.recording.text] is str
-            assert skill.recording.options is None or types[skill.recording.options] is list
+            assert types[skill.recording.text] == TEXT
+            assert skill.recording.options is None or types[skill.recording.options].is_list
 
 
 def test_every_skill_travels_as_a_ros_action_with_one_goal_field_a_parameter() -> None:
@@ -47,7 +50,7 @@ def test_every_skill_travels_as_a_ros_action_with_one_goal_field_a_parameter() -
         assert [field.split()[-1] for field in skill.ros.goal] == [
             {"entity": "object"}.get(p.name, p.name) for p in skill.parameters
         ]
-        assert (skill.ros.result is None) == (skill.returns == "None")
+        assert (skill.ros.result is None) == (skill.returns == NOTHING)
         assert skill.ros.server == f"/{skill.name}_server"
 
 
@@ -60,7 +63,7 @@ def test_a_simulated_robot_does_what_skills_ask_of_it() -> None:
                 assert [*inspect.signature(getattr(kind, name)).parameters][: len(wanted)] == wanted
 
 
-WAVE = Skill("wave", (Parameter("person"),), "None", "Wave.", Recording("wave", "person"))
+WAVE = Skill("wave", (Parameter("person"),), NOTHING, "Wave.", Recording("wave", "person"))
 
 
 def test_one_more_skill_makes_a_longer_table_and_leaves_the_old_one() -> None:
@@ -76,8 +79,8 @@ def test_one_more_skill_makes_a_longer_table_and_leaves_the_old_one() -> None:
 @pytest.mark.parametrize(
     "row",
     [
-        Skill("say", (), "None", "Another skill of that name."),
-        Skill("shout", (Parameter("text"),), "None", "Another of that kind.", Recording("say", "text")),
+        Skill("say", (), NOTHING, "Another skill of that name."),
+        Skill("shout", (Parameter("text"),), NOTHING, "Another of that kind.", Recording("say", "text")),
     ],
 )
 def test_two_skills_share_neither_a_name_nor_a_kind_of_event(row: Skill) -> None:

@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
-from codebotler.core.skills import SKILLS, Parameter, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Skill
+from codebotler.core.skills.values import NOTHING
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.log import Line, Summary, events_of
 from codebotler.missions.mcap import Clock, export, write_mcap
@@ -121,7 +123,7 @@ def test_program_and_instruction_are_in_the_file(mission: tuple[Summary, list[Li
 
 
 def test_skill_that_is_not_in_the_table_is_a_note(mission: tuple[Summary, list[Line]]) -> None:
-    table = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), "None", "Wave."))
+    table = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NOTHING, "Wave."))
     line: Line = {"time": 1.0, "clock": 0.0, "event": "skill", "number": 1, "skill": "wave",
                   "arguments": {"hand": "left"}}  # fmt: skip
     for skills, topic in ((SKILLS, "/mission/log"), (table, "/skill/wave")):

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.program import Program, undefined_names
-from codebotler.core.skills import SkillTable
+from codebotler.core.skills.table import SkillTable
 from codebotler.models.recorded import NAMES, recorded_model
 from codebotler.prompts.extract import program_of
 

@@ -6,7 +6,9 @@ import pytest
 
 from codebotler import prompts
 from codebotler.core.program import Program
-from codebotler.core.skills import SKILLS, Parameter, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Skill
+from codebotler.core.skills.values import NOTHING
 from codebotler.core.trace import Event, Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.prompts import Message, Prompt, prompt_for, rendering, template_hash
@@ -15,7 +17,7 @@ from codebotler.prompts.rendering import Example, examples, task_end
 from codebotler.simulator import run
 from roboeval.suites.load import Suite
 
-WAVE = Skill("wave", (Parameter("person"),), "None", "Wave at a person in the room.")
+WAVE = Skill("wave", (Parameter("person"),), NOTHING, "Wave at a person in the room.")
 PROMPT = prompt_for("Go to the lab.")
 
 

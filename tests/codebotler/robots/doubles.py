@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, no_feedback
 from codebotler.robots.clock import Clock
 

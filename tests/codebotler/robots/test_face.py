@@ -12,7 +12,9 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Recording, Skill
+from codebotler.core.skills.values import NOTHING, TEXT, ValueType
 from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
@@ -135,9 +137,13 @@ def test_the_robot_behind_a_face_is_asked_for_nothing_that_is_spoken(kind: str) 
 
 def test_whatever_is_spoken_is_shown_by_the_parameters_of_its_row() -> None:
     text = (Parameter("text"),)
-    choose = (Parameter("choices", list, "list[str]"), Parameter("title"), Parameter("guest"))
-    table = SKILLS.with_skill(Skill("whisper", text, "None", "Whisper.", Recording("whisper", "text")))
-    row = Skill("choose", choose, "str", "Let a guest choose.", Recording("choose", "title", "choices"))
+    choose = (
+        Parameter("choices", ValueType(is_list=True), is_options=True),
+        Parameter("title"),
+        Parameter("guest"),
+    )
+    table = SKILLS.with_skill(Skill("whisper", text, NOTHING, "Whisper.", Recording("whisper", "text")))
+    row = Skill("choose", choose, TEXT, "Let a guest choose.", Recording("choose", "title", "choices"))
     table = table.with_skill(row)
     face = Face(LONG)
     robot = RobotWithFace(Simulated(WORLD, speed=None, skills=without_speech(table)), face, table)

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.missions.live import LiveRobot
 from codebotler.missions.preflight import preflight

@@ -9,11 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Recording, Skill
+from codebotler.core.skills.values import NOTHING
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import And, Formula, Inconclusive, Not, Or, explain, holds, parse
 
-WAVE = Skill("wave", (Parameter("person"),), "None", "Wave at a person.", Recording("wave", "person"))
+WAVE = Skill("wave", (Parameter("person"),), NOTHING, "Wave at a person.", Recording("wave", "person"))
 YES_NO = (Option("yes"), Option("no"))
 LUNCH: Trace = (
     Event("goto", "alice's office"),

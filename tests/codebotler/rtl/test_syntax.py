@@ -8,7 +8,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Recording, Skill
+from codebotler.core.skills.values import NOTHING
 from codebotler.core.trace import Event
 from codebotler.rtl import (
     ActAtFirst,
@@ -207,7 +209,7 @@ def test_escapes_that_python_does_not_know_mean_what_they_look_like() -> None:
 
 
 def test_a_further_skill_is_a_further_element() -> None:
-    wave = Skill("wave", (Parameter("person"),), "None", "Wave at a person.", Recording("wave", "person"))
+    wave = Skill("wave", (Parameter("person"),), NOTHING, "Wave at a person.", Recording("wave", "person"))
     formula = parse('tr.Exists(wave("alice"))', skills=SKILLS.with_skill(wave))
     assert formula == Exists(EventPattern("wave", Regex("alice")))
     assert holds(formula, (Event("wave", "Alice"),))

@@ -17,7 +17,8 @@ from tempfile import TemporaryFile
 
 import pytest
 
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
 from codebotler.simulator import isolated_process, pool

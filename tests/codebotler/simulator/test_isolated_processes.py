@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox.isolation import NOBODY

@@ -12,7 +12,7 @@ from dataclasses import replace
 import pytest
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rules import ENDLESS, PAPER

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Room, World
 from codebotler.simulator.preparer import LONG, Prepared, Preparer, is_exhausted

@@ -16,7 +16,9 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Parameter, Recording, Skill
+from codebotler.core.skills.values import NOTHING
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
@@ -417,7 +419,7 @@ def test_a_skill_of_ones_own_is_felt_by_its_own_run_only(
     lines: tuple[str, ...], batches: Worker, alone: Worker
 ) -> None:
     skills = SKILLS.with_skill(
-        Skill("wave", (Parameter("person"),), "None", "Wave.", Recording("wave", "person"), does=wave)
+        Skill("wave", (Parameter("person"),), NOTHING, "Wave.", Recording("wave", "person"), does=wave)
     )
     new = [partial(SimulatedRobot, world, AS_WRITTEN, skills) for world in WORLDS]
     source = "\n    ".join(("def task_program():", *lines))

@@ -21,7 +21,7 @@ from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
 from shapely.geometry import LineString
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import World
 from codebotler.robots.base import CancelledError, Feedback, no_feedback
 from codebotler.robots.clock import Clock

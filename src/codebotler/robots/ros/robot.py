@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import RosAction, SkillTable
+from codebotler.core.skills.table import RosAction, SkillTable
 from codebotler.robots.base import (
     ROS_PYTHON,
     Argument,

@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
 from codebotler.robots.ros.robot import actions_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
 from typing import Any, overload
 
 from codebotler.core.trace import Event, Option
@@ -43,9 +44,10 @@ def alphabet(
     places = _places([element for alike in kinds.values() for element in alike], rooms)
     held = _texts([element.holding for alike in kinds.values() for element in alike], nothing="")
     return [
-        Event(kind, text, options, answer, found, place, holding=holding, to=to)
+        Event(kind, text, options, answer, found, place, holding=holding, to=to, more=more)
         for kind, alike in kinds.items()
         for text in (moves if kind == "goto" and moves is not None else _requests(alike))
+        for more in _more(alike)
         for options in _options(alike)
         for answer in _texts([element.answer for element in alike])
         for found in ([None] if all(e.found is None for e in alike) else [True, False])
@@ -69,6 +71,13 @@ def _places(wanted: Sequence[EventPattern], rooms: Sequence[str] | None) -> Sequ
 
 def _requests(alike: Sequence[EventPattern]) -> Sequence[str]:
     return distinct_strings(_distinct(element.text for element in alike))
+
+
+def _more(alike: Sequence[EventPattern]) -> Iterable[tuple[str, ...]]:
+    """Further arguments that match in all combinations; none where no element has any."""
+    most = max(len(element.more) for element in alike)
+    wanted = ([e.more[at] for e in alike if len(e.more) > at] for at in range(most))
+    return product(*(distinct_strings(_distinct(texts), outer=True) for texts in wanted))
 
 
 @overload

@@ -141,7 +141,7 @@ class TranscribedRun(ProgramRun):
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the copy of the robot execute a skill."""
-        given = [options(value) if type(value) is list else value for value in arguments]
+        given = [taken(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)]
         try:
             if self.now != self._told:
                 self._let_time_pass()
@@ -226,6 +226,13 @@ def the_clock(*_: object) -> ModuleType:
     return sys.modules["time"]
 
 
+def taken(kind: str, value: Any) -> Any:  # noqa: ANN401 - of any type that skills take
+    """An argument as the robot takes it."""
+    if kind == "list":
+        return options(value)
+    return tuple(value) if type(value) is list else value
+
+
 def options(values: list[object]) -> tuple[Option, ...]:
     """Options as the robot takes them."""
     return tuple([Option(str(value), isinstance(value, str)) for value in values])
@@ -233,7 +240,10 @@ def options(values: list[object]) -> tuple[Option, ...]:
 
 def is_plain(given: Argument) -> bool:
     """Whether texts are short enough for JSON, and hold no halves of surrogate pairs, which it would join."""
-    text = given if isinstance(given, str) else "".join([offered for offered, _ in given])
+    if isinstance(given, tuple):
+        text = "".join([str(each[0] if isinstance(each, Option) else each) for each in given])
+    else:
+        text = str(given)
     try:
         return len(text.encode()) <= LONGEST_CALL
     except UnicodeEncodeError:

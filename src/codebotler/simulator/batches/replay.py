@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 import msgspec
 
-from codebotler.core.skills import SkillTable
+from codebotler.core.skills.table import Parameter, SkillTable
+from codebotler.core.skills.values import TEXT, Scalar
 from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, kept
@@ -25,7 +26,7 @@ class Call(NamedTuple):
     """A skill that a program called, and how it was answered."""
 
     skill: str
-    arguments: tuple[str | tuple[Option, ...], ...]
+    arguments: tuple[Scalar | tuple[Option | Scalar, ...], ...]
     kind: str  # of the answer; `ask` where only the engine can give it, `time` where only time went by
     value: Any
 
@@ -175,17 +176,30 @@ class Replay:
         if call.kind == "time":
             return "", (), ONLY_TIME
         signature = self._signatures.get(call.skill)
-        if signature is None or tuple(map(type, call.arguments)) != signature:
+        if signature is None or (tuple(map(type, call.arguments)) != signature and not self._fits(call)):
             raise ProtocolError("there is no such skill, or it has other parameters")
         if call.kind == "ask" and call.skill not in self._own:
             raise ProtocolError("the child could have answered")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
-        return call.skill, call.arguments, None if call.kind == "ask" else (call.kind, value)
+        arguments: Any = call.arguments  # which fit
+        return call.skill, arguments, None if call.kind == "ask" else (call.kind, value)
+
+    def _fits(self, call: Call) -> bool:
+        """Whether a call gives a skill, which takes more than texts, what it takes."""
+        taken = self.robot.skills[call.skill].parameters
+        return len(taken) == len(call.arguments) and all(map(_fits, taken, call.arguments))
+
+
+def _fits(parameter: Parameter, given: object) -> bool:
+    if parameter.is_options:
+        return isinstance(given, tuple) and all(isinstance(each, Option) for each in given)
+    return parameter.type.fits(given)
 
 
 @lru_cache(maxsize=16)
 def signatures(skills: SkillTable) -> dict[str, tuple[type, ...]]:
-    """The types of the arguments of each skill; options are a tuple here."""
+    """The types of the arguments of each skill, where that is all there is to them."""
     return {
-        skill.name: tuple(str if p.type is str else tuple for p in skill.parameters) for skill in skills.rows
+        skill.name: tuple(str if p.type == TEXT else object for p in skill.parameters)
+        for skill in skills.rows
     }

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, TypeAlias
 
-    Skills: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
+    Parameter: TypeAlias = tuple[str, str, tuple[Any, ...], str]  # name, kind, choices if any, and words
+    Skills: TypeAlias = tuple[tuple[str, tuple[Parameter, ...]], ...]
     Settings: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
 
 # Functions below look here for `len` and the like, and not where a program can write.
@@ -39,7 +40,8 @@ class ProgramRun:
     recursion_limit = RECURSION_LIMIT
 
     def __init__(self) -> None:
-        self.skills: Skills = ()  # name, and parameters: name, and type `str` or `list`
+        self.skills: Skills = ()
+        self.kinds: dict[str, list[str]] = {}  # of the parameters of each skill; `list` is one of options
         self.now = 0.0
         self.spent = self.entered = False
         self.refused_at: int | None = None  # the line that asked for what a rule ended the run for
@@ -162,13 +164,14 @@ class ProgramRun:
         """Count fuel from the start."""
         self.count = itertools.count(1).__next__
 
-    def skill(self, name: str, parameters: tuple[tuple[str, str], ...]) -> object:
+    def skill(self, name: str, parameters: tuple[Parameter, ...]) -> object:
         """The function that a program calls for a skill."""
-        names = ", ".join(parameter for parameter, _ in parameters)
-        arguments = "".join(f"{parameter}, " for parameter, _ in parameters)
-        types_: list[tuple[str, type]] = [
-            (name, list if kind == "list" else str) for name, kind in parameters
+        names = ", ".join(parameter[0] for parameter in parameters)
+        arguments = "".join(f"{parameter[0]}, " for parameter in parameters)
+        types_: list[tuple[type | str, Parameter]] = [
+            (each[1] if each[2] else USUAL.get(each[1], each[1]), each) for each in parameters
         ]
+        self.kinds[name] = [kind for _, kind, _, _ in parameters]
         scope = {
             "perform": lambda *values: self.perform(name, types_, values),
             "limit": setrecursionlimit,
@@ -182,25 +185,28 @@ class ProgramRun:
         )
         return scope[name]
 
-    def perform(self, name: str, parameters: list[tuple[str, type]], values: tuple[Any, ...]) -> Any:  # noqa: ANN401 - what a skill returns
+    def perform(
+        self, name: str, parameters: list[tuple[type | str, Parameter]], values: tuple[Any, ...]
+    ) -> Any:  # noqa: ANN401 - what a skill returns
         """Carry out a skill; texts must be `str` and options a `list`, exactly."""
-        for (parameter, kind), value in zip(parameters, values, strict=True):
+        for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
-                wanted = "a list" if kind is list else "text"
-                raise TypeError(f"{name}: {parameter} must be {wanted}, not {NAME_OF(given)}")
+                check_fit(name, parameter, value, given)
         if self.spent:
             raise LimitReachedError
         arguments = [value.copy() if type(value) is list else value for value in values]
         result = self.carry_out(name, arguments)
-        for options in arguments:
-            if type(options) is list and options and type(result) is int:
-                return options[result]  # the very object that the program gave
+        if type(result) is int:
+            for (kind, _), options in zip(parameters, arguments, strict=True):
+                if kind is list and options:
+                    return options[result]  # the very object that the program gave
         return result
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Ask the engine for a skill."""
-        given = [options_text(value) if type(value) is list else quoted(value) for value in arguments]
+        kinds = self.kinds[name]
+        given = [WRITTEN.get(kind, value_text)(value) for kind, value in zip(kinds, arguments, strict=True)]
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
@@ -250,6 +256,31 @@ def options_text(options: list[Any]) -> str:
     return f"[{','.join(parts)}]"
 
 
+def check_fit(name: str, parameter: Parameter, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
+    """TypeError or ValueError where a value is none that a parameter takes."""
+    named, kind, choices, words = parameter
+    base = kind[5:-1] if kind[:5] == "list[" else ""
+    if base and given is list:
+        for each in list.__iter__(value):
+            check_fit(name, (named, base, choices, words), each, type(each))
+        return
+    if not (given is KINDS.get(kind) or (kind == "float" and given is int)):
+        raise TypeError(f"{name}: {named} must be {words}, not {NAME_OF(given)}")
+    if choices and value not in choices:
+        raise ValueError(f"{name}: {named} must be {words}, not {repr(value)[:100]}")
+    if (given is int and not -LARGEST <= value <= LARGEST) or (given is float and value - value != 0):
+        raise ValueError(f"{name}: {named} is too large")
+
+
+def value_text(value: Any) -> str:  # noqa: ANN401 - a text, a number, a truth value, or a list of these
+    """A value that fits its parameter, as JSON."""
+    if type(value) is list:
+        return f"[{','.join([value_text(each) for each in value])}]"
+    if type(value) is str:
+        return quoted(value)
+    return {True: "true", False: "false"}[value] if type(value) is bool else repr(value)
+
+
 def line_at_work() -> int:
     """The line of the program that calls us; 0 where none does."""
     frame: types.FrameType | None = getframe(1)
@@ -281,6 +312,10 @@ def message_of(error: BaseException) -> str:
         return ""
 
 
+USUAL: dict[str, type] = {"str": str, "list": list}
+KINDS: dict[str, type] = {**USUAL, "int": int, "float": float, "bool": bool}
+WRITTEN: dict[str, Callable[[Any], str]] = {"str": quoted, "list": options_text}
+LARGEST = 2**53  # of whole numbers that JSON carries exactly
 NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
 """The name of a class, past what a metaclass of the program may say."""
 

@@ -14,7 +14,7 @@ from nicegui.events import GenericEventArguments
 
 from codebotler.checking.problems import Check
 from codebotler.core.errors import UserError
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
@@ -24,7 +24,7 @@ from codebotler.web.frame import Button, PlainText, scroll_up, warn
 from codebotler.web.panes.rules import RulesPane
 from codebotler.web.storyboard import Reached, draw_strips
 
-SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
+CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
 MOST_MARKS, MOST_ESCAPES = 400, 2_000
 MOST_PROBLEMS = 20
 SCRIPT = '<script src="/static/editor.js"></script>'
@@ -226,7 +226,8 @@ def _for_editor(program: str) -> str:
 
 
 def _skills(program: str) -> list[dict[str, Any]]:
-    found = list(SKILL_CALL.finditer(program))[:MOST_MARKS]
+    calls = (found for found in CALL.finditer(program) if by_name(found[1]) is not None)
+    found = list(islice(calls, MOST_MARKS))
     return [{"kind": "mark", "from": m.start(), "to": m.end(), "class": "skill"} for m in found]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from nicegui import ui
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import verb_for
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import State, Summary
@@ -25,7 +25,6 @@ HEADLINES: Mapping[Phase, str] = {
     State.CHECKED: "Ready: waiting for your approval",
     State.APPROVED: "Starting",
 }
-PAST_VERBS = {**{kind: verb.past for kind, verb in SKILLS.verbs.items()}, ANSWER: "heard"}
 MOST_MOMENTS = 60
 SCRIPT = '<script src="/static/moments.js"></script>'
 
@@ -98,8 +97,9 @@ class RobotPane:
             for moment in moments[known:]:
                 with ui.element("li").classes(f"moment moment-{moment.kind}"):
                     PlainText("time", f"{moment.clock:.1f} s")
-                    if moment.kind in PAST_VERBS:
-                        PlainText("small", PAST_VERBS[moment.kind])
+                    verb = verb_for(moment.kind)
+                    if moment.kind == ANSWER or verb is not None:
+                        PlainText("small", "heard" if verb is None else verb.past)
                     PlainText("span", moment.text, "text")
         ui.run_javascript(f"moments.follow({self._log.id})")
 

@@ -13,7 +13,8 @@ import msgspec
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_lines, read_rows, to_line
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
 
 MOST = 1_000_000  # bytes of a row
@@ -175,8 +176,8 @@ def _expect_known_kinds(row: JudgedRow) -> None:
     for verdict in row.verdicts:
         for event in verdict.trace:
             kind = msgspec.json.decode(event)[0]
-            if kind not in KINDS:
-                raise ValueError(f'"{kind}" is not a kind of event')
+            if kind not in KINDS and by_event(kind) is None:
+                raise ValueError(f'"{kind}" is not a kind of event; name the file of its skill with --skills')
 
 
 @dataclass(frozen=True)

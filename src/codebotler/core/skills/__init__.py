@@ -1,0 +1,1 @@
+"""Skills: what a robot can do, each declared by one function."""

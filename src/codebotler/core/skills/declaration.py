@@ -1,0 +1,293 @@
+"""Declares a skill by one typed function; its signature and docstring are what programs and models see."""
+
+from __future__ import annotations
+
+import builtins
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, NoReturn, overload
+
+from codebotler.core.errors import VIOLATION, UserError
+from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill
+from codebotler.core.skills.values import NOTHING, ValueType, value_type
+from codebotler.core.skills.verbs import Verb, verb_of
+
+TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins)})
+RTL_WORDS = frozenset(
+    {
+        *("at", "holding", "to", "found", "missed", "mention", "answered", "returned", "tr"),
+        *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies"),
+    }
+)
+"""What formulas call other things by than events."""
+_DECLARED: dict[str, Skill] = {}
+USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
+
+
+def by_name(name: str) -> Skill | None:
+    """The skill of this name that was declared in this process, for words about it."""
+    return _DECLARED.get(name)
+
+
+def all_names() -> list[str]:
+    """The names of all skills declared in this process."""
+    return list(_DECLARED)
+
+
+def by_event(kind: str) -> Skill | None:
+    """The skill declared in this process that leaves events of a kind, which is all that these say of it."""
+    return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), None)
+
+
+def verb_for(kind: str) -> Verb | None:
+    """The verb for a kind of event; None if nobody has declared one."""
+    row = by_event(kind)
+    return None if row is None else row.verb
+
+
+@overload
+def skill(does: Callable[..., Any], /) -> Skill: ...
+
+
+@overload
+def skill(
+    *,
+    verb: Verb | str | None = None,
+    past: str = "",
+    results: tuple[str, str] = ("no", "yes"),
+    fails: Mapping[str, str] | None = None,
+    ros: RosAction | str | None = None,
+    example: str = "",
+    event: str | None = "",
+    text: str = "",
+    names: str = "thing",
+    to: str | None = None,
+    when_tried: bool = False,
+    seconds: float = 1.0,
+    is_idle: bool = False,
+    adds_event: bool = True,
+) -> Callable[[Callable[..., Any]], Skill]: ...
+
+
+def skill(
+    does: Callable[..., Any] | None = None,
+    /,
+    *,
+    verb: Verb | str | None = None,
+    past: str = "",
+    results: tuple[str, str] = ("no", "yes"),
+    fails: Mapping[str, str] | None = None,
+    ros: RosAction | str | None = None,
+    example: str = "",
+    event: str | None = "",
+    text: str = "",
+    names: str = "thing",
+    to: str | None = None,
+    when_tried: bool = False,
+    seconds: float = 1.0,
+    is_idle: bool = False,
+    adds_event: bool = True,
+) -> Skill | Callable[[Callable[..., Any]], Skill]:
+    """Declare a skill by a function that does it to a simulated robot, its first parameter.
+
+    A function without code (`...`) leaves the event of the skill, and returns a value of its type by lot; in
+    some of the worlds that a check imagines, it fails with each of its errors.
+
+    Args:
+        does: the function, where nothing else is declared.
+        verb: for people, such as `open {door}`, with the parameters in braces.
+        past: of the verb, where it is irregular and not known, such as `wove`.
+        results: what False and True mean to people.
+        fails: the errors that it may end with, by kind, each with a clause that says when.
+        ros: the action on a robot, such as `lab_msgs/OpenDoor:/open_door`.
+        example: a call that models are shown; by default one that is made of the names of parameters.
+        event: the kind of its event; by default the name of the function; None if it leaves no event.
+        text: the parameter whose value is the text of the event; by default the first one.
+        names: the sort of thing that the text names, such as `room`; empty for what is spoken.
+        to: the parameter that says whom it is for.
+        when_tried: whether an attempt that fails is an event, too.
+        seconds: how long the simulated robot takes by its clock, besides driving.
+        is_idle: whether it leaves the robot and its world as they are, however often it is executed.
+        adds_event: whether its event is added for it when it ends; otherwise the function does that.
+
+    Raises:
+        UserError: it cannot be a skill; the sentence names the file and the line.
+    """
+    said = {
+        "verb": verb,
+        "past": past,
+        "results": results,
+        "fails": fails or {},
+        "ros": ros,
+        "example": example,
+    }
+    said |= {"event": event, "text": text, "names": names, "to": to, "when_tried": when_tried}
+    said |= {"seconds": seconds, "is_idle": is_idle, "adds_event": adds_event}
+    if does is not None:
+        return _Declaration(does, said).skill()
+    return lambda function: _Declaration(function, said).skill()
+
+
+class _Declaration:
+    """One function, and what is said of it."""
+
+    def __init__(self, does: Callable[..., Any], said: Mapping[str, Any]) -> None:
+        self.does, self.said = does, said
+        self.name = does.__name__
+
+    def skill(self) -> Skill:
+        """The skill, which its events are known by from now on."""
+        self.check_name()
+        parameters, returns = self.parameters(), self.returns()
+        recording = self.recording(parameters)
+        fails = self.fails()
+        doc = " ".join((self.does.__doc__ or "").split("\n\n")[0].split())
+        if not doc:
+            self.wrong(
+                f"{self.name} has no docstring; begin it with a sentence that says what the skill does"
+            )
+        row = Skill(
+            self.name,
+            parameters,
+            returns,
+            doc,
+            recording,
+            self.ros(parameters, returns),
+            self.verb(parameters),
+            self.said["seconds"],
+            is_idle=self.said["is_idle"],
+            does=_drawn(self.does) if _is_empty(self.does) else self.does,
+            adds_event=self.said["adds_event"],
+            fails=tuple(fails.items()),
+            example=self.said["example"],
+        )
+        _DECLARED[self.name] = row
+        return row
+
+    def wrong(self, sentence: str) -> NoReturn:
+        """Raise a UserError that names the function's file and line."""
+        code = self.does.__code__
+        raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
+
+    def check_name(self) -> None:
+        kind = self.said["event"] or self.name
+        if self.name in TAKEN:
+            self.wrong(f"{self.name} is a name that Python or every program already has; choose another one")
+        if kind in RTL_WORDS:
+            self.wrong(f"{kind} means something else in formulas; choose another name")
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        code = self.does.__code__
+        if not code.co_argcount or code.co_kwonlyargcount or code.co_flags & (0x04 | 0x08):
+            self.wrong(
+                f"{self.name} must take the simulation and then, by position, what programs pass, "
+                "as in (sim: Simulation, door: str)"
+            )
+        if self.does.__defaults__:
+            self.wrong(f"{self.name} has a default value; programs pass every argument, so leave it out")
+        names = code.co_varnames[1 : code.co_argcount]
+        for name in names:
+            if name not in self.does.__annotations__:
+                self.wrong(
+                    f"the parameter {name} of {self.name} has no type; write {name}: str, or another one"
+                )
+        types = [self.type_of(name, f"the type of the parameter {name}") for name in names]
+        if NOTHING in types:
+            self.wrong(f"a parameter of {self.name} cannot be None; use {USABLE}")
+        of_options = self.options(names)
+        return tuple(Parameter(n, t, n == of_options) for n, t in zip(names, types, strict=True))
+
+    def options(self, names: tuple[str, ...]) -> str | None:
+        """The parameter that lists the options of a question."""
+        return next((name for name in names if name == "options"), None)
+
+    def returns(self) -> ValueType:
+        if "return" not in self.does.__annotations__:
+            self.wrong(f"{self.name} does not say what it returns; write -> None, or another type")
+        return self.type_of("return", "what it returns")
+
+    def type_of(self, name: str, what: str) -> ValueType:
+        annotation = self.does.__annotations__[name]
+        if isinstance(annotation, str):
+            try:
+                annotation = eval(annotation, self.does.__globals__)  # noqa: S307 - of the user's own file
+            except Exception as error:  # noqa: BLE001 - whatever it is, that is no type
+                self.wrong(f"{what} of {self.name} cannot be read: {error}")
+        found = value_type(annotation)
+        if found is None:
+            written = getattr(annotation, "__name__", str(annotation))
+            self.wrong(f"{what} of {self.name}, {written}, is none that skills can have; use {USABLE}")
+        return found
+
+    def recording(self, parameters: tuple[Parameter, ...]) -> Recording | None:
+        event = self.said["event"]
+        if event is None:
+            return None
+        to = self.said["to"]
+        options = next((each.name for each in parameters if each.is_options), None)
+        names = [each.name for each in parameters if each.name != options]
+        text = self.said["text"] or next((name for name in names if name != to), "")
+        for name in filter(None, (text, to)):
+            if name not in names:
+                self.wrong(f"{self.name} has no parameter {name}")
+        more = tuple(name for name in names if name not in {text, to})
+        return Recording(
+            event or self.name, text, options, to, self.said["names"], self.said["when_tried"], more
+        )
+
+    def fails(self) -> Mapping[str, str]:
+        fails: Mapping[str, str] = self.said["fails"]
+        for kind in fails:
+            if not kind.isidentifier() or kind == VIOLATION or hasattr(builtins, kind):
+                self.wrong(
+                    f'the error "{kind}" of {self.name} must have a name of its own, such as "DoorLocked"'
+                )
+        return fails
+
+    def verb(self, parameters: tuple[Parameter, ...]) -> Verb | None:
+        verb = self.said["verb"]
+        if not isinstance(verb, str):
+            return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb is a text")
+        try:
+            names = [each.name for each in parameters]
+            return verb_of(verb, names, self.said["results"], self.said["past"])
+        except ValueError as error:
+            self.wrong(f"{error}")
+
+    def ros(self, parameters: tuple[Parameter, ...], returns: ValueType) -> RosAction | None:
+        ros = self.said["ros"]
+        if ros is None or isinstance(ros, RosAction):
+            return ros
+        full, colon, server = ros.partition(":")
+        package, slash, kind = full.partition("/")
+        if not (colon and slash and package.isidentifier() and kind.isidentifier() and server.strip("/")):
+            self.wrong(
+                f'"{ros}" is no ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
+            )
+        goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
+        result = None if returns.base is None else _ros_type(returns)
+        return RosAction(kind, server, goal, result, package=package)
+
+
+ROS_TYPES = {"str": "string", "int": "int64", "float": "float64", "bool": "bool"}
+
+
+def _ros_type(value: ValueType) -> str:
+    return ROS_TYPES[value.base or "str"] + "[]" * value.is_list
+
+
+def _is_empty(does: Callable[..., Any]) -> bool:
+    """Whether a function has no code."""
+    return does.__code__.co_code == _empty.__code__.co_code
+
+
+def _empty(_sim: object) -> None:
+    """Do nothing."""
+
+
+def _drawn(does: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(does)
+    def drawn(sim: Any, *arguments: Any) -> Any:  # noqa: ANN401 - as any skill
+        return sim.outcome(does.__name__, arguments)
+
+    return drawn

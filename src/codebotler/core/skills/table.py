@@ -1,0 +1,192 @@
+"""Skills as data, for prompts, messages, checks and robots."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from typing import Any, SupportsIndex
+
+from codebotler.core.skills.values import TEXT, ValueType
+from codebotler.core.skills.verbs import Verb
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One argument of a skill."""
+
+    name: str  # by which a program may pass it
+    type: ValueType = TEXT
+    is_options: bool = False  # whether it lists the options of a question, which may be of any type
+
+    @property
+    def kind(self) -> str:
+        """The type as the sandbox knows it."""
+        return "list" if self.is_options else self.type.kind
+
+    @property
+    def words(self) -> str:
+        """What programs must pass, in words."""
+        return "a list" if self.is_options else self.type.words
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a skill leaves in the trace."""
+
+    kind: str  # of the event, and its name in RTL, such as `goto`
+    text: str  # the parameter whose value is the event's text; empty if it has none
+    options: str | None = None  # the parameter whose value is the event's list of options
+    to: str | None = None  # the parameter that says whom it is for
+    names: str = ""  # the sort of thing that the text names, such as `room`; empty for what is spoken
+    when_tried: bool = False  # whether an attempt that fails is an event, too
+    more: tuple[str, ...] = ()  # the parameters whose values follow the text
+
+    @property
+    def is_spoken(self) -> bool:
+        """Whether the text is said aloud."""
+        return not self.names
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether the robot goes to the place that the text names."""
+        return self.names == "room"
+
+
+@dataclass(frozen=True)
+class RosAction:
+    """The ROS action that carries a skill to a robot (paper, section III.C)."""
+
+    type: str
+    server: str  # the topic under which the robot offers it
+    goal: tuple[str, ...] = ()  # its fields, in the order of the skill's parameters
+    result: str | None = None  # the type of its only field, if it has one
+    failure: str = ""  # the kind of its only error; if it is empty, the robot names the kind
+    package: str = "robot_actions_pkg"
+
+    @property
+    def definition(self) -> str:
+        """The text of its .action file; names and order decide whether robots understand it."""
+        result = "" if self.result is None else f"{self.result} result\n"
+        return "".join(f"{line}\n" for line in self.goal) + f"---\n{result}---\n"
+
+
+@dataclass(frozen=True)
+class Skill:
+    """One robot primitive of the paper's figure 2a, or one of a user's own.
+
+    Args:
+        name: the function a program calls.
+        parameters: its arguments, in order.
+        returns: the type of what comes back.
+        doc: what it does, in a sentence for the person or model that writes programs.
+        recording: its event in the trace; None for skills without one.
+        ros: the action on a robot.
+        verb: for people; without one, they read the skill's name and its arguments.
+        seconds: how long the simulated robot takes by its clock, besides driving.
+        is_idle: whether it leaves the robot and its world as they are, however often it is executed.
+        does: what it does to a simulated robot, its first argument.
+        adds_event: whether the robot adds its event; otherwise, what it does adds that by itself.
+        fails: the kinds of errors that it may end with, and when each occurs.
+        example: a call of it that models are shown.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    returns: ValueType
+    doc: str
+    recording: Recording | None = None
+    ros: RosAction | None = None
+    verb: Verb | None = None
+    seconds: float = 0.0
+    is_idle: bool = False
+    does: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
+    adds_event: bool = False
+    fails: tuple[tuple[str, str], ...] = ()
+    example: str = ""
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
+        """By its name where that is in its module: there, the name of the function is that of the skill."""
+        module = getattr(self.does, "__module__", "")
+        if getattr(sys.modules.get(module), self.name, None) is self:
+            return _declared_in, (module, self.name)
+        return super().__reduce_ex__(protocol)
+
+    def doing(self, does: Callable[..., Any]) -> Skill:
+        """The same skill, which does something else."""
+        return replace(self, does=does, is_idle=False)
+
+    @property
+    def signature(self) -> str:
+        """The skill as a Python signature, such as `go_to(location: str) -> None`."""
+        arguments = ", ".join(f"{p.name}: {p.type.annotation}" for p in self.parameters)
+        return f"{self.name}({arguments}) -> {self.returns.annotation}"
+
+
+def _declared_in(module: str, name: str) -> Skill:
+    found: Skill = getattr(import_module(module), name)
+    return found
+
+
+@dataclass(frozen=True)
+class SkillTable(Mapping[str, Skill]):
+    """Skills by name, in the order in which they are shown.
+
+    Args:
+        rows: the skills; names and recorded kinds are unique.
+        recordings: the events that a trace can have, by kind; follows from the rows.
+
+    Raises:
+        ValueError: two rows share a name or a recorded kind.
+    """
+
+    rows: tuple[Skill, ...]
+    _by_name: Mapping[str, Skill] = field(init=False, repr=False, compare=False)
+    recordings: Mapping[str, Recording] = field(init=False, repr=False, compare=False)
+    _hash: int = field(init=False, repr=False, compare=False)
+    _idle: frozenset[str] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        by_name = {skill.name: skill for skill in self.rows}
+        kinds = [skill.recording.kind for skill in self.rows if skill.recording]
+        if len(by_name) != len(self.rows) or len(set(kinds)) != len(kinds):
+            raise ValueError("two skills share a name or a kind of event")
+        object.__setattr__(self, "_by_name", by_name)
+        recordings = {skill.recording.kind: skill.recording for skill in self.rows if skill.recording}
+        object.__setattr__(self, "recordings", recordings)
+        object.__setattr__(self, "_idle", frozenset(s.name for s in self.rows if s.is_idle))
+        object.__setattr__(self, "_hash", hash(self.rows))  # once, since tables are keys of caches
+
+    def __getitem__(self, name: str) -> Skill:
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __repr__(self) -> str:
+        return f"SkillTable({', '.join(self)})"
+
+    def with_skill(self, skill: Skill) -> SkillTable:
+        """This table and one more row."""
+        return SkillTable((*self.rows, skill))
+
+    def doing(self, **does: Callable[..., Any]) -> SkillTable:
+        """The same skills, of which some do something else."""
+        return SkillTable(tuple(s.doing(does[s.name]) if s.name in does else s for s in self.rows))
+
+    @property
+    def idle(self) -> frozenset[str]:
+        """The skills that leave a robot and its world as they are."""
+        return self._idle
+
+    @property
+    def verbs(self) -> Mapping[str, Verb]:
+        """The verbs of events, by kind; kinds without a verb are absent."""
+        return {s.recording.kind: s.verb for s in self.rows if s.recording and s.verb}

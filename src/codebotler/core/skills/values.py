@@ -1,0 +1,162 @@
+"""The types of what skills are given and return: what fits them, and how they are written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from math import isfinite
+from typing import Any, Literal, TypeAlias, get_args, get_origin
+
+Scalar: TypeAlias = str | int | float | bool
+Base: TypeAlias = Literal["str", "int", "float", "bool"]
+
+LARGEST = 2**53  # of whole numbers, which JSON and robots carry exactly
+BASES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
+
+
+@dataclass(frozen=True)
+class ValueType:
+    """What a skill takes or returns.
+
+    Args:
+        base: the type of a single value; None for nothing at all.
+        is_list: whether it is a list of such values.
+        choices: the only values that fit, if they are listed.
+        enum: what the function of the skill gets for a choice, where it wants no plain value.
+    """
+
+    base: Base | None = "str"
+    is_list: bool = False
+    choices: tuple[Scalar, ...] = ()
+    enum: type[Enum] | None = field(default=None, compare=False)
+
+    @property
+    def kind(self) -> str:
+        """The type as the sandbox knows it, without what it chooses from."""
+        return f"list[{self.base}]" if self.is_list else str(self.base)
+
+    @property
+    def annotation(self) -> str:
+        """The type as programs and models see it, such as `list[str]` or `Literal["red", "green"]`."""
+        quoted = (f'"{one}"' if isinstance(one, str) else repr(one) for one in self.choices)
+        one = f"Literal[{', '.join(quoted)}]" if self.choices else str(self.base)
+        return f"list[{one}]" if self.is_list else one
+
+    @property
+    def words(self) -> str:
+        """What is expected, in words."""
+        named = {"str": "text", "int": "a whole number", "float": "a number", "bool": "True or False"}
+        if self.base is None:
+            return "nothing"
+        if self.is_list:
+            return f"a list of {PLURALS[self.base]}" if not self.choices else f"a list of {self._listed}"
+        return self._listed if self.choices else named[self.base]
+
+    @property
+    def _listed(self) -> str:
+        quoted = [f'"{one}"' if isinstance(one, str) else str(one) for one in self.choices]
+        return " or ".join([", ".join(quoted[:-1]), quoted[-1]] if quoted[1:] else quoted)
+
+    def fits(self, value: object) -> bool:
+        """Whether a value is of this type, exactly; a whole number is a number, too."""
+        if self.base is None:
+            return value is None
+        if self.is_list:
+            return isinstance(value, list | tuple) and all(map(self._fits_one, value))
+        return self._fits_one(value)
+
+    def _fits_one(self, value: object) -> bool:
+        given = type(value)
+        if given.__name__ != self.base and not (self.base == "float" and given is int):
+            return False
+        if isinstance(value, float) and not isfinite(value):
+            return False
+        if given is int and abs(value) > LARGEST:  # type: ignore[arg-type]  # a whole number
+            return False
+        return not self.choices or value in self.choices
+
+    def wanted(self, value: Any) -> Any:  # noqa: ANN401 - of any of these types
+        """A value that fits as the function of the skill wants it."""
+        if isinstance(value, list | tuple):
+            return [self.wanted(each) for each in value]
+        if self.enum is not None:
+            return self.enum(value)
+        return float(value) if self.base == "float" else value
+
+
+PLURALS: Mapping[Base, str] = {
+    "str": "texts",
+    "int": "whole numbers",
+    "float": "numbers",
+    "bool": "truth values",
+}
+TEXT, TRUTH, NOTHING = ValueType(), ValueType("bool"), ValueType(None)
+
+
+def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
+    """What a function has returned, with the values of enumerations in their place."""
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return value.value if isinstance(value, Enum) else value
+
+
+def value_type(annotation: object) -> ValueType | None:
+    """The type that an annotation means; None if it is none of those that skills can have."""
+    if annotation is None or annotation is type(None):
+        return NOTHING
+    if isinstance(annotation, type) and annotation in BASES:
+        return ValueType(BASES[annotation])
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        return _one_of(tuple(member.value for member in annotation), annotation)
+    if get_origin(annotation) is Literal:
+        return _one_of(get_args(annotation))
+    if get_origin(annotation) is list and len(get_args(annotation)) == 1:
+        inner = value_type(get_args(annotation)[0])
+        if inner is not None and inner.base is not None and not inner.is_list:
+            return replace(inner, is_list=True)
+    return None
+
+
+def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueType | None:
+    kinds = {type(choice) for choice in choices}
+    if len(kinds) != 1 or not kinds <= {str, int, float}:
+        return None
+    return ValueType(BASES[kinds.pop()], choices=choices, enum=enum)
+
+
+def possible(value: ValueType) -> tuple[Any, ...]:
+    """Some values of a type, from which a result is drawn by lot."""
+    if value.is_list:
+        some = possible(ValueType(value.base, choices=value.choices))
+        return [], [some[0]], list(some[:2])
+    if value.base is None:
+        return (None,)
+    return value.choices or SOME[value.base]
+
+
+SOME: Mapping[Base, tuple[Scalar, ...]] = {
+    "bool": (True, False),
+    "int": (1, 0, 2, 10),
+    "float": (1.0, 0.0, 0.5, 100.0),
+    "str": ("something", "", "something else"),
+}
+
+
+def written_call(name: str, arguments: Sequence[object]) -> str:
+    """A call as a program writes it, such as `open_door("glass door")`."""
+    return f"{name}({', '.join(map(_written, arguments))})"
+
+
+def _written(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_written, value))}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def as_text(value: object) -> str:
+    """An argument as events and rules have it: `3`, `0.5`, `red`, `true`, `cup, plate`."""
+    if isinstance(value, list | tuple):
+        return ", ".join(map(as_text, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)

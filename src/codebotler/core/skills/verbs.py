@@ -1,0 +1,138 @@
+"""Skills in English: a verb in its forms, and what follows it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+PAST: Mapping[str, str] = {
+    **dict.fromkeys(("beat", "cut", "hit", "let", "put", "read", "set", "shut", "spread"), ""),
+    "bend": "bent",
+    "bind": "bound",
+    "blow": "blew",
+    "bring": "brought",
+    "build": "built",
+    "buy": "bought",
+    "catch": "caught",
+    "choose": "chose",
+    "come": "came",
+    "dig": "dug",
+    "do": "did",
+    "draw": "drew",
+    "drive": "drove",
+    "feed": "fed",
+    "find": "found",
+    "fly": "flew",
+    "get": "got",
+    "give": "gave",
+    "go": "went",
+    "grind": "ground",
+    "hang": "hung",
+    "hear": "heard",
+    "hold": "held",
+    "keep": "kept",
+    "lay": "laid",
+    "lead": "led",
+    "leave": "left",
+    "lend": "lent",
+    "light": "lit",
+    "make": "made",
+    "meet": "met",
+    "ride": "rode",
+    "ring": "rang",
+    "run": "ran",
+    "say": "said",
+    "see": "saw",
+    "seek": "sought",
+    "send": "sent",
+    "shake": "shook",
+    "show": "showed",
+    "sit": "sat",
+    "speak": "spoke",
+    "spin": "spun",
+    "stand": "stood",
+    "stick": "stuck",
+    "sweep": "swept",
+    "swing": "swung",
+    "take": "took",
+    "teach": "taught",
+    "tell": "told",
+    "throw": "threw",
+    "turn": "turned",
+    "wear": "wore",
+    "wind": "wound",
+    "write": "wrote",
+}
+"""The past of irregular verbs that robots may need; empty where it is the verb itself."""
+
+PLACE = re.compile(r"\{(\w+)\}")
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A skill in English; the event's text follows it, or fills in `object`."""
+
+    base: str  # `pick up`
+    third: str  # `picks up`
+    past: str  # `picked up`
+    ing: str  # `picking up`
+    alone: str = ""  # `picked something up`, where no object follows
+    results: tuple[str, str] = ("no", "yes")  # what False and True mean
+    object: str = ""  # `{} ml of {} into {}`, if what follows is more than one text
+
+    def with_object(self, form: str, arguments: Sequence[str], quote: str = '"') -> str:
+        """A form of the verb with what it is done to, in quotes where there are no words around it."""
+        if not self.object:
+            return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
+        return f"{form} {self.object.format(*arguments)}"
+
+
+def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], past: str = "") -> Verb:
+    """The verb that a template such as `open {door}` declares.
+
+    Raises:
+        ValueError: the template names what is no parameter, or has no verb.
+    """
+    head, _, rest = template.strip().partition(" ")
+    if not head.isalpha():
+        raise ValueError(f'the verb "{template}" must begin with a verb such as "open"')
+    for name in PLACE.findall(template):
+        if name not in parameters:
+            raise ValueError(f'the verb "{template}" names {{{name}}}, which is no parameter')
+    fixed, brace, _ = rest.partition("{")
+    particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
+    if rest and not brace:
+        particle = rest
+    is_plain = rest in {particle, f"{particle} {{{parameters[0] if parameters else ''}}}".strip()}
+    forms = (head, _third(head), past or _past(head), _ing(head))
+    if is_plain and len(parameters) <= 1:
+        base, third, before, ing = (f"{form} {particle}".strip() for form in forms)
+        return Verb(base, third, before, ing, results=results)
+    order = {name: str(number) for number, name in enumerate(parameters)}
+    return Verb(*forms, results=results, object=PLACE.sub(lambda found: f"{{{order[found[1]]}}}", rest))
+
+
+def _third(verb: str) -> str:
+    if re.search(r"(?:s|x|z|ch|sh|o)$", verb):
+        return f"{verb}es"
+    return f"{verb[:-1]}ies" if re.search(r"[^aeiou]y$", verb) else f"{verb}s"
+
+
+def _past(verb: str) -> str:
+    if verb in PAST:
+        return PAST[verb] or verb
+    if verb.endswith("e"):
+        return f"{verb}d"
+    return f"{verb[:-1]}ied" if re.search(r"[^aeiou]y$", verb) else f"{_doubled(verb)}ed"
+
+
+def _ing(verb: str) -> str:
+    if re.search(r"[^eoy]e$", verb):
+        return f"{verb[:-1]}ing"
+    return f"{_doubled(verb)}ing"
+
+
+def _doubled(verb: str) -> str:
+    """A verb as it is before `ed` and `ing`: a short one doubles its last consonant."""
+    return verb + verb[-1] if re.fullmatch(r"[^aeiou]*[aeiou][^aeiouwxy]", verb) else verb
