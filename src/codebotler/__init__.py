@@ -10,12 +10,15 @@ __all__ = [
     "Generation",
     "ModelError",
     "Problem",
+    "Simulation",
     "UserError",
     "__version__",
     "check",
     "generate",
     "program_of",
     "prompt_for",
+    "skill",
+    "skills_from",
 ]
 
 TYPE_CHECKING = False
@@ -23,6 +26,9 @@ if TYPE_CHECKING:
     from codebotler.checking.check import check
     from codebotler.checking.problems import Check, Problem
     from codebotler.core.errors import UserError
+    from codebotler.core.skills.declaration import skill
+    from codebotler.core.skills.files import skills_from
+    from codebotler.core.skills.simulation import Simulation
     from codebotler.generation.generate import Generation, generate
     from codebotler.models.base import ModelError
     from codebotler.prompts import prompt_for
@@ -37,6 +43,9 @@ else:  # each name is imported when it is first used
             "checking.check": ["check"],
             "checking.problems": ["Check", "Problem"],
             "core.errors": ["BadInput", "UserError"],
+            "core.skills.declaration": ["skill"],
+            "core.skills.files": ["skills_from"],
+            "core.skills.simulation": ["Simulation"],
             "generation.generate": ["Generation", "generate"],
             "models.base": ["ModelError"],
             "prompts": ["prompt_for"],

@@ -190,7 +190,7 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *PEOPLE - {""}]}
         row = by_event(element.kind)
         sort = row.recording.names if row is not None and row.recording is not None else ""
-        named.append((SORTS.get(sort, sort), element.text if sort else None, sorts.get(sort, [])))
+        named.append((SORTS.get(sort, sort), element.text if sort in sorts else None, sorts.get(sort, [])))
         for what, text, known in named:
             if isinstance(text, Regex) and not may_mean(text.pattern, known):
                 yield f'it names the {what} "{text.pattern}", which is not in this world'

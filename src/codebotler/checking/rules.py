@@ -9,6 +9,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import brief
 from codebotler.core.world_file import Text
 from codebotler.core.yaml_files import Place, YamlFile
@@ -38,7 +40,7 @@ class RuleFile(BaseModel):
     finally_: Annotated[Text | None, Field(alias="finally")] = None
     refuse: Annotated[bool, Field(strict=True)] = False
 
-    def rule(self, file: YamlFile, at: Place) -> Rule:
+    def rule(self, file: YamlFile, at: Place, skills: SkillTable) -> Rule:
         """The rule that it describes, or a UserError."""
         if self.always is None and self.finally_ is None:
             raise file.wrong(
@@ -51,9 +53,9 @@ class RuleFile(BaseModel):
             if self.refuse:
                 sentence = 'what holds "finally" cannot be refused; remove "refuse", or write "always"'
                 raise file.wrong(sentence, *at, "refuse")
-            formula = _parsed(self.finally_ or "", file, (*at, "finally"))
+            formula = _parsed(self.finally_ or "", file, (*at, "finally"), skills)
             return Rule(self.name, self.says, formula, "finally")
-        formula = _parsed(self.always, file, (*at, "always"))
+        formula = _parsed(self.always, file, (*at, "always"), skills)
         if not holds(formula, ()):
             whenever = f"not tr.Last(...) or {_bracketed(formula)}"
             sentence = f'the rule "{self.name}" is broken before anything has happened; say when it counts'
@@ -71,7 +73,7 @@ class RulesFile(BaseModel):
     rules: Annotated[list[RuleFile], Field(min_length=1)]
 
 
-def read_rules(path: Path) -> tuple[Rule, ...]:
+def read_rules(path: Path, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
     """Read a file of rules; a UserError names the line of what is wrong, and how to mend it."""
     file = YamlFile.read(path)
     forms = file.validate(RulesFile).rules
@@ -79,12 +81,12 @@ def read_rules(path: Path) -> tuple[Rule, ...]:
     for number, name in enumerate(names):
         if name in names[:number]:
             raise file.wrong(f'the rule "{name}" is listed twice; rename one', "rules", number, "name")
-    return tuple(form.rule(file, ("rules", number)) for number, form in enumerate(forms))
+    return tuple(form.rule(file, ("rules", number), skills) for number, form in enumerate(forms))
 
 
-def _parsed(text: str, file: YamlFile, at: Place) -> Formula:
+def _parsed(text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula:
     try:
-        formula = parse(text)
+        formula = parse(text, skills=skills)
     except RtlSyntaxError as error:
         there = brief(text[error.column - 1 :], MOST_QUOTED)
         where = f"column {error.column}" + (f", at {there}" if there else "")

@@ -13,6 +13,7 @@ from rich.text import Text
 from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace
+from codebotler.rtl.formulas import takes_nothing
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20
@@ -105,11 +106,10 @@ def step_text(step: Mapping[str, Any]) -> Text:
 
 def step_words(step: Mapping[str, Any], form: str) -> str:
     """A form of a step's verb, and to what it is done."""
-    row = by_event(step["kind"])
-    assert row is not None, "it has a verb"
-    assert row.verb is not None, "the same"
     given = [shortened(text) for text in (step["text"], *step.get("more", ()))]
-    return row.verb.with_object(form, given if row.recording is not None and row.recording.text else [])
+    verb = verb_for(step["kind"])
+    assert verb is not None, "the form is of its verb"
+    return verb.with_object(form, [] if takes_nothing(step["kind"]) else given)
 
 
 def _drive(step: Mapping[str, Any], request: str) -> Text:

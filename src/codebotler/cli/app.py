@@ -44,6 +44,7 @@ def generate(
     timeout: options.TimeoutOption = 60.0,
     base_url: options.BaseUrlOption = None,
     rules: options.RulesOption = None,
+    skills: options.SkillsOption = None,
 ) -> None:
     """Have a model write a program, and print it.
 
@@ -51,6 +52,7 @@ def generate(
     """
     from codebotler.cli.generate import show, write
     from codebotler.cli.rules import rules_for
+    from codebotler.core.skills.files import skills_from
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
     from codebotler.models.chosen import chosen_model
@@ -58,9 +60,11 @@ def generate(
 
     chosen = chosen_model(model, base_url)
     known = None if world is None else World.read(world)
-    house_rules = rules_for(known, rules)
+    table = skills_from(*(skills or ()))
+    house_rules = rules_for(known, rules, table)
     prompt = prompt_for(
         instruction,
+        skills=table,
         rooms=() if known is None else [room.name for room in known.rooms],
         rules=[rule.says for rule in house_rules],
     )
@@ -75,6 +79,7 @@ def generate(
         settings,
         world=known,
         house_rules=house_rules,
+        skills=table,
         retries=tries,
         repair=repair,
         record=record,
@@ -101,6 +106,7 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,
     rules: options.RulesOption = None,
+    skills: options.SkillsOption = None,
 ) -> None:
     """Look for problems in a program before a robot runs it.
 
@@ -109,11 +115,13 @@ def check(
     from codebotler.checking import check
     from codebotler.cli.check import check_view, read_program
     from codebotler.cli.rules import rules_for
+    from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
 
     known = None if world is None else World.read(world)
-    house_rules = rules_for(known, rules)
+    table = skills_from(*(skills or ()))
+    house_rules = rules_for(known, rules, table)
     source = read_program(program)
     with busy("checking"):
         found = check.check(
@@ -124,10 +132,11 @@ def check(
             seed=seed,
             strict=strict,
             workers=workers,
+            skills=table,
             house_rules=house_rules,
         )
     if json:
-        print_json(found.data())
+        print_json(found.data(table))
     else:
         name = "the program" if program == "-" else program
         print_rich(check_view(found, source, name, shows_all=shows_all))
@@ -138,6 +147,7 @@ def check(
 def rules(
     file: Annotated[Path, typer.Argument(help="A file of house rules.")],
     world: options.WorldOption = None,
+    skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """Show house rules with examples, and what is odd about them.
@@ -147,10 +157,12 @@ def rules(
     from codebotler.checking.rule_review import reviewed
     from codebotler.checking.rules import read_rules
     from codebotler.cli.rules import review_data, review_view
+    from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
 
-    house_rules = read_rules(file)
+    table = skills_from(*(skills or ()))
+    house_rules = read_rules(file, table)
     known = None if world is None else World.read(world)
     with busy("looking for examples"):
         found = reviewed(house_rules, known)
@@ -184,6 +196,7 @@ def run(
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
     rules: options.RulesOption = None,
+    skills: options.SkillsOption = None,
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
@@ -193,6 +206,7 @@ def run(
     from codebotler.cli import run
     from codebotler.cli.run import Request
     from codebotler.core.files import home
+    from codebotler.core.skills.files import skills_from
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
     from codebotler.models.chosen import chosen_model
@@ -201,7 +215,8 @@ def run(
     from codebotler.robots.open import open_robot
 
     chosen = chosen_model(model, base_url)
-    house_rules = () if rules is None else read_rules(rules)
+    table = skills_from(*(skills or ()))
+    house_rules = () if rules is None else read_rules(rules, table)
     request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
     asked = SamplingSettings(base_url=chosen.base_url)
     world = options.world_or_office(robot, world)
@@ -210,6 +225,7 @@ def run(
         speed=speed or None,
         address=address,
         ros_python=ros_python,
+        skills=table,
     )
     body = open_robot(robot, settings)
     raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked)))
@@ -325,6 +341,7 @@ def serve_page(
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
     rules: options.RulesOption = None,
+    skills: options.SkillsOption = None,
 ) -> None:
     """Serve the web page for operating a robot.
 
@@ -332,19 +349,21 @@ def serve_page(
     """
     from codebotler.checking.rules import read_rules
     from codebotler.cli.serve import opener, serve
+    from codebotler.core.skills.files import skills_from
     from codebotler.core.world import World
     from codebotler.models.chosen import chosen_model
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.web.access import Access, Place
 
-    house_rules = () if rules is None else read_rules(rules)
+    table = skills_from(*(skills or ()))
+    house_rules = () if rules is None else read_rules(rules, table)
     place = Place(host, port, tuple(name or ()))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
     world = options.world_or_office(robot, world)
     known = None if world is None else World.read(world)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
-    settings = Options(known, speed or None, address, ros_python)
+    settings = Options(known, speed or None, address, ros_python, table)
     shown = Face(face_timeout) if face else None
     named = robot, settings, models, opener(models, base_url)
     serve(*named, place, access, runs, face=shown, rules=house_rules, alone_for=stop_when_alone)

@@ -7,6 +7,8 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 from codebotler.core.files import Appender, expect_replaceable, to_line
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_source, visible
 from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore, write_checked_program
@@ -26,6 +28,7 @@ def write(
     *,
     world: World | None,
     house_rules: tuple[Rule, ...] = (),
+    skills: SkillTable = SKILLS,
     retries: int,
     repair: bool,
     record: Path | None,
@@ -47,6 +50,7 @@ def write(
                     prompt,
                     room_map=room_map,
                     house_rules=house_rules,
+                    skills=skills,
                     retries=retries,
                     repair=repair,
                     tried=tried,

@@ -49,6 +49,14 @@ RulesOption = Annotated[
         metavar="FILE",
     ),
 ]
+SkillsOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--skills",
+        help="A Python file of your own skills, which is run; may be given several times.",
+        metavar="FILE",
+    ),
+]
 TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
 TopPOption = Annotated[
     float,

@@ -13,10 +13,13 @@ from codebotler.checking.rule_review import Review, unknown_rooms_in
 from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
 from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import listed
 from codebotler.core.world import World
+from codebotler.rtl.formulas import takes_nothing
 from codebotler.rtl.wording import verb as verb_of
 from codebotler.simulator.rule_guard import Rule
 
@@ -24,9 +27,9 @@ MADE_UP = ("", "x")  # texts in examples that stand for any other
 ASPECTS = {"always": "at any time", "finally": "at the end"}
 
 
-def rules_for(world: World | None, path: Path | None) -> tuple[Rule, ...]:
+def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
     """The rules in a file, if one is named, with a remark on each room that the world lacks."""
-    rules = () if path is None else read_rules(path)
+    rules = () if path is None else read_rules(path, skills)
     for sentence in () if world is None else unknown_rooms_in(rules, [room.name for room in world.rooms]):
         note(sentence)
     return rules
@@ -67,7 +70,9 @@ def step_sentence(event: Event) -> str:
     row, verb = by_event(event.kind), verb_of(event.kind)
     is_drive = row is not None and row.recording is not None and row.recording.is_drive
     made_up = "another room" if is_drive else "something"
-    told = [verb.third, made_up if event.text in MADE_UP else f'"{visible(event.text)}"']
+    quote = "" if verb.object else '"'
+    given = [made_up if t in MADE_UP else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
+    told = [verb.with_object(verb.third, [] if takes_nothing(event.kind) else given, "")]
     offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
     told += [f"offering {listed(offered)}"] if offered else []
     told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []

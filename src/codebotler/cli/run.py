@@ -14,6 +14,7 @@ from codebotler.checking.problems import Check
 from codebotler.cli.check import check_view, read_program
 from codebotler.cli.views import Watcher, ending, source_view
 from codebotler.core.errors import UserError
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.missions.log import State
 from codebotler.missions.mission import GRACE, MissionError
@@ -77,6 +78,7 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
     program = read_program(request.what) if request.is_program else ""
     recover(home)
     order = Order(program=program) if program else Order(request.what, request.model)
+    checked = checker(robot.skills)
     session = MissionSession(robot, home, order, open_model=open_model, check=checked, rules=request.rules)
     session.start()
     try:
@@ -92,9 +94,13 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
     return 1
 
 
-def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> Check:
-    """The check of a program for a robot that knows these rooms."""
-    return check(program, room_map=room_map, house_rules=rules)
+def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], Check]:
+    """The check of programs for a robot that has these skills."""
+
+    def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> Check:
+        return check(program, room_map=room_map, house_rules=rules, skills=skills)
+
+    return checked
 
 
 def _prepared(session: MissionSession) -> SessionView:

@@ -67,7 +67,7 @@ class World:
     robot: str
     about: str = ""
     may_wait_forever: bool = False
-    truths: tuple[tuple[str, Scalar], ...] = ()
+    truths: tuple[tuple[str, Scalar | tuple[Scalar, ...]], ...] = ()
 
     def __repr__(self) -> str:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
@@ -94,7 +94,7 @@ class World:
             "objects": {room.name: list(room.objects) for room in self.rooms if room.objects},
             "people": {room.name: [*map(_person_data, room.people)] for room in self.rooms if room.people},
             "may_wait_forever": self.may_wait_forever,
-            "truths": dict(self.truths),
+            "truths": {key: list(v) if isinstance(v, tuple) else v for key, v in self.truths},
         }
         return {key: value for key, value in data.items() if value or key == "about"}
 

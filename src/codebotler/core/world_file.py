@@ -54,6 +54,7 @@ def check_regex(text: str) -> str:
 
 Pattern = Annotated[Text, AfterValidator(check_regex)]
 NamePattern = Annotated[Name, AfterValidator(check_regex)]
+Value: TypeAlias = StrictBool | StrictInt | StrictFloat | StrictStr
 Metres = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
 Corner: TypeAlias = tuple[Metres, Metres]
 
@@ -125,7 +126,7 @@ class WorldFile(_Form):
     objects: dict[Text, list[NamePattern]] = {}
     people: dict[Text, list[PersonFile]] = {}
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
-    truths: dict[Name, StrictBool | StrictInt | StrictFloat | StrictStr] = {}
+    truths: dict[Name, Value | list[Value]] = {}
 
     def world(self, file: YamlFile, at: Place = ()) -> World:
         """The world that it describes, or a UserError about a room or a regex."""
@@ -162,7 +163,7 @@ class WorldFile(_Form):
             robot=self.robot,
             about=self.about,
             may_wait_forever=self.may_wait_forever,
-            truths=tuple(self.truths.items()),
+            truths=tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in self.truths.items()),
         )
 
 

@@ -10,6 +10,8 @@ from typing import Any, TypeAlias
 
 from codebotler.checking.check import check
 from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
 from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unheard
 from codebotler.models.open import open_model
@@ -117,6 +119,7 @@ def write_checked_program(
     rooms: Sequence[str] | None = None,
     room_map: RoomMap | None = None,
     house_rules: tuple[Rule, ...] = (),
+    skills: SkillTable = SKILLS,
     retries: int = 0,
     repair: bool = False,
     tried: Callable[[Attempt], None] = ignore,
@@ -125,7 +128,9 @@ def write_checked_program(
     with WorkerPool(1) as pool:
 
         def problems_of(program: str) -> list[str]:
-            found = check(program, rooms=rooms, room_map=room_map, pool=pool, house_rules=house_rules)
+            found = check(
+                program, rooms=rooms, room_map=room_map, pool=pool, house_rules=house_rules, skills=skills
+            )
             return [problem.sentence for problem in found.problems]
 
         def result() -> Generation:
@@ -154,6 +159,7 @@ def generate(
     seed: int | None = None,
     timeout: float = 60.0,
     base_url: str | None = None,
+    skills: SkillTable = SKILLS,
 ) -> Generation:
     """Have a model write a program, check it in sampled worlds, and wait for the result.
 
@@ -174,6 +180,7 @@ def generate(
         seed: for the random numbers, where a model takes a seed.
         timeout: seconds for one request altogether.
         base_url: where the model is served, such as `http://localhost:8000/v1`.
+        skills: what the robot can do; `skills_from` reads further ones from a file.
 
     Raises:
         UserError: there is no such model, or an argument is out of its range.
@@ -184,7 +191,7 @@ def generate(
     if tries < 0:
         raise UserError(f"the number of retries is {tries}, but must be at least 0")
     settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
-    prompt = prompt_for(instruction, rooms=rooms or ())
+    prompt = prompt_for(instruction, rooms=rooms or (), skills=skills)
     return write_checked_program(
-        open_model(model, settings), prompt, rooms=rooms, retries=tries, repair=repair
+        open_model(model, settings), prompt, rooms=rooms, retries=tries, repair=repair, skills=skills
     )

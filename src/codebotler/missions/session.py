@@ -285,7 +285,7 @@ class MissionSession:
     async def _written(self, model: Model, before: str, problems: Sequence[str]) -> str:
         rooms = () if self._view.room_map is None else self._view.room_map.rooms
         rules = [rule.says for rule in self._view.rules_in_force]
-        prompt = prompt_for(self._order.instruction, rooms=rooms, rules=rules)
+        prompt = prompt_for(self._order.instruction, rooms=rooms, rules=rules, skills=self._robot.skills)
         if problems:
             prompt = prompt.after(before, problems)
 

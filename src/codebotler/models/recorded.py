@@ -131,21 +131,34 @@ def is_recorded(name: str) -> bool:
     return name.partition(":")[0] == "recorded"
 
 
-def recorded_model(name: str) -> RecordedModel:
-    """A recorded model by its name; `recorded` means `recorded:careful`."""
+def recorded_model(name: str, folder: Path | None = None) -> RecordedModel:
+    """A recorded model by its name; `recorded` means `recorded:careful`, `recorded:FOLDER` your own files.
+
+    Args:
+        name: of the model.
+        folder: of further files that it knows.
+    """
     short = name.removeprefix("recorded").removeprefix(":") or NAMES[0]
+    if short not in NAMES and Path(short).is_dir():
+        own = _read(Path(short))
+        replies = {one.instruction: one.careful for one in own}
+        return RecordedModel(f"recorded:{short}", replies, tuple(replies))
     if short not in NAMES:
         known = ", ".join(f"recorded:{known}" for known in NAMES)
         raise UserError(f'there is no recorded model "{name}"; there are {known}')
     usual, of_rules = (_recorded(suite) for suite in ("paper", "rules"))
-    replies = {one.instruction: one.by(short) for one in (*usual, *of_rules)}
+    further = () if folder is None else _read(folder)
+    replies = {one.instruction: one.by(short) for one in (*usual, *of_rules, *further)}
     return RecordedModel(f"recorded:{short}", replies, tuple(one.instruction for one in usual))
 
 
 @cache
 def _recorded(suite: str) -> tuple[InstructionSolutions, ...]:
     """The instructions of a suite of the benchmark; with those of the paper's, our own."""
-    folders = [*_folders(suite), *([FOLDER] if suite == "paper" else [])]
+    return _read(*_folders(suite), *([FOLDER] if suite == "paper" else []))
+
+
+def _read(*folders: Path) -> tuple[InstructionSolutions, ...]:
     files = sorted((f for folder in folders for f in folder.glob("*.yaml")), key=lambda file: file.name)
     forms = (YamlFile.read(file).validate(RecordedFile) for file in files)
     return tuple(one for form in forms for one in form.recorded)

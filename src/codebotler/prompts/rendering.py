@@ -16,7 +16,8 @@ from typing import Literal
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import TASK, Flaw, parsed
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import SkillTable
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.words import listed
 
 FOLDER = Path(__file__).parent
 OPENING = f"def {TASK}():\n"
@@ -121,7 +122,7 @@ def prompt_for(
     about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
     about_rules = _filled("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
     wish = "\n\n".join(filter(None, (instruction, about_rooms, about_rules)))
-    stubs = [f'def {skill.signature}:\n    """{skill.doc}"""' for skill in skills.values()]
+    stubs = [stub(skill) for skill in skills.values()]
     shown = examples()
     messages = [Message("system", _filled("system", skills="\n\n".join(stubs)))]
     for example in shown:
@@ -140,6 +141,19 @@ def prompt_for(
         opening=OPENING,
     )
     return Prompt(instruction, tuple(messages), text + "\n", STOP, OPENING)
+
+
+def stub(skill: Skill) -> str:
+    """A skill as models are shown it; one of a user's own with an example, and when it fails."""
+    lines = [skill.doc]
+    if skill.fails:
+        lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")
+    if skill not in SKILLS.rows:
+        result = "" if skill.returns.base is None else "result = "
+        lines.append(f"Example: {result}{skill.call}")
+    if len(lines) == 1:
+        return f'def {skill.signature}:\n    """{skill.doc}"""'
+    return f'def {skill.signature}:\n    """' + "\n\n    ".join(lines) + '\n    """'
 
 
 @cache

@@ -8,6 +8,7 @@ from types import UnionType
 from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.skills.declaration import by_event
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
 from codebotler.rtl.text.matcher import Matcher
@@ -133,6 +134,8 @@ class EventPattern:
             written = f"{'found' if self.found else 'missed'}({self.text})"
         else:
             texts = [self.text, *self.more] if self.options is None else [self.text, self.options]
+            if takes_nothing(self.kind):
+                texts = []
             written = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
         if self.found is not None and self.kind != "check":
             written = f"returned({self.found}, {written})"
@@ -141,6 +144,12 @@ class EventPattern:
         if self.holding is not None:
             written = f"holding({self.holding}, {written})"
         return written if self.place is None else f"at({quote(self.place)}, {written})"
+
+
+def takes_nothing(kind: str) -> bool:
+    """Whether events of a kind have no text, since their skill has no arguments."""
+    row = by_event(kind)
+    return row is not None and row.recording is not None and not row.recording.text
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,9 @@ class _Parser:
         self.text = re.sub(r"[\r\n\f]", " ", text).strip()
         self.bytes = self.text.encode(errors="replace")  # in which `ast` counts columns
         self.recordings = skills.recordings
-        self.types = {s.recording.kind: {p.name: p.type for p in s.parameters} for s in skills.rows if s.recording}
+        self.types = {
+            s.recording.kind: {p.name: p.type for p in s.parameters} for s in skills.rows if s.recording
+        }
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
         looks = (kind for kind, row in self.recordings.items() if row.names == "object or person")
         self.look = next(looks, None)

@@ -12,7 +12,7 @@ from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
-from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
+from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words, takes_nothing
 from codebotler.rtl.text.claims import Claim, Number, Time
 
 Form: TypeAlias = Literal["base", "past", "ing"]
@@ -24,6 +24,7 @@ _LOOKS: Mapping[bool, Mapping[Form, str]] = {
 _MOST_LISTED = 5
 _TEXT = r"[\w ',;:!%@&/-]+"
 _ALTERNATIVES = re.compile(rf"{_TEXT}(?:\|{_TEXT})*")
+_EXACT = re.compile(r"\^([\w ]+)\$")
 _WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
 
 
@@ -53,6 +54,8 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
 
 
 def _wanted(element: EventPattern, thing: str) -> str:
+    if takes_nothing(element.kind):
+        return ""
     if element.kind == "goto":
         return room(element.text, "any" if thing == "anything" else "a")
     match element.text:
@@ -97,9 +100,7 @@ def event_words(event: Event) -> str:
 def done_to(event: Event, form: str, text: str | None = None) -> str:
     """A form of an event's verb, and to what it is done."""
     given = [brief(event.text if text is None else text), *map(brief, event.more)]
-    row = by_event(event.kind)
-    has_text = row is None or row.recording is None or bool(row.recording.text)
-    return verb(event.kind).with_object(form, given if has_text else [])
+    return verb(event.kind).with_object(form, [] if takes_nothing(event.kind) else given)
 
 
 def verb(kind: str) -> Verb:
@@ -160,6 +161,8 @@ def is_any(text: Text | None) -> bool:
 
 def named(pattern: str) -> str:
     """A regex as the plain texts it chooses between, or as it is."""
+    if exact := _EXACT.fullmatch(pattern):
+        return f'"{exact[1]}"'
     if _ALTERNATIVES.fullmatch(pattern):
         return f'"{brief(listed(pattern.split("|"), "or"))}"'
     if whole := _WHOLE_WORDS.fullmatch(pattern):

@@ -256,7 +256,7 @@ class SimulatedRobot:
                 raise UserError(
                     f"the world says that {call} gives {known!r}; {skill} returns {row.returns.words}"
                 )
-            return known
+            return plain(known)
         results = possible(row.returns)
         words = [f"gives {result!r}" if result is not None else "works" for result in results]
         number = self.lot(call, words, [f"fails: {when}" for _, when in row.fails])

@@ -160,7 +160,8 @@ class Console:
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
-            return check(program, room_map=room_map, pool=self._pool, house_rules=rules)
+            table = self.robot.skills
+            return check(program, room_map=room_map, pool=self._pool, house_rules=rules, skills=table)
 
 
 class Notifier:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from codebotler.cli.ending import STOPPED
+from codebotler.cli.options import SkillsOption
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -59,6 +60,7 @@ def evaluate(
     require_isolation: IsolationOption = False,
     one_process_per_run: ProcessOption = False,
     rules: RulesOption = None,
+    skills: SkillsOption = None,
     json: JsonOption = False,
 ) -> None:
     """Judge whether each completion does what was asked."""
@@ -71,7 +73,7 @@ def evaluate(
         from roboeval.evaluation.runs.results import Scope
         from roboeval.evaluation.runs.table import TableBuilder
 
-        judged_by = load(suite, rules)
+        judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
             judged_by = judged_by.with_worlds(worlds, seed).with_house_rules(judged_by.house)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)

@@ -144,13 +144,14 @@ def with_options_of(called: Callable[..., object]) -> Callable[[Command], Comman
 # --- what a user names
 
 
-def load(suite: str, rules: Path | None = None) -> Suite:
-    """Read a suite by name or folder, and the rules of a house."""
+def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
+    """Read a suite by name or folder, files of further skills, and the rules of a house."""
+    from codebotler.core.skills.files import skills_from
     from roboeval.suites.house import HouseRules
     from roboeval.suites.load import load_suite
 
-    read = load_suite(suite)
-    return read if rules is None else read.with_house_rules(HouseRules.read(rules))
+    read = load_suite(suite, skills=skills_from(*(skills or ())))
+    return read if rules is None else read.with_house_rules(HouseRules.read(rules, read.skills))
 
 
 def command(

@@ -177,7 +177,9 @@ class _Generation:
     async def _request(self, key: Key) -> None:
         _KEY.set(key)
         try:
-            prompt = prompt_for(self.plan.instruction(key), rules=self.plan.suite.house_sentences)
+            suite = self.plan.suite
+            wish, rules = self.plan.instruction(key), suite.house_sentences
+            prompt = prompt_for(wish, rules=rules, skills=suite.skills)
             await self._keep(key, await self._paced.reply(prompt, number=key[2]))
         except BudgetSpentError as error:
             self.progress.stopped = error.sentence

@@ -75,12 +75,13 @@ def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
 @of_codebotler
 def prompting(suite: str = "paper") -> Solver:
     """The prompt of `roboeval generate`: with the skills and some examples before the instruction."""
-    rules = load_suite(suite).house_sentences
+    known = load_suite(suite)
+    rules = known.house_sentences
 
     async def prompt(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - comes later
         state.messages = [
             getattr(model, f"ChatMessage{message.role.title()}")(content=message.text)
-            for message in prompt_for(state.input_text, rules=rules).messages
+            for message in prompt_for(state.input_text, rules=rules, skills=known.skills).messages
         ]
         return state
 

@@ -72,7 +72,7 @@ def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: SamplingS
     fixed = {
         "model": model,
         "settings": {name: value for name, value in asdict(settings).items() if name not in WITHOUT_EFFECT},
-        "template": template_hash(),
+        "template": template_hash(plan.suite.skills),
         "suite": plan.suite.name,
     }
     metadata = fixed | {

@@ -42,7 +42,7 @@ def _named(
         if (known := there.get(what)) is not None:
             found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
             yield from ((what, one, known) for one in found)
-        else:
+        elif not what:
             yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
         if element.holding is not None:
             yield from (("object", one, objects) for one in patterns(element.holding))

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from codebotler.checking.rules import read_rules
 from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.simulator.rule_guard import Rule
 
 
@@ -28,14 +30,14 @@ class HouseRules:
     digest: str
 
     @classmethod
-    def of_suite(cls, path: Path) -> HouseRules:
+    def of_suite(cls, path: Path, skills: SkillTable = SKILLS) -> HouseRules:
         """Read the rules that a suite brings."""
-        return cls("", read_rules(path), hashlib.sha256(path.read_bytes()).hexdigest())
+        return cls("", read_rules(path, skills), hashlib.sha256(path.read_bytes()).hexdigest())
 
     @classmethod
-    def read(cls, path: Path) -> HouseRules:
+    def read(cls, path: Path, skills: SkillTable = SKILLS) -> HouseRules:
         """Read a file of rules; a UserError if it cannot be used."""
-        rules = read_rules(path)
+        rules = read_rules(path, skills)
         if not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(
                 "its name is used for files; write it in small letters, digits and dashes", file=path

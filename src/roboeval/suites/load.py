@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 
 from codebotler.core.errors import UserError
+from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
@@ -128,7 +129,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
 
     Args:
         name: of a suite that ships with RoboEval, or that an installed package brings, or its folder.
-        skills: what can stand in formulas.
+        skills: what can stand in formulas, besides those of files that the suite names.
 
     Raises:
         UserError: there is no such suite, or one of its files is wrong.
@@ -170,7 +171,7 @@ def task_files(folder: Path) -> list[Path]:
 
 def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
     """The suite in a folder; its files are read again only if they have changed."""
-    files = [*sorted(folder.glob("*.yaml")), *task_files(folder)]
+    files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("*.py")), *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
     return _suite_of(folder, skills, count, seed, versions)
@@ -195,7 +196,9 @@ def _suite_of(
     count, seed = count or head.worlds, head.seed if seed is None else seed
     documents = [YamlFile.read(path) for path in paths]
     words = head.rules.words_for_people
-    house = None if head.house_rules is None else HouseRules.of_suite(folder / head.house_rules)
+    own = [folder / name for name in head.skills]
+    skills = skills.with_skills(skills_from(*own)) if own else skills
+    house = None if head.house_rules is None else HouseRules.of_suite(folder / head.house_rules, skills)
     lenders = [_lender(file, head.instructions, path) if head.instructions else None for path in paths]
     tasks = [
         read_task(document, path, skills, lender=lender, count=count, seed=seed, words=words)
@@ -209,7 +212,7 @@ def _suite_of(
         rules=head.rules.rules(),
         tasks={task.name: task for task in tasks},
         digest=_digest(
-            [file, *documents, *(lender for lender in lenders if lender is not None)], tasks, house
+            [file, *documents, *(lender for lender in lenders if lender is not None)], tasks, house, own
         ),
         house=house,
         folder=folder,
@@ -228,9 +231,12 @@ def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
     return YamlFile.read(lender)
 
 
-def _digest(files: list[YamlFile], tasks: list[Task], house: HouseRules | None) -> str:
+def _digest(
+    files: list[YamlFile], tasks: list[Task], house: HouseRules | None, skills: Sequence[Path]
+) -> str:
     """A hash of what the files say, and of the worlds that were drawn."""
     content: list[object] = [file.data for file in files]
+    content += [hashlib.sha256(path.read_bytes()).hexdigest() for path in skills]
     if house is not None:
         content.append(house.digest)
     drawn = (scenario for task in tasks if task.drawn for scenario in task.scenarios)

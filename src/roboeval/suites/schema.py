@@ -219,3 +219,4 @@ class SuiteFile(_Form):
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     rules: RulesFile = RulesFile()
     house_rules: Name | None = None  # a file of the suite: no program may break its rules
+    skills: list[Name] = []  # files of the suite that declare further skills

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.cli.run import checked
+from codebotler.cli.run import checker
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, State
 from codebotler.missions.mission import Mission, MissionError
@@ -192,7 +193,7 @@ def test_rules_hold_in_a_building_of_more_rooms_than_a_check_takes(tmp_path: Pat
     robot = knowing(*rooms.rooms)
     program = "def task_program():\n    go_to('into the vault')\n"
     session = MissionSession(
-        robot, tmp_path, Order(program=program), open_model=recorded, check=checked, rules=(rule,)
+        robot, tmp_path, Order(program=program), open_model=recorded, check=checker(SKILLS), rules=(rule,)
     )
     session.start()
     view = session.wait_until(lambda now: now.may_be_approved)
@@ -208,7 +209,7 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
         tmp_path,
         Order(program=STUBBORN),
         open_model=recorded,
-        check=checked,
+        check=checker(SKILLS),
         rules=(VAULT,),
     )
     session.start()
@@ -227,7 +228,7 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
 def test_a_rule_that_was_switched_off_is_in_force_for_what_a_model_writes_next(tmp_path: Path) -> None:
     order = Order(next(iter(recorded("recorded").replies)), "recorded")
     session = MissionSession(
-        knowing("hall", "vault"), tmp_path, order, open_model=recorded, check=checked, rules=(VAULT,)
+        knowing("hall", "vault"), tmp_path, order, open_model=recorded, check=checker(SKILLS), rules=(VAULT,)
     )
     session.start()
     session.wait_until(lambda now: now.may_be_approved)

@@ -113,7 +113,7 @@ def skill(
     Raises:
         UserError: it cannot be a skill; the sentence names the file and the line.
     """
-    said = {
+    said: dict[str, Any] = {
         "verb": verb,
         "past": past,
         "results": results,

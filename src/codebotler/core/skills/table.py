@@ -6,9 +6,10 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import Any, SupportsIndex
+from typing import Any, NoReturn, SupportsIndex
 
-from codebotler.core.skills.values import TEXT, ValueType
+from codebotler.core.errors import UserError
+from codebotler.core.skills.values import TEXT, ValueType, possible, written_call
 from codebotler.core.skills.verbs import Verb
 
 
@@ -108,14 +109,27 @@ class Skill:
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
         """By its name where that is in its module: there, the name of the function is that of the skill."""
-        module = getattr(self.does, "__module__", "")
-        if getattr(sys.modules.get(module), self.name, None) is self:
-            return _declared_in, (module, self.name)
+        name = getattr(self.does, "__module__", "")
+        module = sys.modules.get(name)
+        if module is not None and getattr(module, self.name, None) is self:
+            return _declared_in, (module.__file__ if name.startswith(OWN) else name, self.name)
         return super().__reduce_ex__(protocol)
 
     def doing(self, does: Callable[..., Any]) -> Skill:
         """The same skill, which does something else."""
         return replace(self, does=does, is_idle=False)
+
+    @property
+    def call(self) -> str:
+        """A call of it that models are shown."""
+        return self.example or written_call(self.name, [_sample(each) for each in self.parameters])
+
+    def wrong(self, sentence: str) -> NoReturn:
+        """Raise a UserError that names the file and the line of its function."""
+        code = getattr(getattr(self.does, "__wrapped__", self.does), "__code__", None)
+        if code is None:
+            raise UserError(sentence)
+        raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
 
     @property
     def signature(self) -> str:
@@ -124,7 +138,25 @@ class Skill:
         return f"{self.name}({arguments}) -> {self.returns.annotation}"
 
 
+def _sample(parameter: Parameter) -> object:
+    """A value that a parameter takes: its name, where it is a text."""
+    value = parameter.type
+    if value.choices:
+        one: object = value.choices[0]
+    else:
+        one = parameter.name if value.base == "str" else possible(replace(value, is_list=False))[0]
+    return [one] if value.is_list else one
+
+
+OWN = "codebotler_skills_"
+"""How the names of modules begin that files of a user's own skills are."""
+
+
 def _declared_in(module: str, name: str) -> Skill:
+    if module.endswith(".py"):
+        from codebotler.core.skills.files import skill_in  # noqa: PLC0415 - which needs this module
+
+        return skill_in(module, name)
     found: Skill = getattr(import_module(module), name)
     return found
 
@@ -176,6 +208,10 @@ class SkillTable(Mapping[str, Skill]):
     def with_skill(self, skill: Skill) -> SkillTable:
         """This table and one more row."""
         return SkillTable((*self.rows, skill))
+
+    def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
+        """This table and those rows of another one that it lacks."""
+        return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def doing(self, **does: Callable[..., Any]) -> SkillTable:
         """The same skills, of which some do something else."""

@@ -159,4 +159,6 @@ def as_text(value: object) -> str:
     """An argument as events and rules have it: `3`, `0.5`, `red`, `true`, `cup, plate`."""
     if isinstance(value, list | tuple):
         return ", ".join(map(as_text, value))
+    if isinstance(value, float) and value.is_integer():
+        return f"{value:.0f}"
     return str(value).lower() if isinstance(value, bool) else str(value)

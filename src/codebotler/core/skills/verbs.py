@@ -85,7 +85,8 @@ class Verb:
         """A form of the verb with what it is done to, in quotes where there are no words around it."""
         if not self.object:
             return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
-        return f"{form} {self.object.format(*arguments)}"
+        missing = ["something"] * (self.object.count("{") - len(arguments))
+        return f"{form} {self.object.format(*arguments, *missing)}"
 
 
 def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], past: str = "") -> Verb:

@@ -186,7 +186,7 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     Raises:
         UserError: there is no such model or suite, or the model knows none of its instructions.
     """
-    model = recorded_model(name)
+    model = recorded_model(name, None if suite.folder is None else suite.folder / "solutions")
     found = False
     for task in suite.tasks.values():
         for prompt, instruction in enumerate(task.prompts):

@@ -1,0 +1,91 @@
+"""Files of a user's own skills; they are the user's code, and run in this process."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from traceback import extract_tb
+from types import ModuleType
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import OWN, Skill, SkillTable
+
+
+def skills_from(*files: Path | str) -> SkillTable:
+    """The eight skills of the paper, and those that files declare with `@skill`.
+
+    Args:
+        files: Python files, which are run.
+
+    Raises:
+        UserError: a file cannot be run, declares no skill, or one whose name is taken.
+    """
+    rows = [*SKILLS.rows]
+    for file in files:
+        path = Path(file)
+        found = declared_in(path)
+        if not found:
+            raise UserError("it declares no skill; put @skill above a function", file=path)
+        for row in found:
+            _expect_new(row, rows)
+            rows.append(row)
+    return SkillTable(tuple(rows)) if files else SKILLS
+
+
+def declared_in(path: Path) -> list[Skill]:
+    """The skills that a file declares, in its order."""
+    module = loaded(path)
+    found = [value for value in vars(module).values() if isinstance(value, Skill)]
+    return [row for row in found if getattr(row.does, "__module__", "") == module.__name__]
+
+
+def skill_in(path: str, name: str) -> Skill:
+    """A skill of a file by its name, in another process, say."""
+    found: Skill = getattr(loaded(Path(path)), name)
+    return found
+
+
+def loaded(path: Path) -> ModuleType:
+    """The module of a file, which is run once."""
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"it cannot be read ({error.strerror})", file=path) from None
+    where = str(path.resolve())
+    name = OWN + hashlib.sha256(where.encode() + b"\0" + source).hexdigest()[:16]
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = spec_from_loader(name, None, origin=where)
+    assert spec is not None, "it has a name"
+    module = module_from_spec(spec)
+    module.__file__ = where
+    sys.modules[name] = module
+    try:
+        exec(compile(source, str(path), "exec", dont_inherit=True), vars(module))  # noqa: S102 - the user's own code
+    except Exception as error:  # noqa: BLE001 - whatever the file raises
+        del sys.modules[name]
+        raise _refused(path, error) from None
+    return module
+
+
+def _refused(path: Path, error: Exception) -> UserError:
+    """Why a file cannot be used, by the line at which it failed."""
+    if isinstance(error, UserError):
+        return error
+    if isinstance(error, SyntaxError):
+        return UserError(f"it is no Python: {error.msg}", file=path, line=error.lineno)
+    lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
+    return UserError(
+        f"it cannot be run: {type(error).__name__}: {error}", file=path, line=lines[-1] if lines else None
+    )
+
+
+def _expect_new(row: Skill, rows: list[Skill]) -> None:
+    kinds = {other.recording.kind for other in rows if other.recording is not None}
+    if row.name in {other.name for other in rows}:
+        row.wrong(f"there is a skill {row.name} already; choose another name")
+    if row.recording is not None and row.recording.kind in kinds:
+        row.wrong(f'the events of another skill are called "{row.recording.kind}"; choose another name')
