@@ -9,7 +9,7 @@ import symtable
 import threading
 import warnings
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
 from itertools import islice
@@ -17,7 +17,6 @@ from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill, SkillTable
-from codebotler.core.skills.values import TEXT
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
@@ -43,6 +42,7 @@ class Flaw:
     line: int | None  # counted from 1; None where no line is to blame
     kind: str  # of the failure that it leads to, such as `NameError` or `AskEmptyOptions`
     message: str  # one plain sentence
+    is_misuse: bool = False  # of one of a user's own skills, which no `except` makes right
 
 
 @dataclass(frozen=True)
@@ -275,7 +275,8 @@ def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
     for node in nodes(tree):
         match node:
             case ast.Call(ast.Name(name)) if name in skills and name not in rebound:
-                yield from _wrong_call(node, skills[name])
+                is_own = name not in SKILLS
+                yield from (replace(flaw, is_misuse=is_own) for flaw in _wrong_call(node, skills[name]))
 
 
 def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
@@ -291,7 +292,7 @@ def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
     for parameter in skill.parameters:
         if parameter.is_options:
             yield from _wrong_options(given[parameter.name], skill, parameter)
-        elif parameter.type != TEXT:
+        elif skill.name not in SKILLS:
             yield from _wrong_value(given[parameter.name], skill, parameter)
 
 

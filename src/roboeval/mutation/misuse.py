@@ -1,0 +1,82 @@
+"""Operators about a user's own skills: wrong values, errors that nobody handles, steps left out."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from typing import Any
+
+from codebotler.core.skills.declaration import by_name
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill
+from roboeval.mutation.operator import Context, Edits
+from roboeval.mutation.program_tree import ProgramTree, skill_of
+
+OTHER_TYPE: dict[str, Any] = {"str": 3, "int": "three", "float": "0.5", "bool": "yes"}
+NO_CHOICE: dict[str, Any] = {"str": "anything", "int": 1_000, "float": 1_000.5}
+
+
+def pass_another_type(program: ProgramTree, _: Context) -> Edits:
+    """Passes a value of another type."""
+    for node, skill in _own_calls(program):
+        for argument, parameter in zip(node.args, skill.parameters, strict=False):
+            value = OTHER_TYPE[parameter.type.base or "str"]
+            yield {argument: ast.Constant(value)}
+
+
+def pass_no_choice(program: ProgramTree, _: Context) -> Edits:
+    """Passes a value that is not among those from which the skill chooses."""
+    for node, skill in _own_calls(program):
+        for argument, parameter in zip(node.args, skill.parameters, strict=False):
+            if parameter.type.choices:
+                yield {argument: ast.Constant(NO_CHOICE[parameter.type.base or "str"])}
+
+
+def forget_an_argument(program: ProgramTree, _: Context) -> Edits:
+    """Forgets the last argument."""
+    for node, _skill in _own_calls(program):
+        if node.args:
+            yield {node: ast.Call(node.func, node.args[:-1], node.keywords)}
+
+
+def handle_no_error(program: ProgramTree, _: Context) -> Edits:
+    """Does not handle the errors of a skill."""
+    for node in program.nodes:
+        if isinstance(node, ast.Try) and any(
+            _is_own(inner) for part in node.body for inner in ast.walk(part)
+        ):
+            yield {node: [*node.body, *node.orelse, *node.finalbody]}
+
+
+def skip_a_step(program: ProgramTree, _: Context) -> Edits:
+    """Leaves out a step that others may need."""
+    return ({node: []} for node in program.nodes if isinstance(node, ast.Expr) and _is_own(node.value))
+
+
+def take_a_step_again(program: ProgramTree, _: Context) -> Edits:
+    """Does a step twice."""
+    for node in program.nodes:
+        if isinstance(node, ast.Expr) and _is_own(node.value):
+            yield {node: [node, node]}
+
+
+def ask_for_success_in_vain(program: ProgramTree, _: Context) -> Edits:
+    """Goes on as if a skill had succeeded."""
+    for node in program.nodes:
+        match node:
+            case ast.If(test, body) if _is_own(test):
+                yield {node: [ast.Expr(test), *body]}
+            case ast.If(ast.UnaryOp(ast.Not(), test)) if _is_own(test):
+                yield {node: ast.Expr(test)}
+
+
+def _own_calls(program: ProgramTree) -> Iterator[tuple[ast.Call, Skill]]:
+    for node in program.nodes:
+        if isinstance(node, ast.Call) and _is_own(node):
+            skill = by_name(skill_of(node) or "")
+            assert skill is not None, "it calls a skill"
+            yield node, skill
+
+
+def _is_own(node: ast.AST) -> bool:
+    return (name := skill_of(node)) is not None and name not in SKILLS
