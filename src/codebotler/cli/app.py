@@ -173,6 +173,32 @@ def rules(
 
 
 @app.command()
+def skills(
+    file: Annotated[
+        Path | None, typer.Argument(help="A Python file of your own skills, which is run.")
+    ] = None,
+    new: Annotated[
+        Path | None, typer.Option("--new", help="Write a commented start of such a file.", metavar="FILE")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Show skills as models see them, and try each in imagined worlds."""
+    from codebotler.cli.skills import data, view, write_new
+    from codebotler.core.skills.files import skills_from
+    from codebotler.core.terminal import print_json, print_rich
+
+    if new is not None:
+        write_new(new)
+        note(f"{new} is written; `codebotler skills {new}` shows what is in it")
+        return
+    table = skills_from(*([] if file is None else [file]))
+    if json:
+        print_json(data(table))
+    else:
+        print_rich(view(table))
+
+
+@app.command()
 def run(
     program: Annotated[
         str,
@@ -240,12 +266,14 @@ def missions(
         Path | None, typer.Option(help="Write the mission and its program to this MCAP file, for Foxglove.")
     ] = None,
     clock: Annotated[str, typer.Option(help="With --mcap: wall, or robot for simulated time.")] = "wall",
+    skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """List past missions, or show what happened in one."""
     from codebotler.cli.missions import show_mission, show_missions, write_mission
     from codebotler.core.errors import UserError
     from codebotler.core.files import home
+    from codebotler.core.skills.files import skills_from
 
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; name it, or `last`")
@@ -253,12 +281,14 @@ def missions(
         raise UserError("--mcap and --json exclude each other; give one of them")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
+    table = skills_from(*(skills or ()))
     if mission is None:
         show_missions(home(), json=json)
     elif mcap is None:
         show_mission(home(), mission, json=json)
     else:
-        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall")
+        by = "robot" if clock == "robot" else "wall"
+        write_mission(home(), mission, mcap, clock=by, skills=table)
 
 
 @app.command()
@@ -384,6 +414,7 @@ def virtual_robot(
     ros_python: Annotated[
         Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
     ] = options.ROS_PYTHON,
+    skills: options.SkillsOption = None,
 ) -> None:
     """Offer a simulated robot's skills on ROS 1.
 
@@ -391,6 +422,7 @@ def virtual_robot(
     """
     from contextlib import suppress
 
+    from codebotler.core.skills.files import skills_from
     from codebotler.core.world import World
     from codebotler.robots.ros.virtual import VirtualRobot
 
@@ -398,7 +430,8 @@ def virtual_robot(
         with suppress(OSError):  # the robot goes on where nobody reads any more
             print_text(line)
 
-    robot = VirtualRobot(World.read(world), speed=speed, port=port, python=ros_python, show=show)
+    known, table = World.read(world), skills_from(*(skills or ()))
+    robot = VirtualRobot(known, speed=speed, port=port, python=ros_python, show=show, skills=table)
     try:
         started = robot.start()
         what = "a ROS master was started" if started else "joined the ROS master"

@@ -142,14 +142,19 @@ def _about(summary: Summary) -> dict[str, str]:
 
 
 def export(
-    path: Path, summary: Summary, events: Sequence[Line], clock: Clock, folder: Path | None = None
+    path: Path,
+    summary: Summary,
+    events: Sequence[Line],
+    clock: Clock,
+    folder: Path | None = None,
+    skills: SkillTable = SKILLS,
 ) -> None:
     """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
     path.parent.stat()  # no folder is created where a name is mistyped
     whole = io.BytesIO()
-    write_mcap(whole, summary, events, folder=folder, clock=clock)
+    write_mcap(whole, summary, events, folder=folder, clock=clock, skills=skills)
     if path.exists() and not path.is_file():
         path.write_bytes(whole.getvalue())
         return

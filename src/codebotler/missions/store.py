@@ -9,9 +9,9 @@ from contextlib import closing
 from pathlib import Path
 
 from codebotler.core.errors import UserError
+from codebotler.core.skills.values import written_call
 from codebotler.core.terminal import note, system_sentence, visible
 from codebotler.missions.log import SUMMARY, Line, State, Summary, add_event, doing, events_of, log_of
-from codebotler.missions.wording import call_text
 
 ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
@@ -92,7 +92,7 @@ def _how(summary: Summary, events: list[Line]) -> str:
     skill = doing(events)
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"
-    going = call_text(skill["skill"], list(skill["arguments"].values()))
+    going = written_call(skill["skill"], list(skill["arguments"].values()))
     where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
     where = f" ({where})" if where else ""
     return f"CodeBotler ended unexpectedly during {going}{where}; {summary.if_tool_dies}"

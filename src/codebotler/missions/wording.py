@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 from codebotler.core.program import nodes, tree_of
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.table import Recording
-from codebotler.core.skills.values import as_text
+from codebotler.core.skills.values import as_text, written_call
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import trace_from
 from codebotler.core.words import brief, room_name
@@ -76,19 +76,10 @@ def _given(recording: Recording, line: Line) -> list[str]:
     return [shortened(as_text(line["arguments"][name]), 100) for name in names]
 
 
-def call_text(skill: str, arguments: Sequence[str | Sequence[str]]) -> str:
-    """A call of a skill as a program would write it."""
-    quoted = [[f'"{text}"' for text in ([a] if isinstance(a, str) else a)] for a in arguments]
-    texts = [
-        q[0] if isinstance(a, str) else f"[{', '.join(q)}]" for a, q in zip(arguments, quoted, strict=True)
-    ]
-    return f"{skill}({', '.join(texts)})"
-
-
 def _skill(line: Line) -> str:
     skill, arguments = by_name(line["skill"]), line["arguments"]
     if skill is None or skill.verb is None:
-        return shortened(call_text(line["skill"], list(arguments.values())))
+        return shortened(written_call(line["skill"], list(arguments.values())))
     if skill.recording is None:
         return skill.verb.third
     if skill.recording.more or not skill.recording.text:

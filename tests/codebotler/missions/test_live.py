@@ -11,11 +11,10 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
-from codebotler.core.skills.values import TEXT, ValueType
+from codebotler.core.skills.values import TEXT, ValueType, written_call
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.missions.wording import call_text
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, Result, RobotLostError
 from codebotler.robots.simulated import Simulated
@@ -212,7 +211,7 @@ def test_ninth_skill_needs_nothing_here() -> None:
 
 
 def test_call_in_words() -> None:
-    assert call_text("ask", ["ann", "Tea?", ("Yes", "No")]) == 'ask("ann", "Tea?", ["Yes", "No"])'
+    assert written_call("ask", ["ann", "Tea?", ("Yes", "No")]) == 'ask("ann", "Tea?", ["Yes", "No"])'
 
 
 # --- the stop

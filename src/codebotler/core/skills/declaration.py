@@ -21,6 +21,7 @@ RTL_WORDS = frozenset(
 )
 """What formulas call other things by than events."""
 _DECLARED: dict[str, Skill] = {}
+PAPER = "codebotler.core.skills.paper"
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
 
@@ -161,7 +162,9 @@ class _Declaration:
             fails=tuple(fails.items()),
             example=self.said["example"],
         )
-        _DECLARED[self.name] = row
+        known = _DECLARED.get(self.name)
+        if known is None or getattr(known.does, "__module__", "") != PAPER:
+            _DECLARED[self.name] = row
         return row
 
     def wrong(self, sentence: str) -> NoReturn:

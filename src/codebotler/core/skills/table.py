@@ -55,6 +55,10 @@ class Recording:
         return self.names == "room"
 
 
+PACKAGE = "robot_actions_pkg"
+"""Of the actions of the paper's skills."""
+
+
 @dataclass(frozen=True)
 class RosAction:
     """The ROS action that carries a skill to a robot (paper, section III.C)."""
@@ -64,7 +68,12 @@ class RosAction:
     goal: tuple[str, ...] = ()  # its fields, in the order of the skill's parameters
     result: str | None = None  # the type of its only field, if it has one
     failure: str = ""  # the kind of its only error; if it is empty, the robot names the kind
-    package: str = "robot_actions_pkg"
+    package: str = PACKAGE
+
+    @property
+    def full_type(self) -> str:
+        """Its name, with the package if that is another one."""
+        return self.type if self.package == PACKAGE else f"{self.package}/{self.type}"
 
     @property
     def definition(self) -> str:

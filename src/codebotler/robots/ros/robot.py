@@ -221,7 +221,7 @@ def ros_readiness(
 def actions_of(skills: SkillTable) -> Message:
     """Type, server and definition of the action of each skill that has one, as a worker reads them."""
     return {
-        skill.name: {"type": ros.type, "server": ros.server, "definition": ros.definition}
+        skill.name: {"type": ros.full_type, "server": ros.server, "definition": ros.definition}
         for skill in skills.rows
         if (ros := skill.ros) is not None
     }

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
 from codebotler.robots.ros.robot import actions_of
@@ -34,6 +35,7 @@ class VirtualRobot:
         port: of the master; None for that of ROS_MASTER_URI.
         python: an interpreter that has rospy, and rosmaster if a master must be started.
         show: called with a line for each goal and for its end.
+        skills: what it offers.
 
     Raises:
         UserError: the speed is out of range, or ROS_MASTER_URI is invalid.
@@ -47,7 +49,9 @@ class VirtualRobot:
         port: int | None = None,
         python: Path = ROS_PYTHON,
         show: Callable[[str], None] = lambda _: None,
+        skills: SkillTable = SKILLS,
     ) -> None:
+        self._skills = skills
         self._speed, self._python, self._show = speed, python, show
         self.address = master_uri(f"http://localhost:{port}" if port else "")
         self._body = self._at_start(world)
@@ -70,7 +74,7 @@ class VirtualRobot:
         environment = {"ROS_MASTER_URI": self.address}
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
-        start = {"node": NODE, "actions": actions_of(SKILLS), "port": port}
+        start = {"node": NODE, "actions": actions_of(self._body.skills), "port": port}
         worker = self._worker = RosWorker(self._python, "servers.py", start, environment)
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
@@ -98,7 +102,7 @@ class VirtualRobot:
             thread.join(HEARS)
 
     def _at_start(self, world: World) -> Simulated:
-        body = Simulated(world, speed=self._speed)
+        body = Simulated(world, speed=self._speed, skills=self._skills)
         body.connect()
         return body
 

@@ -8,7 +8,7 @@ import xmlrpc.client
 from typing import Any
 
 from channel import SetupError
-from message_types import PACKAGE
+from message_types import parts_of
 
 LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
 MASTER_ANSWERS, NODE_ANSWERS = 5.0, 2.0  # seconds
@@ -98,7 +98,7 @@ class Ros1Graph:
         address = self.address_of(nodes[0])
         if address is None or not is_alive(address):
             return f"the action server at {server} (node {nodes[0]}) has died; start it again"
-        action = f"{PACKAGE}/{type_name}Action"
+        action = "/".join(parts_of(type_name)) + "Action"
         return (
             f"the action server at {server} (node {nodes[0]}) is running, but does not accept our "
             f"messages: its definition of {action} differs (another md5; compare with `rosmsg md5 "

@@ -25,27 +25,43 @@ PICTURES = {
 
 
 def message_types(actions: list[Message]) -> dict[str, Any]:
-    """Action types by name, from rows with a `type` and the `definition` of an .action file."""
-    try:
-        module = importlib.import_module(PACKAGE + ".msg")
-    except ImportError:
-        package, module = types.ModuleType(PACKAGE), types.ModuleType(PACKAGE + ".msg")
-        package.msg = module  # type: ignore[attr-defined]  # as an import would
-        sys.modules[PACKAGE], sys.modules[PACKAGE + ".msg"] = package, module
+    """Action types by their `type`, from rows with this and the `definition` of an .action file."""
+    found = {}
     for action in actions:
-        if not hasattr(module, action["type"] + "Action"):
-            build(module, action["type"], action["definition"])
-    return {action["type"]: getattr(module, action["type"] + "Action") for action in actions}
+        package, name = parts_of(action["type"])
+        module = _messages_of(package)
+        if not hasattr(module, name + "Action"):
+            build(module, package, name, action["definition"])
+        found[action["type"]] = getattr(module, name + "Action")
+    return found
 
 
-def build(module: types.ModuleType, name: str, definition: str) -> None:
-    """Add the seven message classes of an action to a module."""
+def parts_of(kind: str) -> tuple[str, str]:
+    """The package and the name of an action's type; without a package, it is in ours."""
+    package, _, name = kind.rpartition("/")
+    return package or PACKAGE, name
+
+
+def _messages_of(package: str) -> types.ModuleType:
+    """The module of a package's messages, an empty one if it is not installed."""
+    try:
+        return importlib.import_module(package + ".msg")
+    except ImportError:
+        whole, module = types.ModuleType(package), types.ModuleType(package + ".msg")
+        whole.msg = module  # type: ignore[attr-defined]  # as an import would
+        sys.modules[package], sys.modules[package + ".msg"] = whole, module
+        return module
+
+
+def build(module: types.ModuleType, package: str, name: str, definition: str) -> None:
+    """Add the seven message classes of an action to a module of a package."""
     import actionlib_msgs.msg
     import std_msgs.msg
 
-    module.__dict__[PACKAGE] = sys.modules[PACKAGE]
+    module.__dict__[package] = sys.modules[package]
     known = (std_msgs.msg.Header, actionlib_msgs.msg.GoalID, actionlib_msgs.msg.GoalStatus)
-    _define(module, ((f"{PACKAGE}/{name}{part}", text) for part, text in _parts(name, definition)), known)
+    parts = ((f"{package}/{name}{part}", text) for part, text in _parts(name, definition))
+    _define(module, parts, known)
 
 
 @lru_cache(maxsize=None)
@@ -87,7 +103,7 @@ def _define(module: types.ModuleType, definitions: Iterable[Any], known: Iterabl
     specs = [genmsg.msg_loader.load_msg_from_string(context, text, name) for name, text in definitions]
     for spec in specs:
         code = "\n".join(genpy.generator.msg_generator(context, spec, {}))
-        code = code.replace(f"import {PACKAGE}.msg\n", "")  # the module itself, still being filled
+        code = code.replace(f"import {spec.package}.msg\n", "")  # the module itself, still being filled
         exec(compile(code, f"<{spec.full_name}>", "exec"), module.__dict__)  # noqa: S102 - genpy's own code
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
-from message_types import PACKAGE
+from message_types import parts_of
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
@@ -58,8 +58,9 @@ class Ros2Graph:
 
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with an action server."""
+        kind = "/action/".join(parts_of(type_name))
         return (
-            f"there is no action server of {PACKAGE}/action/{type_name} at {server}; start it, or compare "
+            f"there is no action server of {kind} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
@@ -85,7 +86,8 @@ class Ros2Server:
         goal, result, _ = action["definition"].split("---\n")
         self.fields = [line.split()[1] for line in goal.splitlines()]
         self.returns = [line.split()[1] for line in result.splitlines()]
-        self.spec = getattr(importlib.import_module(f"{PACKAGE}.action"), self.type)
+        package, name = parts_of(self.type)
+        self.spec = getattr(importlib.import_module(f"{package}.action"), name)
         self.client = rclpy.action.ActionClient(node, self.spec, self.name)
         self._cancel_all = node.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         self._request = CancelGoal.Request

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from channel import Message
-from message_types import PACKAGE
+from message_types import parts_of
 
 AT_ONCE = {"secs": 0, "nsecs": 0}
 ENDS_ROS1 = {2: "cancelled", 3: "succeeded", 4: "aborted", 5: "rejected", 8: "cancelled", 9: "lost"}
@@ -39,7 +39,7 @@ class Ros1Protocol:
 
     def opening(self, server: str, action: str) -> Iterator[Message]:
         """Advertise what we publish, and subscribe to the rest."""
-        kind = f"{PACKAGE}/{action}Action"
+        kind = "/".join(parts_of(action)) + "Action"
         ours = {"goal": f"{kind}Goal", "cancel": "actionlib_msgs/GoalID"}
         theirs = {
             "result": f"{kind}Result",
@@ -94,7 +94,7 @@ class Ros2Protocol:
             "op": "send_action_goal",
             "id": goal,
             "action": server,
-            "action_type": f"{PACKAGE}/action/{action}",
+            "action_type": "/action/".join(parts_of(action)),
             "args": fields,
             "feedback": True,
         }

@@ -1,0 +1,155 @@
+"""`codebotler skills`: shows skills as models see them, tries each, and begins a file of your own."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.syntax import Syntax
+from rich.text import Text
+
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.program import parse_expression
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.terminal import visible
+from codebotler.core.trace import Event, Option
+from codebotler.core.words import listed
+from codebotler.prompts.rendering import stub
+from codebotler.rtl.wording import done_to, verb
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.sampled_robot import Lot, RoomMap, SampledRobot
+
+TRIES = 40  # worlds in which each skill is tried
+ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
+NEW = '''\
+"""What this robot can do besides the eight skills; `codebotler skills {name}` shows it as a model sees it."""
+
+from codebotler import Simulation, skill
+
+
+@skill(
+    verb="open {{door}}",  # for people: opens, opened, opening ...
+    results=("it did not move", "it opened"),  # what False and True mean
+    fails={{"DoorLocked": "the door is locked"}},  # an exception in the program
+    ros="lab_msgs/OpenDoor:/open_door",  # package/Type:/topic, if a ROS robot has it
+    example='open_door("glass door")',  # a call that models are shown
+)
+def open_door(sim: Simulation, door: str) -> bool:  # str, int, float, bool, Literal, an Enum, lists
+    """Open a door of the room; False if it did not move."""
+    # What the simulation does. A fact is in a world file under `truths`; otherwise it is drawn by lot.
+    if sim.truth(f"{{door}} is locked"):
+        sim.fail("DoorLocked")
+    return sim.truth(f"{{door}} opens")
+
+
+@skill(verb="measure the temperature", is_idle=True)
+def temperature(sim: Simulation) -> float:
+    """Measure the temperature in the room, in degrees Celsius."""
+    ...  # nothing is simulated: the result is drawn by lot
+'''
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What has come of a skill in some of the worlds in which it was tried."""
+
+    outcome: str  # in words
+    facts: tuple[str, ...]  # of the first of these worlds
+    event: Event | None
+
+
+def write_new(path: Path) -> None:
+    """Write a commented start of a file of skills; a UserError if there is such a file."""
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(NEW.format(name=path))
+    except FileExistsError:
+        raise UserError("it is there already; choose another name", file=path) from None
+
+
+def tried(row: Skill, skills: SkillTable) -> list[Trial]:
+    """What comes of the example of a skill in imagined worlds, each different outcome once."""
+    arguments = _example(row)
+    found: dict[str, Trial] = {}
+    for number in range(TRIES):
+        robot = SampledRobot(ROOMS, FactSampler(0, number), skills=skills)
+        try:
+            result: Any = robot.perform(row.name, arguments)
+            options = [given for given, one in zip(arguments, row.parameters, strict=True) if one.is_options]
+            result = options[0][result].text if options else result
+            outcome = "works" if result is None else f"returns {result!r}"
+        except RobotError as error:
+            outcome = f"fails with {error.kind}: {str(error).removeprefix(f'{row.name}: ')}"
+        event = robot.trace[-1] if robot.trace else None
+        told = [fact for fact in robot.facts if not (isinstance(fact, Lot) and fact.statement == row.call)]
+        facts = tuple(fact.sentence for fact in told)
+        found.setdefault(outcome, Trial(outcome, facts, event))
+    return list(found.values())
+
+
+def _example(row: Skill) -> list[Any]:
+    """The arguments of the example, by position; a UserError if it is no call of the skill."""
+    node = parse_expression(row.call)
+    if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == row.name):
+        row.wrong(f"the example of {row.name} is no call of it: {row.call}")
+    named = {keyword.arg: keyword.value for keyword in node.keywords}
+    given: list[Any] = []
+    for number, parameter in enumerate(row.parameters):
+        value = node.args[number] if number < len(node.args) else named.get(parameter.name)
+        try:
+            literal = None if value is None else ast.literal_eval(value)
+        except ValueError:
+            literal = None
+        if literal is None or not parameter.type.fits(literal):
+            row.wrong(f"{parameter.name} in the example of {row.name} must be {parameter.words}")
+        if parameter.is_options:
+            literal = [Option(text) for text in literal]
+        given.append(tuple(literal) if isinstance(literal, list) else literal)
+    return given
+
+
+def view(skills: SkillTable) -> RenderableType:
+    """The skills that are not the paper's, or all of these, as models see them, and what comes of each."""
+    own = [row for row in skills.rows if row not in SKILLS.rows]
+    return Group(*_lines(own or SKILLS.rows, skills))
+
+
+def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType]:
+    for number, row in enumerate(rows):
+        yield Text("\n" if number else "", end="")
+        yield Syntax(stub(row), "python", theme="ansi_dark", background_color="default", word_wrap=True)
+        trials = tried(row, skills)
+        by_lot = [one for one in trials if one.outcome.startswith("returns ") and not one.facts]
+        if len(by_lot) > 1:
+            values = listed([one.outcome.removeprefix("returns ") for one in by_lot], "or")
+            trials = [
+                replace(by_lot[0], outcome=f"returns {values}"),
+                *(t for t in trials if t not in by_lot),
+            ]
+        for trial in trials:
+            where = f", where {listed(trial.facts)}" if trial.facts else ""
+            yield Text(visible(f"  {row.call} {trial.outcome}{where}"), "dim")
+            if trial.event is not None and not trial.outcome.startswith("fails"):
+                yield Text(
+                    visible(f"    in words: {done_to(trial.event, verb(trial.event.kind).past)}"), "dim"
+                )
+
+
+def data(skills: SkillTable) -> list[dict[str, Any]]:
+    """The same as plain data."""
+    return [
+        {
+            "name": row.name,
+            "signature": row.signature,
+            "doc": row.doc,
+            "example": row.call,
+            "fails": dict(row.fails),
+            "tried": [{"outcome": one.outcome, "facts": list(one.facts)} for one in tried(row, skills)],
+        }
+        for row in skills.rows
+    ]
