@@ -10,6 +10,7 @@ __all__ = [
     "Generation",
     "ModelError",
     "Problem",
+    "RobotError",
     "Simulation",
     "UserError",
     "__version__",
@@ -25,7 +26,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from codebotler.checking.check import check
     from codebotler.checking.problems import Check, Problem
-    from codebotler.core.errors import UserError
+    from codebotler.core.errors import RobotError, UserError
     from codebotler.core.skills.declaration import skill
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.simulation import Simulation
@@ -42,7 +43,7 @@ else:  # each name is imported when it is first used
         {
             "checking.check": ["check"],
             "checking.problems": ["Check", "Problem"],
-            "core.errors": ["BadInput", "UserError"],
+            "core.errors": ["BadInput", "RobotError", "UserError"],
             "core.skills.declaration": ["skill"],
             "core.skills.files": ["skills_from"],
             "core.skills.simulation": ["Simulation"],

@@ -287,8 +287,7 @@ def missions(
     elif mcap is None:
         show_mission(home(), mission, json=json)
     else:
-        by = "robot" if clock == "robot" else "wall"
-        write_mission(home(), mission, mcap, clock=by, skills=table)
+        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall", skills=table)
 
 
 @app.command()

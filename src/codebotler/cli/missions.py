@@ -47,5 +47,5 @@ def write_mission(home: Path, name: str, path: Path, *, clock: Clock, skills: Sk
     recover(home)
     folder = find(home, name)
     summary, events = Summary.read(folder), events_of(folder)
-    export(path, summary, events, clock, folder, skills)
+    export(path, summary, events, clock, folder, skills=skills)
     note(f"wrote {len(events):,} events of mission {summary.id} to {path}")

@@ -21,7 +21,8 @@ def robot_names(incomplete: str) -> list[str]:
 RobotOption = Annotated[
     str,
     typer.Option(
-        help="Which robot: sim, or another that `codebotler robots` lists.", autocompletion=robot_names
+        help="Which robot: sim, another that `codebotler robots` lists, or your own: FILE.py:CLASS.",
+        autocompletion=robot_names,
     ),
 ]
 

@@ -16,6 +16,7 @@ from codebotler.cli.views import Watcher, ending, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
+from codebotler.core.words import listed
 from codebotler.missions.log import State
 from codebotler.missions.mission import GRACE, MissionError
 from codebotler.missions.session import MissionSession
@@ -76,6 +77,7 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
         stopped it.
     """
     program = read_program(request.what) if request.is_program else ""
+    tell_missing(robot)
     recover(home)
     order = Order(program=program) if program else Order(request.what, request.model)
     checked = checker(robot.skills)
@@ -92,6 +94,12 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
         raise
     session.join(GRACE)
     return 1
+
+
+def tell_missing(robot: Robot) -> None:
+    """Say what a robot lacks, as far as that is known before it is connected."""
+    if robot.missing:
+        note(f"{robot.name} lacks {listed(list(robot.missing))}; programs that need them fail")
 
 
 def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], Check]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from codebotler.cli.run import tell_missing
 from codebotler.core.files import home
 from codebotler.models.base import Model, SamplingSettings
 from codebotler.models.chosen import chosen_model
@@ -32,6 +33,7 @@ def serve(
 ) -> None:
     """Serve the page for a robot until Ctrl-C."""
     body = open_robot(robot, settings) if face is None else open_with_face(robot, settings, face)
+    tell_missing(body)
     world = settings.world
     console = Console(body, home(), open_model, models=models, world=world, face=face, rules=rules)
 

@@ -147,6 +147,7 @@ def export(
     events: Sequence[Line],
     clock: Clock,
     folder: Path | None = None,
+    *,
     skills: SkillTable = SKILLS,
 ) -> None:
     """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""

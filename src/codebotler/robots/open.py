@@ -10,6 +10,7 @@ from types import ModuleType
 from codebotler.core.errors import UserError, install_command, missing_package
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
 from codebotler.robots.face import Face, RobotWithFace, without_speech
+from codebotler.robots.own import OwnRobot, is_own
 
 KINDS = {
     "sim": "simulated",
@@ -26,13 +27,16 @@ Importing such a module is cheap. It has `readiness(ros_python)`, which takes le
 
 
 def open_robot(name: str, options: Options | None = None) -> Robot:
-    """A robot by its kind (sim, pyrobosim, ros1, rosbridge or ros2), not yet connected.
+    """A robot by its kind (sim, pyrobosim, ros1, rosbridge or ros2) or class, not yet connected.
 
     Raises:
-        UserError: there is no such kind, or an option is missing or wrong.
+        UserError: there is no such kind or class, or an option is missing or wrong.
     """
+    if is_own(name):
+        return OwnRobot(name, options or Options())
     if name not in KINDS:
-        raise UserError(f'there is no robot "{name}"; choose one of {", ".join(KINDS)}')
+        own = "or a class of yours, as in lab_robot.py:Spot"
+        raise UserError(f'there is no robot "{name}"; choose one of {", ".join(KINDS)}, {own}')
     robot: Robot = _kind(name).robot(options or Options())
     return robot
 

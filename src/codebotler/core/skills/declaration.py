@@ -281,7 +281,8 @@ def _ros_type(value: ValueType) -> str:
 
 def _is_empty(does: Callable[..., Any]) -> bool:
     """Whether a function has no code."""
-    return does.__code__.co_code == _empty.__code__.co_code
+    code = does.__code__
+    return code.co_code == _empty.__code__.co_code and {*code.co_consts} <= {does.__doc__, None, ...}
 
 
 def _empty(_sim: object) -> None:

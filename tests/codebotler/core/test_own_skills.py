@@ -1,0 +1,295 @@
+"""Files of own skills: what they declare, and the sentence where something is wrong with them."""
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.declaration import RTL_WORDS, by_name
+from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.skills.verbs import Verb, verb_of
+from codebotler.core.trace import Event, Outcome, Status, trace_data, trace_from
+from codebotler.core.world import Room, World
+from codebotler.prompts import prompt_for
+from codebotler.rtl import holds, parse
+from codebotler.rtl.syntax import AROUND, LOOKS, QUESTIONS, TEXTS
+from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import PAPER
+
+HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"
+EVERY = (
+    HEAD
+    + """
+class Colour(Enum):
+    RED = "red"
+    BLUE = "blue"
+
+@skill
+def text(sim: Simulation, one: str) -> str:
+    "Text."
+    return one + "!"
+
+@skill
+def whole(sim: Simulation, one: int) -> int:
+    "Whole."
+    return one + 1
+
+@skill
+def share(sim: Simulation, one: float) -> float:
+    "Share."
+    return one / 2
+
+@skill
+def truth(sim: Simulation, one: bool) -> bool:
+    "Truth."
+    return not one
+
+@skill
+def paint(sim: Simulation, colour: Colour, where: Literal["door", "wall"]) -> Colour:
+    "Paint."
+    assert isinstance(colour, Colour)
+    return Colour.BLUE
+
+@skill
+def many(sim: Simulation, some: list[int], others: list[Literal["a", "b"]]) -> list[str]:
+    "Many."
+    return [str(each) for each in some] + others
+
+@skill
+def nothing(sim: Simulation) -> None:
+    "Nothing."
+"""
+)
+WORLD = World((Room("hall"),), "hall")
+ROADS = {"tame": "", "wild": "import collections\n"}
+
+
+@pytest.fixture(scope="module", name="every")
+def every_(tmp_path_factory: pytest.TempPathFactory) -> SkillTable:
+    path = tmp_path_factory.mktemp("skills") / "every.py"
+    path.write_text(EVERY)
+    return skills_from(path)
+
+
+@pytest.fixture(scope="module", name="pool")
+def pool_() -> WorkerPool:
+    return WorkerPool(1)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def closed(pool: WorkerPool) -> object:
+    with pool:
+        yield
+
+
+def ran(pool: WorkerPool, skills: SkillTable, lines: Sequence[str], road: str) -> Outcome:
+    program = ROADS[road] + "def task_program():\n" + "".join(f"    {line}\n" for line in lines)
+    robot = partial(SimulatedRobot, WORLD, PAPER, skills)
+    ((outcome,),) = pool.here().run_all([(program, [robot])])
+    return outcome
+
+
+@pytest.mark.parametrize("road", ROADS)
+def test_values_of_every_type_go_there_and_back(pool: WorkerPool, every: SkillTable, road: str) -> None:
+    lines = [
+        "assert text('a') == 'a!'",
+        "assert whole(-3) == -2",
+        "assert share(3) == 1.5 and share(0.5) == 0.25",
+        "assert truth(True) is False",
+        "assert paint('red', 'wall') == 'blue'",
+        "assert many([1, 2], ['b']) == ['1', '2', 'b']",
+        "assert nothing() is None",
+    ]
+    outcome = ran(pool, every, lines, road)
+    assert outcome.error is None
+    assert trace_data(outcome.trace) == [
+        ["text", "a"],
+        ["whole", "-3"],
+        ["share", "3"],
+        ["share", "0.5"],
+        ["truth", "true", False],
+        ["paint", "red", ["wall"]],
+        ["many", "1, 2", ["b"]],
+        ["nothing", ""],
+    ]
+
+
+@pytest.mark.parametrize("road", ROADS)
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [
+        ("text(3)", "TypeError", "text: one must be text, not int"),
+        ("whole(True)", "TypeError", "whole: one must be a whole number, not bool"),
+        ("whole(2.0)", "TypeError", "whole: one must be a whole number, not float"),
+        ("whole(10 ** 30)", "ValueError", "whole: one is too large"),
+        ("share('1')", "TypeError", "share: one must be a number, not str"),
+        ("share(float('inf'))", "ValueError", "share: one is too large"),
+        ("share(float('nan'))", "ValueError", "share: one is too large"),
+        ("truth(1)", "TypeError", "truth: one must be True or False, not int"),
+        ("paint('green', 'wall')", "ValueError", 'paint: colour must be "red" or "blue", not \'green\''),
+        ("paint('red', 3)", "TypeError", 'paint: where must be "door" or "wall", not int'),
+        ("many(['1'], [])", "TypeError", "many: some must be a list of whole numbers, not str"),
+        ("many((1,), [])", "TypeError", "many: some must be a list of whole numbers, not tuple"),
+        ("many([], ['c'])", "ValueError", 'many: others must be a list of "a" or "b", not \'c\''),
+        ("nothing(1)", "TypeError", "nothing() takes 0 positional arguments but 1 was given"),
+    ],
+)
+def test_what_a_skill_does_not_take_is_an_error_of_the_program_and_no_event(  # noqa: PLR0917 - of a table
+    pool: WorkerPool, every: SkillTable, road: str, call: str, kind: str, message: str
+) -> None:
+    outcome = ran(pool, every, [call], road)
+    assert outcome.error is not None
+    assert (outcome.status, outcome.error.kind, outcome.trace) == (Status.PYTHON_ERROR, kind, ())
+    assert outcome.error.message.startswith(message)
+
+
+def test_traces_with_several_arguments_are_read_as_they_were_written() -> None:
+    trace = (Event("paint", "red", more=("wall",)), Event("put", "a", found=True, more=("b", "c")))
+    assert trace_from(trace_data(trace)) == trace
+
+
+@pytest.mark.parametrize(
+    ("formula", "expected"),
+    [
+        ('tr.Exists(paint("red"))', True),
+        ('tr.Exists(paint("red", "wall"))', True),
+        ('tr.Exists(paint("red", "door"))', False),
+        ("tr.Exists(whole(-3))", True),
+        ("tr.Exists(whole(3))", False),
+        ("tr.Exists(share(0.5))", True),
+        ("tr.Exists(truth(True))", True),
+        ("tr.Exists(nothing())", True),
+        ("tr.Exists(returned(False, truth(True)))", True),
+        ("tr.Exists(returned(True, truth(True)))", False),
+    ],
+)
+def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: str, expected: bool) -> None:  # noqa: FBT001
+    trace = (
+        Event("paint", "red", more=("wall",)),
+        Event("whole", "-3"),
+        Event("share", "0.5"),
+        Event("truth", "true", found=False),
+        Event("nothing", ""),
+    )
+    parsed = parse(formula, skills=every)
+    assert holds(parsed, trace) is expected
+    assert parse(str(parsed), skills=every) == parsed
+
+
+def test_names_that_formulas_use_otherwise_are_refused() -> None:
+    assert {*AROUND, *LOOKS, *QUESTIONS, *TEXTS, "tr"} == RTL_WORDS
+
+
+def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
+    path = tmp_path / "doors.py"
+    path.write_text(
+        HEAD + '@skill(fails={"Locked": "it is locked", "Stuck": "it is stuck"}, '
+        "example='open_gate(\"north\", 2)')\n"
+        'def open_gate(sim: Simulation, gate: Literal["north", "south"], times: int) -> bool:\n'
+        '    """Open a\n    gate.\n\n    More for people.\n    """\n'
+    )
+    text = prompt_for("Open it.", skills=skills_from(path)).messages[0].text
+    assert (
+        'def open_gate(gate: Literal["north", "south"], times: int) -> bool:\n'
+        '    """Open a gate.\n\n'
+        "    Fails with an exception if it is locked or if it is stuck.\n\n"
+        '    Example: result = open_gate("north", 2)\n'
+        '    """'
+    ) in text
+
+
+BAD = {
+    "@skill\ndef wave(): 'Wave.'": "must take the simulation and then, by position, what programs pass",
+    "@skill\ndef wave(sim, *who: str) -> None: 'Wave.'": "must take the simulation and then, by position",
+    "@skill\ndef wave(sim, who) -> None: 'Wave.'": "the parameter who of wave has no type; write who: str",
+    "@skill\ndef wave(sim, who: str = 'a') -> None: 'Wave.'": "wave has a default value",
+    "@skill\ndef wave(sim, who: dict) -> None: 'Wave.'": "the parameter who of wave, dict, is none",
+    "@skill\ndef wave(sim, who: 'Nobody') -> None: 'Wave.'": "the parameter who of wave cannot be read: name",
+    "@skill\ndef wave(sim, who: None) -> None: 'Wave.'": "a parameter of wave cannot be None",
+    "@skill\ndef wave(sim, who: str): 'Wave.'": "wave does not say what it returns; write -> None",
+    "@skill\ndef wave(sim, who: str) -> None: pass": "wave has no docstring",
+    "@skill\ndef print(sim, who: str) -> None: 'Wave.'": "print is a name that Python or every program",
+    "@skill\ndef found(sim, who: str) -> None: 'Wave.'": "found means something else in formulas",
+    "@skill\ndef go_to(sim, who: str) -> None: 'Wave.'": "there is a skill go_to already",
+    "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
+    "@skill(verb='wave {to}')\ndef wave(sim, who: str) -> None: 'Wave.'": "{to}, which is no parameter",
+    "@skill(ros='Wave')\ndef wave(sim, who: str) -> None: 'Wave.'": '"Wave" is no ROS action',
+    "@skill(fails={'KeyError': 'x'})\ndef wave(sim, who: str) -> None: 'Wave.'": "must have a name",
+    "@skill(text='whom')\ndef wave(sim, who: str) -> None: 'Wave.'": "wave has no parameter whom",
+    "def wave(sim, who: str) -> None: 'Wave.'": "it declares no skill; put @skill above a function",
+    "def wave(": "it is no Python",
+    "1 / 0": "it cannot be run: ZeroDivisionError",
+}
+
+
+@pytest.mark.parametrize("source", BAD)
+def test_what_is_wrong_with_a_file_is_one_sentence_with_its_line(tmp_path: Path, source: str) -> None:
+    path = tmp_path / "bad.py"
+    path.write_text(HEAD + source)
+    with pytest.raises(UserError) as caught:
+        skills_from(path)
+    assert BAD[source] in str(caught.value)
+    assert caught.value.file is not None
+    assert (caught.value.line == 4) is not source.startswith("def wave(sim")  # of no line if none is declared
+    assert by_name("go_to") is SKILLS["go_to"]
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("return 1 / 0", "wave failed: ZeroDivisionError: division by zero"),
+        ("return 3", "wave returned 3, but it declares bool"),
+        ("sim.fail('Other')", 'no skill declares the error "Other"'),
+    ],
+)
+@pytest.mark.parametrize("road", ROADS)
+def test_a_function_that_fails_ends_the_command_with_a_sentence(
+    pool: WorkerPool, tmp_path: Path, body: str, message: str, road: str
+) -> None:
+    path = tmp_path / "bad.py"
+    path.write_text(HEAD + f"@skill\ndef wave(sim: Simulation) -> bool:\n    'Wave.'\n    {body}\n")
+    with pytest.raises(UserError, match=message):
+        ran(pool, skills_from(path), ["wave()"], road)
+
+
+def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:
+    path = tmp_path / "every.py"
+    path.write_text(EVERY)
+    table = skills_from(path)
+    code = "import pickle, sys; print(*pickle.loads(sys.stdin.buffer.read()))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], input=pickle.dumps(table), capture_output=True, check=True
+    )
+    assert done.stdout.decode().split() == [*SKILLS, *list(table)[len(SKILLS) :]]
+    assert pickle.loads(pickle.dumps(table)) == table
+
+
+@pytest.mark.parametrize(
+    ("template", "parameters", "forms"),
+    [
+        ("open {door}", ["door"], ("open", "opens", "opened", "opening")),
+        ("switch on {lamp}", ["lamp"], ("switch on", "switches on", "switched on", "switching on")),
+        ("carry {thing}", ["thing"], ("carry", "carries", "carried", "carrying")),
+        ("grip {thing}", ["thing"], ("grip", "grips", "gripped", "gripping")),
+        ("take {lift}", ["lift"], ("take", "takes", "took", "taking")),
+        ("land", [], ("land", "lands", "landed", "landing")),
+        ("tie {knot}", ["knot"], ("tie", "ties", "tied", "tying")),
+    ],
+)
+def test_verbs_have_their_forms(
+    template: str, parameters: list[str], forms: tuple[str, str, str, str]
+) -> None:
+    assert verb_of(template, parameters, ("no", "yes")) == Verb(*forms)
+
+
+def test_what_a_verb_is_done_to_may_stand_anywhere() -> None:
+    verb = verb_of("pour {ml} ml of {liquid} into {target}", ["liquid", "ml", "target"], ("no", "yes"))
+    assert verb.with_object(verb.past, ["water", "20", "the cup"]) == "poured 20 ml of water into the cup"

@@ -1,0 +1,345 @@
+"""A robot of one's own is a class; here three, each with a real server."""
+
+import json
+import socket
+import socketserver
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import pytest
+
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.paper import SKILLS
+from codebotler.robots.base import CancelledError, NotReadyError, Options, Robot, RobotLostError
+from codebotler.robots.open import open_robot
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+Write: TypeAlias = Callable[[str], Robot]
+SOON = 20.0  # seconds
+
+
+@pytest.fixture(name="write")
+def write_(tmp_path: Path) -> Iterator[Write]:
+    def write(body: str) -> Robot:
+        path = tmp_path / f"lab_robot_{time.monotonic_ns()}.py"
+        path.write_text(
+            f"import asyncio, threading, time\nfrom codebotler import RobotError\nclass Spot:\n{body}"
+        )
+        robot = open_robot(f"{path}:Spot")
+        opened.append(robot)
+        return robot
+
+    opened: list[Robot] = []
+    yield write
+    for robot in opened:
+        robot.disconnect()
+
+
+BASE = """
+    stopped = 0
+    def stop(self): self.stopped += 1
+    def rooms(self): return ["hall", "lab"]
+"""
+
+
+def test_methods_are_skills_async_or_not_and_rooms_lists_the_rooms(write: Write) -> None:
+    robot = write(
+        BASE
+        + """
+    def get_current_location(self): return "hall"
+    async def is_in_room(self, entity):
+        await asyncio.sleep(0)
+        return entity == "mug"
+    def ask(self, person, question, options): return options[-1]
+"""
+    )
+    robot.connect()
+    assert robot.perform("get_all_rooms", ()) == ["hall", "lab"]
+    assert robot.perform("is_in_room", ["mug"]) is True
+    assert robot.perform("ask", ["ann", "Tea?", ("yes", "no")]) == "no"
+    assert robot.missing == {
+        skill: f"Spot has no method {skill}" for skill in ("go_to", "say", "pick", "place")
+    }
+    with pytest.raises(RobotError, match="Spot has no method say"):
+        robot.perform("say", ["hello"])
+
+
+@pytest.mark.parametrize(
+    "go_to",
+    [
+        "async def go_to(self, location): await asyncio.sleep(600)",
+        "def go_to(self, location): self.event.wait(600)",
+    ],
+)
+def test_a_stop_ends_what_goes_on(write: Write, go_to: str) -> None:
+    robot = write(
+        f"""
+    def __init__(self): self.event = threading.Event()
+    def stop(self): self.event.set()
+    def rooms(self): return ["hall"]
+    {go_to}
+"""
+    )
+    robot.connect()
+    ended: list[BaseException] = []
+
+    def drive() -> None:
+        try:
+            robot.perform("go_to", ["hall"])
+        except CancelledError as error:
+            ended.append(error)
+
+    thread = threading.Thread(target=drive)
+    thread.start()
+    time.sleep(0.2)
+    robot.cancel()
+    thread.join(SOON)
+    assert len(ended) == 1
+    with pytest.raises(CancelledError):
+        robot.perform("go_to", ["hall"])
+    robot.connect()
+    assert robot.perform("get_all_rooms", ()) == ["hall"]
+
+
+def test_declared_errors_reach_the_program_and_others_end_the_mission(tmp_path: Path) -> None:
+    (tmp_path / "skills.py").write_text(
+        "from codebotler import Simulation, skill\n"
+        '@skill(fails={"DoorLocked": "the door is locked"})\n'
+        "def open_door(sim: Simulation, door: str) -> bool:\n"
+        '    """Open."""\n'
+    )
+    (tmp_path / "lab.py").write_text(
+        "class DoorLocked(Exception): pass\n"
+        "class Spot:\n"
+        "    def stop(self): pass\n"
+        "    def rooms(self): return ['hall']\n"
+        "    def open_door(self, door):\n"
+        "        if door == 'locked': raise DoorLocked\n"
+        "        return door.no_such_method()\n"
+    )
+    robot = open_robot(f"{tmp_path / 'lab.py'}:Spot", Options(skills=skills_from(tmp_path / "skills.py")))
+    robot.connect()
+    with pytest.raises(RobotError, match="open_door: the door is locked") as caught:
+        robot.perform("open_door", ["locked"])
+    assert caught.value.kind == "DoorLocked"
+    with pytest.raises(RobotLostError, match=r"Spot\.open_door failed: AttributeError"):
+        robot.perform("open_door", ["other"])
+    robot.disconnect()
+
+
+def test_a_stop_that_fails_is_told(write: Write) -> None:
+    robot = write(
+        """
+    def stop(self): raise OSError("the line is dead")
+    def rooms(self): return ["hall"]
+    def say(self, message): time.sleep(0.5)
+"""
+    )
+    robot.connect()
+    told: list[str] = []
+
+    def speak() -> None:
+        try:
+            robot.perform("say", ["hello"])
+        except RobotLostError as error:
+            told.append(str(error))
+
+    thread = threading.Thread(target=speak)
+    thread.start()
+    time.sleep(0.1)
+    robot.cancel()
+    thread.join(SOON)
+    assert told == ["Spot.stop failed: OSError: the line is dead; STOP THE ROBOT BY HAND"]
+
+
+def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:
+    robot = write(BASE + "    def connect(self): raise ConnectionError('no route')\n")
+    with pytest.raises(NotReadyError, match="Spot did not connect: ConnectionError: no route"):
+        robot.connect()
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("", r"it has no class Spot"),
+        ("class Spot:\n    def rooms(self): pass\n", r"line 1: Spot has no method stop, which stops"),
+        ("class Spot:\n    def stop(self): pass\n", r"Spot has no method rooms, which lists"),
+        (
+            "class Spot:\n    def __init__(self): 1 / 0\n    stop = rooms = print\n",
+            r"Spot\(\) failed: ZeroDiv",
+        ),
+        ("1 / 0\n", r"line 1: it cannot be run: ZeroDivisionError"),
+    ],
+)
+def test_what_a_class_lacks_is_said_in_a_sentence(tmp_path: Path, source: str, message: str) -> None:
+    path = tmp_path / "lab_robot.py"
+    path.write_text(source)
+    with pytest.raises(UserError, match=message):
+        open_robot(f"{path}:Spot")
+
+
+# --- three robots with real servers
+
+
+class Controller(socketserver.StreamRequestHandler):
+    """The controller of an arm."""
+
+    def handle(self) -> None:
+        for line in self.rfile:
+            name, *arguments = json.loads(line)
+            answer: dict[str, object] = {"result": None}
+            if name == "detect":
+                answer = {"result": ["cup", "pen"]}
+            elif name == "move" and arguments == ["pen", "drawer"]:
+                answer = {"error": "the drawer is full"}
+            DONE.append([name, *arguments])
+            self.wfile.write(json.dumps(answer).encode() + b"\n")
+
+
+DONE: list[Any] = []
+
+
+def test_a_robot_with_an_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
+    DONE.clear()
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Controller) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        monkeypatch.setenv("ARM_ADDRESS", f"127.0.0.1:{server.server_address[1]}")
+        skills = skills_from(EXAMPLES / "skills" / "tidy_arm" / "skills.py")
+        robot = open_robot(f"{EXAMPLES / 'robots' / 'sdk_robot.py'}:Arm", Options(skills=skills))
+        robot.connect()
+        assert robot.perform("seen_on_table", ()) == ["cup", "pen"]
+        robot.perform("tidy", ["cup", "bin"])
+        with pytest.raises(RobotError, match="full") as caught:
+            robot.perform("tidy", ["pen", "drawer"])
+        assert caught.value.kind == "ReceptacleFull"
+        robot.cancel()
+        robot.disconnect()
+        server.shutdown()
+    assert DONE == [["detect"], ["move", "cup", "bin"], ["move", "pen", "drawer"], ["halt"]]
+
+
+class CartHandler(BaseHTTPRequestHandler):
+    """A cart; a drive to the attic takes until it is stopped."""
+
+    stop = threading.Event()
+
+    def do_POST(self) -> None:
+        values = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        path, status, answer = self.path.strip("/"), 200, json.dumps(None)
+        match path, values:
+            case "rooms", _:
+                answer = json.dumps(["hall", "attic"])
+            case "where", _:
+                answer = json.dumps("hall")
+            case "drive", {"to": "attic"}:
+                self.stop.wait(SOON)
+                status, answer = 500, "stopped"
+            case "drive", {"to": "moon"}:
+                status, answer = 409, "there is no moon"
+            case "look", _:
+                answer = json.dumps(values["what"] == "mug")
+            case "stop", _:
+                self.stop.set()
+        self.send_response(status)
+        self.end_headers()
+        self.wfile.write(answer.encode())
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
+def test_a_robot_with_http(monkeypatch: pytest.MonkeyPatch) -> None:
+    with ThreadingHTTPServer(("127.0.0.1", 0), CartHandler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        monkeypatch.setenv("CART_URL", f"http://127.0.0.1:{server.server_address[1]}")
+        robot = open_robot(f"{EXAMPLES / 'robots' / 'http_robot.py'}:Cart", Options(skills=SKILLS))
+        robot.connect()
+        assert robot.perform("get_all_rooms", ()) == ["hall", "attic"]
+        assert robot.perform("is_in_room", ["mug"]) is True
+        with pytest.raises(RobotError, match="there is no moon"):
+            robot.perform("go_to", ["moon"])
+        threading.Timer(0.3, robot.cancel).start()
+        with pytest.raises(CancelledError):
+            robot.perform("go_to", ["attic"])
+        robot.disconnect()
+        server.shutdown()
+
+
+MCP_SERVER = """
+import sys
+from mcp.server import MCPServer
+from mcp.server.mcpserver.exceptions import ToolError
+
+server = MCPServer("porter")
+log = open(sys.argv[2], "a", buffering=1)
+
+
+@server.tool()
+def call_lift() -> bool:
+    print("call_lift", file=log)
+    return True
+
+
+@server.tool()
+def ride_to(floor: int) -> None:
+    print("ride_to", floor, file=log)
+    if floor > 5:
+        raise ToolError("the house has five floors")
+
+
+@server.tool()
+def stop() -> None:
+    print("stop", file=log)
+
+
+server.run("streamable-http", host="127.0.0.1", port=int(sys.argv[1]))
+"""
+
+
+def test_a_robot_whose_skills_are_tools_of_an_mcp_server(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    (tmp_path / "server.py").write_text(MCP_SERVER)
+    log = tmp_path / "log"
+    started = [sys.executable, str(tmp_path / "server.py"), str(port), str(log)]
+    with subprocess.Popen(started, stderr=subprocess.DEVNULL) as server:
+        try:
+            wait_for(port)
+            monkeypatch.setenv("PORTER_URL", f"http://127.0.0.1:{port}/mcp")
+            monkeypatch.setenv("PORTER_TOOLS", "call_lift,ride_to")
+            skills = skills_from(EXAMPLES / "skills" / "hotel_lift" / "skills.py")
+            robot = open_robot(f"{EXAMPLES / 'robots' / 'mcp_robot.py'}:Porter", Options(skills=skills))
+            robot.connect()
+            assert robot.perform("call_lift", ()) is True
+            robot.perform("ride_to", [3])
+            with pytest.raises(RobotError, match="five floors"):
+                robot.perform("ride_to", [6])
+            with pytest.raises(RobotError, match="nobody has approved of the tool knock"):
+                robot.perform("knock", [305])
+            robot.cancel()
+            robot.disconnect()
+        finally:
+            server.terminate()
+    assert log.read_text().split("\n")[:-1] == ["call_lift", "ride_to 3", "ride_to 6", "stop"]
+
+
+def wait_for(port: int) -> None:
+    """Wait until something listens."""
+    deadline = time.monotonic() + SOON
+    while time.monotonic() < deadline:
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):
+            return
+        time.sleep(0.1)
+    raise TimeoutError("the server does not listen")

@@ -1,0 +1,174 @@
+"""Five sets of own skills, from the model's prompt to the robot, the benchmark and the page."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from codebotler.checking.check import check
+from codebotler.checking.rules import read_rules
+from codebotler.cli.app import app
+from codebotler.core.cachedproperty import cached_property
+from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.world import World
+from codebotler.missions.store import missions
+from codebotler.simulator.sampled_robot import RoomMap
+from roboeval.cli.app import app as roboeval
+from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.suites.load import Suite, load_suite
+from roboeval.suites.solutions import solutions
+
+SETS = Path(__file__).parent.parent / "examples" / "skills"
+BREAKS = {
+    "drone": "take_off()",
+    "hotel_lift": "if call_lift():\n        ride_to(5)",
+    "lab_bench": 'new_tip()\n    aspirate("ethanol", 20)\n    dispense("A1")',
+    "quadruped": 'open_door("glass door")',
+    "tidy_arm": 'tidy("pen", "bin")',
+}
+RULES = {
+    "drone": "land",
+    "hotel_lift": "staff-floor",
+    "lab_bench": "no-ethanol-in-row-a",
+    "quadruped": "knock",
+    "tidy_arm": "no-pens-in-the-bin",
+}
+
+
+@dataclass(frozen=True)
+class Own:
+    """A set of own skills."""
+
+    folder: Path
+
+    @cached_property
+    def suite(self) -> Suite:
+        return load_suite(self.folder)
+
+    @cached_property
+    def skills(self) -> SkillTable:
+        return skills_from(self.folder / "skills.py")
+
+    @property
+    def options(self) -> list[str]:
+        return ["--skills", str(self.folder / "skills.py"), "--world", str(self.folder / "world.yaml")]
+
+    def problems(self, program: str, *, with_rules: bool = False) -> list[str]:
+        rules = read_rules(self.folder / "rules.yaml", self.skills) if with_rules else ()
+        rooms = RoomMap.of(World.read(self.folder / "world.yaml"))
+        found = check(program, room_map=rooms, skills=self.skills, house_rules=rules)
+        return [problem.kind for problem in found.problems]
+
+
+@pytest.fixture(params=sorted(path.name for path in SETS.iterdir() if path.is_dir()), name="own")
+def own_(request: pytest.FixtureRequest) -> Own:
+    return Own(SETS / request.param)
+
+
+def asked(*words: str, status: int = 0) -> str:
+    done = CliRunner().invoke(app, [*words])
+    assert done.exit_code == status, done.output
+    return done.output
+
+
+def test_there_are_five_with_three_tasks_each_and_at_most_ten_lines_a_skill() -> None:
+    assert sorted(BREAKS) == sorted(path.name for path in SETS.iterdir() if path.is_dir())
+    for name in BREAKS:
+        own = Own(SETS / name)
+        assert len(own.suite.tasks) == 3
+        for skill in own.skills.rows[len(SKILLS) :]:
+            assert skill.does is not None
+            lines = (own.folder / "skills.py").read_text().split(f"def {skill.name}(")[1].split("\n\n\n")[0]
+            assert len([line for line in lines.split("\n")[1:] if line.strip()]) <= 10, skill.name
+
+
+def test_right_programs_pass_and_wrong_ones_fail_as_they_say(own: Own) -> None:
+    written = [(task, one) for task in own.suite.tasks.values() for one in solutions(task)]
+    completions = [
+        Completion(
+            task=task.name, prompt=0, index=number, program=one.program, instruction=None, model="hand"
+        )
+        for number, (task, one) in enumerate(written)
+    ]
+    for (task, solution), row in zip(written, evaluate(completions, own.suite), strict=True):
+        failure = row["failure"]
+        assert (failure and failure["kind"]) == solution.fails, (task.name, solution.about, failure)
+
+
+def test_tasks_have_no_findings(own: Own) -> None:
+    done = CliRunner().invoke(roboeval, ["tasks", "--suite", str(own.folder), "--lint"])
+    assert (done.exit_code, done.stdout) == (0, "nothing was found\n"), done.output
+
+
+def test_the_check_accepts_right_programs_and_finds_errors_that_nobody_handles(own: Own) -> None:
+    declared = {kind for skill in own.skills.rows for kind, _ in skill.fails}
+    for completion in recorded_completions("recorded:careful", own.suite):
+        assert own.problems(completion.program) == [], completion.task
+    for task in own.suite.tasks.values():
+        for solution in solutions(task):
+            if solution.fails in declared:
+                assert solution.fails in own.problems(solution.program), (task.name, solution.about)
+
+
+def test_a_program_that_breaks_the_house_rule_is_rejected_before_it_runs(own: Own) -> None:
+    program = f"def task_program():\n    {BREAKS[own.folder.name]}\n"
+    assert "RuleViolation" in own.problems(program, with_rules=True)
+    for completion in recorded_completions("recorded:careful", own.suite):
+        assert own.problems(completion.program, with_rules=True) == [], completion.task
+
+
+def test_an_instruction_becomes_a_program_and_a_mission(
+    own: Own, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CODEBOTLER_HOME", str(tmp_path))
+    task = next(iter(own.suite.tasks.values()))
+    model = ["--model", f"recorded:{own.folder / 'solutions'}"]
+    instruction = task.prompts[0]
+    program = asked("generate", instruction, *own.options, *model)
+    assert "def task_program():" in program
+    told = asked("generate", instruction, *own.options, *model, "--show-prompt")
+    assert all(f"def {skill}(" in told for skill in own.skills)
+    rules = ["--rules", str(own.folder / "rules.yaml")]
+    output = asked("run", instruction, *own.options, *model, *rules, "--yes", "--speed", "0")
+    (mission,) = missions(tmp_path)
+    assert mission.state == "done", output
+    shown = asked("missions", "last", "--skills", str(own.folder / "skills.py"))
+    words = {skill.verb.third for skill in own.skills.rows[len(SKILLS) :] if skill.verb}
+    assert any(word in shown for word in words), shown
+    asked("missions", "last", *own.options[:2], "--mcap", str(tmp_path / "mission.mcap"))
+    assert (tmp_path / "mission.mcap").stat().st_size > 0
+
+
+def test_the_command_shows_each_skill_and_tries_it(own: Own) -> None:
+    listed: list[dict[str, Any]] = json.loads(asked("skills", str(own.folder / "skills.py"), "--json"))
+    assert [one["name"] for one in listed] == list(own.skills)
+    assert all(one["tried"] for one in listed)
+    shown = asked("skills", str(own.folder / "skills.py"))
+    assert all(one["signature"] in shown for one in listed[len(SKILLS) :])
+
+
+def test_the_rule_is_shown_with_examples(own: Own) -> None:
+    shown = asked("rules", str(own.folder / "rules.yaml"), *own.options)
+    assert "keeps it" in shown
+    assert "breaks it" in shown
+    assert "note:" not in shown
+
+
+def test_a_suite_is_evaluated_and_mutated_from_the_command_line(own: Own, tmp_path: Path) -> None:
+    run = str(tmp_path / "run")
+    words = ["evaluate", "recorded:hasty", "--suite", str(own.folder), "--out", run, "--json"]
+    done = CliRunner().invoke(roboeval, words)
+    assert done.exit_code == 0, done.output
+    shown = CliRunner().invoke(roboeval, ["show", run, "--suite", str(own.folder)])
+    assert shown.exit_code == 0, shown.output
+    mutated = CliRunner().invoke(
+        roboeval, ["mutate", "--suite", str(own.folder), "--mutants", "10", "--brief"]
+    )
+    assert mutated.exit_code == 0, mutated.output
+    assert all(task in mutated.output for task in own.suite.tasks)
