@@ -159,7 +159,8 @@ def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> No
 def test_models_are_told_of_it() -> None:
     prompt = prompt_for("Wave at alice.", skills=TABLE)
     for text in (prompt.messages[0].text, prompt.text):
-        assert 'def wave(person: str) -> None:\n    """Wave at a person in the room."""' in text
+        assert 'def wave(person: str) -> None:\n    """Wave at a person in the room.\n\n' in text
+        assert 'Example: wave("person")\n' in text
 
 
 def test_a_check_in_imagined_worlds_knows_it() -> None:

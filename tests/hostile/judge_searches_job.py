@@ -1,7 +1,7 @@
 """Tries to find more in what the engine sent than its own source and the names of skills."""
 # ends: finished
-# does: say codes count entered fuel is_live namespace now refused_at
-# does: say seconds skills spent start
+# does: say codes count entered fuel is_live kinds namespace now
+# does: say refused_at seconds skills spent start
 
 
 def task_program():

@@ -13,7 +13,7 @@ from rich.text import Text
 from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace
-from codebotler.rtl.formulas import takes_nothing
+from codebotler.rtl.wording import takes_nothing
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20

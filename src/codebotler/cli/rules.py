@@ -19,7 +19,7 @@ from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import listed
 from codebotler.core.world import World
-from codebotler.rtl.formulas import takes_nothing
+from codebotler.rtl.wording import takes_nothing
 from codebotler.rtl.wording import verb as verb_of
 from codebotler.simulator.rule_guard import Rule
 

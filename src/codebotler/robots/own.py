@@ -65,6 +65,7 @@ class OwnRobot:
             skill: f"{kind} has no method {skill}" for skill in self.skills if skill not in self._methods
         }
         self._stopped = True
+        self._is_busy = False
         self._failed_stop = ""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._running: Future[Any] | None = None
@@ -108,6 +109,7 @@ class OwnRobot:
             list(one) if isinstance(one, tuple) else parameter.type.wanted(one)
             for parameter, one in zip(row.parameters, arguments, strict=True)
         ]
+        self._is_busy = True
         try:
             result: Result = self._finished(self._methods[skill](*given))
         except Exception as error:
@@ -118,6 +120,8 @@ class OwnRobot:
             if kind in dict(row.fails):
                 raise RobotError(kind, str(error) or f"{skill}: {dict(row.fails)[kind]}") from error
             raise RobotLostError(f"{self.name}.{skill} failed: {_said(error)}") from error
+        finally:
+            self._is_busy = False
         self._expect_no_stop()
         return result
 
@@ -140,8 +144,11 @@ class OwnRobot:
             running.cancel()
 
     def disconnect(self) -> None:
-        """Stop, call `disconnect` if the class has it, and end the loop of async methods."""
-        self.cancel()
+        """End what goes on, call `disconnect` if the class has it, and end the loop of async methods."""
+        if self._is_busy:
+            self.cancel()
+        self._stopped = True
+        self.clock.stop()
         disconnect = getattr(self._body, "disconnect", None)
         if self._loop is None:
             return

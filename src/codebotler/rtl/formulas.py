@@ -8,7 +8,6 @@ from types import UnionType
 from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.skills.declaration import by_event
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
 from codebotler.rtl.text.matcher import Matcher
@@ -104,6 +103,7 @@ class EventPattern:
         holding: what the robot must have held when it began; None if that does not matter.
         to: what the person must match whom a question was for; None if that does not matter.
         more: what the further arguments of a skill that has several must match, in order.
+        has_text: whether such events have a text: False if their skill has no arguments.
     """
 
     kind: str
@@ -116,6 +116,7 @@ class EventPattern:
     holding: Text | None = None
     to: Text | None = None
     more: tuple[Text, ...] = ()
+    has_text: bool = True
 
     @cached_property
     def place_regex(self) -> re.Pattern[str] | None:
@@ -134,7 +135,7 @@ class EventPattern:
             written = f"{'found' if self.found else 'missed'}({self.text})"
         else:
             texts = [self.text, *self.more] if self.options is None else [self.text, self.options]
-            if takes_nothing(self.kind):
+            if not self.has_text:
                 texts = []
             written = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
         if self.found is not None and self.kind != "check":
@@ -144,12 +145,6 @@ class EventPattern:
         if self.holding is not None:
             written = f"holding({self.holding}, {written})"
         return written if self.place is None else f"at({quote(self.place)}, {written})"
-
-
-def takes_nothing(kind: str) -> bool:
-    """Whether events of a kind have no text, since their skill has no arguments."""
-    row = by_event(kind)
-    return row is not None and row.recording is not None and not row.recording.text
 
 
 @dataclass(frozen=True)

@@ -170,7 +170,7 @@ class _Parser:
         recording = self.recordings[kind]
         if not recording.text:
             self.arguments(node, node, kind, 0)
-            return formulas.EventPattern(kind, formulas.Regex(".*"))
+            return formulas.EventPattern(kind, formulas.Regex(".*"), has_text=False)
         if not recording.more:
             (text,) = self.arguments(node, node, kind, 1)
             return formulas.EventPattern(kind, self.value(text, self.types[kind][recording.text]))

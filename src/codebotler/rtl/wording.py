@@ -12,7 +12,7 @@ from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
-from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words, takes_nothing
+from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
 from codebotler.rtl.text.claims import Claim, Number, Time
 
 Form: TypeAlias = Literal["base", "past", "ing"]
@@ -54,7 +54,7 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
 
 
 def _wanted(element: EventPattern, thing: str) -> str:
-    if takes_nothing(element.kind):
+    if not element.has_text:
         return ""
     if element.kind == "goto":
         return room(element.text, "any" if thing == "anything" else "a")
@@ -101,6 +101,12 @@ def done_to(event: Event, form: str, text: str | None = None) -> str:
     """A form of an event's verb, and to what it is done."""
     given = [brief(event.text if text is None else text), *map(brief, event.more)]
     return verb(event.kind).with_object(form, [] if takes_nothing(event.kind) else given)
+
+
+def takes_nothing(kind: str) -> bool:
+    """Whether events of a kind have no text, since their skill has no arguments."""
+    row = by_event(kind)
+    return row is not None and row.recording is not None and not row.recording.text
 
 
 def verb(kind: str) -> Verb:

@@ -207,25 +207,25 @@ def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
 
 
 BAD = {
-    "@skill\ndef wave(): 'Wave.'": "must take the simulation and then, by position, what programs pass",
-    "@skill\ndef wave(sim, *who: str) -> None: 'Wave.'": "must take the simulation and then, by position",
-    "@skill\ndef wave(sim, who) -> None: 'Wave.'": "the parameter who of wave has no type; write who: str",
-    "@skill\ndef wave(sim, who: str = 'a') -> None: 'Wave.'": "wave has a default value",
-    "@skill\ndef wave(sim, who: dict) -> None: 'Wave.'": "the parameter who of wave, dict, is none",
-    "@skill\ndef wave(sim, who: 'Nobody') -> None: 'Wave.'": "the parameter who of wave cannot be read: name",
-    "@skill\ndef wave(sim, who: None) -> None: 'Wave.'": "a parameter of wave cannot be None",
-    "@skill\ndef wave(sim, who: str): 'Wave.'": "wave does not say what it returns; write -> None",
-    "@skill\ndef wave(sim, who: str) -> None: pass": "wave has no docstring",
-    "@skill\ndef print(sim, who: str) -> None: 'Wave.'": "print is a name that Python or every program",
-    "@skill\ndef found(sim, who: str) -> None: 'Wave.'": "found means something else in formulas",
-    "@skill\ndef go_to(sim, who: str) -> None: 'Wave.'": "there is a skill go_to already",
+    "@skill\ndef wiggle(): 'Wiggle.'": "must take the simulation and then, by position, what programs pass",
+    "@skill\ndef wiggle(sim, *who: str) -> None: 'Wiggle.'": "must take the simulation and then, by position",
+    "@skill\ndef wiggle(sim, who) -> None: 'Wiggle.'": "who of wiggle has no type; write who: str",
+    "@skill\ndef wiggle(sim, who: str = 'a') -> None: 'Wiggle.'": "wiggle has a default value",
+    "@skill\ndef wiggle(sim, who: dict) -> None: 'Wiggle.'": "the parameter who of wiggle, dict, is none",
+    "@skill\ndef wiggle(sim, who: 'Nobody') -> None: 'Wiggle.'": "who of wiggle cannot be read: name",
+    "@skill\ndef wiggle(sim, who: None) -> None: 'Wiggle.'": "a parameter of wiggle cannot be None",
+    "@skill\ndef wiggle(sim, who: str): 'Wiggle.'": "wiggle does not say what it returns; write -> None",
+    "@skill\ndef wiggle(sim, who: str) -> None: pass": "wiggle has no docstring",
+    "@skill\ndef print(sim, who: str) -> None: 'Wiggle.'": "print is a name that Python or every program",
+    "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": "found means something else in formulas",
+    "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is a skill go_to already",
     "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
-    "@skill(verb='wave {to}')\ndef wave(sim, who: str) -> None: 'Wave.'": "{to}, which is no parameter",
-    "@skill(ros='Wave')\ndef wave(sim, who: str) -> None: 'Wave.'": '"Wave" is no ROS action',
-    "@skill(fails={'KeyError': 'x'})\ndef wave(sim, who: str) -> None: 'Wave.'": "must have a name",
-    "@skill(text='whom')\ndef wave(sim, who: str) -> None: 'Wave.'": "wave has no parameter whom",
-    "def wave(sim, who: str) -> None: 'Wave.'": "it declares no skill; put @skill above a function",
-    "def wave(": "it is no Python",
+    "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "{to}, which is no parameter",
+    "@skill(ros='Wave')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"Wave" is no ROS action',
+    "@skill(fails={'KeyError': 'x'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "must have a name",
+    "@skill(text='whom')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "wiggle has no parameter whom",
+    "def wiggle(sim, who: str) -> None: 'Wiggle.'": "it declares no skill; put @skill above a function",
+    "def wiggle(": "it is no Python",
     "1 / 0": "it cannot be run: ZeroDivisionError",
 }
 
@@ -238,15 +238,17 @@ def test_what_is_wrong_with_a_file_is_one_sentence_with_its_line(tmp_path: Path,
         skills_from(path)
     assert BAD[source] in str(caught.value)
     assert caught.value.file is not None
-    assert (caught.value.line == 4) is not source.startswith("def wave(sim")  # of no line if none is declared
+    assert (caught.value.line == 4) is not source.startswith(
+        "def wiggle(sim"
+    )  # of no line if none is declared
     assert by_name("go_to") is SKILLS["go_to"]
 
 
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ("return 1 / 0", "wave failed: ZeroDivisionError: division by zero"),
-        ("return 3", "wave returned 3, but it declares bool"),
+        ("return 1 / 0", "wiggle failed: ZeroDivisionError: division by zero"),
+        ("return 3", "wiggle returned 3, but it declares bool"),
         ("sim.fail('Other')", 'no skill declares the error "Other"'),
     ],
 )
@@ -255,9 +257,9 @@ def test_a_function_that_fails_ends_the_command_with_a_sentence(
     pool: WorkerPool, tmp_path: Path, body: str, message: str, road: str
 ) -> None:
     path = tmp_path / "bad.py"
-    path.write_text(HEAD + f"@skill\ndef wave(sim: Simulation) -> bool:\n    'Wave.'\n    {body}\n")
+    path.write_text(HEAD + f"@skill\ndef wiggle(sim: Simulation) -> bool:\n    'Wiggle.'\n    {body}\n")
     with pytest.raises(UserError, match=message):
-        ran(pool, skills_from(path), ["wave()"], road)
+        ran(pool, skills_from(path), ["wiggle()"], road)
 
 
 def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:

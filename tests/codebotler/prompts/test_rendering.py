@@ -115,7 +115,7 @@ def texts(prompt: Prompt) -> tuple[str, str]:
 @pytest.mark.parametrize("skill", [*SKILLS.values(), WAVE], ids=lambda skill: skill.name)
 def test_every_skill_of_the_table_stands_in_both_prompts(skill: Skill) -> None:
     for text in texts(prompt_for("Go to the lab.", skills=SKILLS.with_skill(WAVE))):
-        assert f'def {skill.signature}:\n    """{skill.doc}"""' in text
+        assert f'def {skill.signature}:\n    """{skill.doc}' in text
 
 
 def test_skill_that_is_not_in_the_table_is_in_no_prompt() -> None:
