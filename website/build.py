@@ -28,7 +28,8 @@ WIDTH = 82  # letters in a line of `--help` here
 MODULES = {
     "codebotler": (
         *("codebotler", "codebotler.simulator", "codebotler.core.program", "codebotler.core.world"),
-        *("codebotler.core.trace", "codebotler.core.skills", "codebotler.rtl"),
+        *("codebotler.core.skills.paper", "codebotler.core.skills.table"),
+        *("codebotler.core.trace", "codebotler.rtl"),
         *("codebotler.rtl.reasoning", "codebotler.missions.mission"),
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
         *("codebotler.robots.ros.robot", "codebotler.robots.ros.ros1", "codebotler.robots.ros.virtual"),
