@@ -76,7 +76,8 @@ def main() -> None:
 
 def _within(text: str) -> str:
     """A page with links that stay within the site."""
-    text = re.sub(r"\]\(\.\./examples/([\w.]+)\)", lambda m: f"](examples.md#{_anchor(m[1])})", text)
+    text = re.sub(r"\]\(\.\./examples/([\w./]+\.\w+)\)", lambda m: f"](examples.md#{_anchor(m[1])})", text)
+    text = re.sub(r"\]\(\.\./examples/\w+\)", "](examples.md)", text)
     return text.replace("](../CHANGELOG.md)", "](changes.md)")
 
 
@@ -86,10 +87,12 @@ def _anchor(name: str) -> str:
 
 def _examples() -> str:
     parts = ["# Examples", "Small, complete, and run by the tests of the project."]
-    for path in sorted((ROOT / "examples").iterdir()):
-        if path.is_file():
-            language = {".py": "python", ".yaml": "yaml"}.get(path.suffix, "text")
-            parts += [f"## {path.name} {{#{_anchor(path.name)}}}", f"````{language}\n{path.read_text()}````"]
+    folder = ROOT / "examples"
+    further = [*sorted(folder.glob("robots/*.py")), *sorted(folder.glob("skills/*/skills.py"))]
+    for path in [*sorted(one for one in folder.iterdir() if one.is_file()), *further]:
+        language = {".py": "python", ".yaml": "yaml"}.get(path.suffix, "text")
+        name = str(path.relative_to(folder))
+        parts += [f"## {name} {{#{_anchor(name)}}}", f"````{language}\n{path.read_text()}````"]
     return "\n\n".join(parts) + "\n"
 
 

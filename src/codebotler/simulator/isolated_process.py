@@ -47,7 +47,7 @@ CORE, BATCHES = "codebotler.core", f"{__package__}.batches"
 SIMULATION = (
     f"{BATCHES}.process",
     *(f"{CORE}.{name}" for name in ("cachedproperty", "errors", "trace", "words", "world")),
-    *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py"))),
+    *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py")) if path.stem != "files"),
     *(f"{__package__}.{name}" for name in ("fact_sampler", "ledger", "robot", "rules", "sampled_robot")),
 )
 MODULES = {PREPARER: f"{__package__}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}

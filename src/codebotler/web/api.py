@@ -135,7 +135,8 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
         summary, events = _past(console, mission)
         file = io.BytesIO()
-        write_mcap(file, summary, events, folder=console.home / "missions" / summary.id, clock=clock)
+        folder = console.home / "missions" / summary.id
+        write_mcap(file, summary, events, folder=folder, clock=clock, skills=console.robot.skills)
         return _file(file.getvalue(), f"{summary.id}.mcap", "application/octet-stream")
 
 

@@ -8,18 +8,22 @@ that the child must leave it to these.
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
+from typing import Any, Literal
 
 import pytest
 
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.simulation import Simulation
 from codebotler.core.skills.table import Parameter, Recording, Skill
 from codebotler.core.skills.values import NOTHING
-from codebotler.core.trace import Outcome, Status
+from codebotler.core.trace import Outcome, Status, trace_data
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fact_sampler import FactSampler
@@ -28,6 +32,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.sandbox.fuel import prepared
+from codebotler.simulator.skill_protocol import arguments_of
 from codebotler.simulator.worker import NewRobot, Worker
 
 FOLDER = Path(__file__).parents[2] / "hostile_tame"
@@ -498,6 +503,8 @@ MALFORMED = {
     "too few arguments": TRANSCRIPT % (b'["say",[],"ok",null]', b"0", b"", END),
     "an argument of another type": TRANSCRIPT % (b'["say",[["x"]],"ok",null]', b"0", b"", END),
     "an option that is none": TRANSCRIPT % (b'["ask",["","",[["x",1]]],"ok",0]', b"0", b"", END),
+    "options that are texts": TRANSCRIPT % (b'["ask",["","",["x"]],"ok",0]', b"0", b"", END),
+    "a number for a text": TRANSCRIPT % (b'["say",[3],"ok",null]', b"0", b"", END),
     "another answer": TRANSCRIPT % (b'["say",["x"],"ok",true]', b"0", b"", END),
     "an answer to wait for": TRANSCRIPT % (b'["say",["x"],"ask",null]', b"0", b"", END),
     "an error that is none": TRANSCRIPT % (FAILS % b"5", b"0", b"", END),
@@ -518,6 +525,41 @@ def test_malformed_transcript_is_no_outcome(frame: bytes) -> None:
     assert (first.status, [event.time for event in first.trace]) == (Status.FINISHED, [0.0, 5.0])
     with pytest.raises(ProtocolError):
         next(told)
+
+
+@skill
+def paint(_: Simulation, colour: Literal["red", "blue"], coats: int, litres: float, walls: list[str]) -> None:
+    """Paint."""
+
+
+PAINT = SKILLS.with_skill(paint)
+MISFITS = {
+    "no choice": ["green", 1, 0.5, ["a"]],
+    "a truth value for a number": ["red", True, 0.5, ["a"]],
+    "a fraction for a whole number": ["red", 1.5, 0.5, ["a"]],
+    "too large a number": ["red", 2**60, 0.5, ["a"]],
+    "a text for a number": ["red", 1, "0.5", ["a"]],
+    "a text for a list": ["red", 1, 0.5, "a"],
+    "a number in a list of texts": ["red", 1, 0.5, [1]],
+    "a list in a list": ["red", 1, 0.5, [["a", True]]],
+    "too few": ["red", 1, 0.5],
+}
+
+
+@pytest.mark.parametrize("values", MISFITS.values(), ids=MISFITS)
+def test_what_an_own_skill_does_not_take_is_refused_outside_of_the_sandbox(values: list[Any]) -> None:
+    robots = [SimulatedRobot(WORLDS[0], AS_WRITTEN, PAINT)] * 2
+    asked = TRANSCRIPT % (b'["paint",%s,"ask",null]', b"", b"", b"null")
+    asked = asked.replace(b"[],[]", b"[0],[]")
+    good = asked % json.dumps(["red", 1, 2, ["a"]]).encode()
+    told = outcomes(Taken(good, TRANSCRIPT % (b"", b"", b"", END)), [(b"", robots[:1])])
+    outcome = next(told)
+    assert outcome is not None
+    assert trace_data(outcome.trace) == [["paint", "red", ["1", "2", "a"]]]
+    with pytest.raises(ProtocolError):
+        next(outcomes(Taken(asked % json.dumps(values).encode()), [(b"", robots[1:])]))
+    with pytest.raises(ProtocolError):
+        arguments_of(paint, values)
 
 
 def test_child_that_says_no_more_is_lost() -> None:

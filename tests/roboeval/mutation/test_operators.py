@@ -8,11 +8,14 @@ import textwrap
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import TypedDict
+from typing import Literal, TypedDict
 
 import pytest
 import yaml
 
+from codebotler.core.skills.declaration import skill
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.simulation import Simulation
 from codebotler.core.trace import Event, Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
@@ -33,6 +36,17 @@ WORLD = World(
 )
 CONTEXT = Context.of([WORLD])
 RULES = Rules(literals="as-written", limits=Limits(calls=20))
+
+
+@skill(fails={"CupFull": "the cup is full"})
+def pour(sim: Simulation, cup: str, size: Literal["small", "large"]) -> bool:  # noqa: ARG001 - as programs call it
+    """Pour something into a cup; False if it runs out of it."""
+    if cup == "full":
+        sim.fail("CupFull")
+    return cup != "sieve"
+
+
+TABLE = SKILLS.with_skill(pour)
 BY_NAME = {operator.name: operator for operator in OPERATORS}
 
 
@@ -67,7 +81,7 @@ def mutants(operator: Operator, body: str) -> Iterator[str]:
 def outcomes() -> dict[str, Outcome]:
     """How all programs of the examples ended."""
     programs = [program(body) for example in EXAMPLES for body in (example["before"], example["after"])]
-    ended = run(((source, WORLD) for source in programs), workers=2, rules=RULES)
+    ended = run(((source, WORLD) for source in programs), workers=2, rules=RULES, skills=TABLE)
     return dict(zip(programs, ended, strict=True))
 
 

@@ -1,0 +1,58 @@
+"""The page of a robot with skills of its user's: listed, checked, run and told in their words."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pageserver import PageServer
+
+QUADRUPED = Path(__file__).parents[3] / "examples" / "skills" / "quadruped"
+OPENS = """def task_program():
+    say("Careful, a door opens.")
+    try:
+        open_door("steel door")
+    except Exception as error:
+        say(str(error))
+    open_door("glass door")
+"""
+
+
+def test_a_program_with_own_skills_is_checked_and_run(tmp_path: Path) -> None:
+    world = (QUADRUPED / "world.yaml").read_text()
+    more = (
+        "--speed",
+        "0",
+        "--skills",
+        str(QUADRUPED / "skills.py"),
+        "--rules",
+        str(QUADRUPED / "rules.yaml"),
+    )
+    with PageServer(tmp_path, *more, world=world) as server:
+        listed = server.call("GET", "/api/robot").data["skills"]
+        assert "open_door(door: str) -> bool" in listed
+        found = server.call("POST", "/api/check", {"program": OPENS}).data
+        assert [problem["kind"] for problem in found["problems"]] == ["DoorLocked"]
+        started = server.call("POST", "/api/missions", {"program": OPENS}).data
+        view = wait(server, lambda now: now["check"] is not None)
+        approval = {"program": view["digest"], "despite_problems": True}
+        assert server.call("POST", f"/api/missions/{started['id']}/approve", approval).status == 200
+        over = wait(server, lambda now: now["is_over"])
+        assert over["state"] == "done", over
+        events = server.call("GET", f"/api/missions/{started['id']}").text
+        assert "DoorLocked" in events
+        refused = server.call("POST", "/api/check", {"program": OPENS.replace('"steel door"', "3")}).data
+        assert "TypeError" in [problem["kind"] for problem in refused["problems"]]
+
+
+def wait(server: PageServer, holds: Callable[[Any], bool], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON
+    ends = time.monotonic() + seconds
+    while not holds(now := server.call("GET", "/api/missions/current").data):
+        if time.monotonic() > ends:
+            pytest.fail(str(now))
+        time.sleep(0.05)
+    return now
