@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros.robot import actions_of
 from codebotler.robots.ros.worker import WORKERS
@@ -61,14 +62,17 @@ def bridge(handle: Callable[[ServerConnection], None]) -> Iterator[Bridge]:
     double.end()
 
 
-def over_ros(master: str, skills: tuple[str, ...] = tuple(SKILLS)) -> Callable[[ServerConnection], None]:
+def over_ros(
+    master: str, skills: tuple[str, ...] = tuple(SKILLS), table: SkillTable = SKILLS
+) -> Callable[[ServerConnection], None]:
     """Handles connections by a node of their own on a real ROS graph.
 
     Args:
         master: of the graph.
         skills: whose messages it knows.
+        table: all of them.
     """
-    actions = [action for skill, action in actions_of(SKILLS).items() if skill in skills]
+    actions = [action for skill, action in actions_of(table).items() if skill in skills]
 
     def handle(connection: ServerConnection) -> None:
         with subprocess.Popen(

@@ -144,6 +144,7 @@ CALLED = {
     "digest": "content of the suite",
     "rules": "set of rules of simulation",
     "house_rules": "set of house rules",
+    "skills": "set of skills",
     "codebotler": "version of this tool",
     "python": "version of Python",
     "tasks": "selection of tasks",

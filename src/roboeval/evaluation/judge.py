@@ -19,6 +19,8 @@ from msgspec import to_builtins
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
+from codebotler.core.skills.files import files_of
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status, Trace, outcome_data
 from codebotler.core.world import World
 from codebotler.rtl import Inconclusive, holds
@@ -287,6 +289,7 @@ def head(suite: Suite) -> dict[str, Any]:
             if (house := suite.house) is None
             else {"house_rules": {house.name or suite.name: house.digest}}
         ),
+        **({} if suite.skills is SKILLS else {"skills": files_of(suite.skills)}),
         "codebotler": __version__,
         "python": PYTHON,
     }

@@ -10,8 +10,11 @@ from typing import Any
 import pytest
 
 from pageserver import PageServer
+from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.suites.load import load_suite
 
-QUADRUPED = Path(__file__).parents[3] / "examples" / "skills" / "quadruped"
+SETS = Path(__file__).parents[3] / "examples" / "skills"
+QUADRUPED = SETS / "quadruped"
 OPENS = """def task_program():
     say("Careful, a door opens.")
     try:
@@ -47,6 +50,21 @@ def test_a_program_with_own_skills_is_checked_and_run(tmp_path: Path) -> None:
         assert "DoorLocked" in events
         refused = server.call("POST", "/api/check", {"program": OPENS.replace('"steel door"', "3")}).data
         assert "TypeError" in [problem["kind"] for problem in refused["problems"]]
+
+
+@pytest.mark.parametrize("name", sorted({path.name for path in SETS.iterdir()} - {QUADRUPED.name}))
+def test_the_other_sets_are_served_as_well(tmp_path: Path, name: str) -> None:
+    own = SETS / name
+    more = ("--speed", "0", "--skills", str(own / "skills.py"), "--rules", str(own / "rules.yaml"))
+    (completion, *_) = recorded_completions("recorded:careful", load_suite(own))
+    with PageServer(tmp_path, *more, world=(own / "world.yaml").read_text()) as server:
+        found = server.call("POST", "/api/check", {"program": completion.program}).data
+        assert found["problems"] == []
+        started = server.call("POST", "/api/missions", {"program": completion.program}).data
+        view = wait(server, lambda now: now["check"] is not None)
+        server.call("POST", f"/api/missions/{started['id']}/approve", {"program": view["digest"]})
+        over = wait(server, lambda now: now["is_over"])
+        assert over["state"] == "done", over
 
 
 def wait(server: PageServer, holds: Callable[[Any], bool], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON

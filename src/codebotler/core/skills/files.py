@@ -42,6 +42,13 @@ def declared_in(path: Path) -> list[Skill]:
     return [row for row in found if getattr(row.does, "__module__", "") == module.__name__]
 
 
+def files_of(skills: SkillTable) -> dict[str, str]:
+    """The names of the files that declare skills of a table, each with the SHA-256 of its content."""
+    modules = {getattr(row.does, "__module__", "") for row in skills.rows}
+    paths = {Path(str(sys.modules[name].__file__)) for name in modules if name.startswith(OWN)}
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}
+
+
 def skill_in(path: str, name: str) -> Skill:
     """A skill of a file by its name, in another process, say."""
     found: Skill = getattr(loaded(Path(path)), name)

@@ -1,0 +1,81 @@
+"""Skills of one's own over a real ROS graph: values of every type, and errors, go there and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bridges import bridge, over_ros
+from codebotler.core.errors import RobotError
+from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.world import Room, World
+from codebotler.robots.base import Options
+from codebotler.robots.ros import rosbridge
+from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.virtual import VirtualRobot
+from ros_graph import Graph
+
+SKILLS = """
+from typing import Literal
+from codebotler import Simulation, skill
+
+@skill(ros="lab_msgs/Mix:/mix", fails={"Spilt": "something was spilt"})
+def mix(
+    sim: Simulation, name: str, parts: int, share: float, hot: bool, how: Literal["stir", "shake"]
+) -> list[str]:
+    "Mix."
+    if name == "too much":
+        sim.fail("Spilt")
+    return [f"{name} {parts!r} {share!r} {hot!r} {how}"]
+
+@skill(ros="other_msgs/Sum:/sum_up")
+def sum_up(sim: Simulation, numbers: list[int], shares: list[float]) -> float:
+    "Sum."
+    return sum(numbers) + sum(shares)
+
+@skill(ros="lab_msgs/Ready:/ready")
+def ready(sim: Simulation) -> bool:
+    "Ready."
+    return True
+"""
+
+
+@pytest.fixture(name="table")
+def table_(tmp_path: Path) -> SkillTable:
+    path = tmp_path / "lab.py"
+    path.write_text(SKILLS)
+    return skills_from(path)
+
+
+@pytest.fixture(params=["ros1", "rosbridge"], name="robot")
+def robot_(request: pytest.FixtureRequest, graph: Graph, table: SkillTable) -> Iterator[RosRobot]:
+    virtual = VirtualRobot(World((Room("hall"),), "hall"), speed=None, port=graph.port, skills=table)
+    virtual.start()
+    waits = Waits(patience=10.0, silence=5.0, longest=20.0)
+    if request.param == "ros1":
+        yield graph.robot(waits, skills=table)
+    else:
+        with bridge(over_ros(graph.uri, tuple(table), table)) as double:
+            behind = rosbridge.robot(Options(address=double.address, skills=table), waits)
+            yield behind
+            behind.disconnect()
+    virtual.stop()
+
+
+def test_values_of_every_type_go_there_and_back(robot: RosRobot) -> None:
+    robot.connect()
+    assert robot.missing == {}
+    done: list[Any] = [
+        robot.perform("mix", ["tea", 3, 0.5, True, "stir"]),
+        robot.perform("sum_up", [(1, 2), (0.25, 0.5)]),
+        robot.perform("ready", []),
+        robot.perform("get_all_rooms", []),
+    ]
+    assert done == [["tea 3 0.5 True stir"], 3.75, True, ["hall"]]
+    with pytest.raises(RobotError, match="something was spilt") as caught:
+        robot.perform("mix", ["too much", 1, 1, False, "shake"])
+    assert caught.value.kind == "Spilt"
