@@ -167,6 +167,9 @@ def test_a_suite_is_evaluated_and_mutated_from_the_command_line(own: Own, tmp_pa
     assert done.exit_code == 0, done.output
     shown = CliRunner().invoke(roboeval, ["show", run, "--suite", str(own.folder)])
     assert shown.exit_code == 0, shown.output
+    words = ["run", "--model", "recorded:careful", "--suite", str(own.folder), "--no-report"]
+    passed = CliRunner().invoke(roboeval, [*words, "--out", str(tmp_path / "careful")])
+    assert "pass@1 over all prompts: 1.000" in passed.output, passed.output
     mutated = CliRunner().invoke(
         roboeval, ["mutate", "--suite", str(own.folder), "--mutants", "10", "--brief"]
     )

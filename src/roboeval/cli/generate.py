@@ -66,7 +66,7 @@ def completed(
     from codebotler.models.base import SamplingSettings
     from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
-    from codebotler.models.recorded import NOTICE, is_recorded
+    from codebotler.models.recorded import NOTICE, is_recorded, recorded_model
     from roboeval.evaluation.generate import Pace, generate_run
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
@@ -76,7 +76,9 @@ def completed(
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    opened = open_model(chosen.name, settings)
+    own = None if known.folder is None else known.folder / "solutions"  # which recorded models know as well
+    knows_more = is_recorded(chosen.name) and chosen.base_url is None
+    opened = recorded_model(chosen.name, own) if knows_more else open_model(chosen.name, settings)
     run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", opened.name).strip("-.")))
     meter = Meter()
     try:
