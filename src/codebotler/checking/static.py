@@ -1,4 +1,4 @@
-"""Static analysis: certain errors in code that is reached and not guarded, and misuse of own skills."""
+"""Static analysis: certain errors in code that is reached and not guarded, and skills that are misused."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: S
     by_line: dict[int | None, list[Flaw]] = {}
     for flaw in flaws:
         kinds = frozenset().union(*(kinds for lines, kinds in caught if flaw.line in lines))
-        is_guarded = flaw.kind in kinds or bool(kinds & EVERYTHING)
-        if flaw.line not in never and (flaw.is_misuse or not is_guarded):
+        is_hidden = bool(kinds & EVERYTHING) and not flaw.is_misuse
+        if flaw.line not in never and flaw.kind not in kinds and not is_hidden:
             by_line.setdefault(flaw.line, []).append(flaw)
     return [
         Problem(same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)

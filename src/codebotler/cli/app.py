@@ -59,8 +59,8 @@ def generate(
     from codebotler.prompts import prompt_for
 
     chosen = chosen_model(model, base_url)
-    known = None if world is None else World.read(world)
     table = skills_from(*(skills or ()))
+    known = None if world is None else World.read(world, table)
     house_rules = rules_for(known, rules, table)
     prompt = prompt_for(
         instruction,
@@ -119,8 +119,8 @@ def check(
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
 
-    known = None if world is None else World.read(world)
     table = skills_from(*(skills or ()))
+    known = None if world is None else World.read(world, table)
     house_rules = rules_for(known, rules, table)
     source = read_program(program)
     with busy("checking"):
@@ -163,7 +163,7 @@ def rules(
 
     table = skills_from(*(skills or ()))
     house_rules = read_rules(file, table)
-    known = None if world is None else World.read(world)
+    known = None if world is None else World.read(world, table)
     with busy("looking for examples"):
         found = reviewed(house_rules, known)
     if json:
@@ -247,7 +247,7 @@ def run(
     asked = SamplingSettings(base_url=chosen.base_url)
     world = options.world_or_office(robot, world)
     settings = Options(
-        world=None if world is None else World.read(world),
+        world=None if world is None else World.read(world, table),
         speed=speed or None,
         address=address,
         ros_python=ros_python,
@@ -390,7 +390,7 @@ def serve_page(
     place = Place(host, port, tuple(name or ()))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
     world = options.world_or_office(robot, world)
-    known = None if world is None else World.read(world)
+    known = None if world is None else World.read(world, table)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
     settings = Options(known, speed or None, address, ros_python, table)
     shown = Face(face_timeout) if face else None
@@ -429,7 +429,8 @@ def virtual_robot(
         with suppress(OSError):  # the robot goes on where nobody reads any more
             print_text(line)
 
-    known, table = World.read(world), skills_from(*(skills or ()))
+    table = skills_from(*(skills or ()))
+    known = World.read(world, table)
     robot = VirtualRobot(known, speed=speed, port=port, python=ros_python, show=show, skills=table)
     try:
         started = robot.start()

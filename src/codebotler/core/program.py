@@ -42,7 +42,7 @@ class Flaw:
     line: int | None  # counted from 1; None where no line is to blame
     kind: str  # of the failure that it leads to, such as `NameError` or `AskEmptyOptions`
     message: str  # one plain sentence
-    is_misuse: bool = False  # of one of a user's own skills, which no `except` makes right
+    is_misuse: bool = False  # of a skill, which an `except` for all errors hides, and does not make right
 
 
 @dataclass(frozen=True)
@@ -245,13 +245,17 @@ def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
 def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
     undefined = undefined_names(tree, skills)
     hints = _meant(tree, dict.fromkeys(name for _, name, is_local in undefined if not is_local), skills)
+    called = {n.func.id for n in nodes(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
     for line, name, is_local in undefined:
         if is_local:
             message = f"the local variable {name} is used before it has a value"
             yield Flaw(line, "UnboundLocalError", message)
         else:
             hint = f"; did you mean {hints[name]}?" if name in hints else ""
-            yield Flaw(line, "NameError", f"the name {name} is not defined{hint}")
+            if not hint and name in called:
+                hint = "; if it is a skill of your own, name its file with --skills"
+            message = f"the name {name} is not defined{hint}"
+            yield Flaw(line, "NameError", message, is_misuse=name in called)
 
 
 def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:

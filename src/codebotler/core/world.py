@@ -13,6 +13,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from codebotler.core.skills.table import SkillTable
+
 warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # odd regexes, which still work
 
 Point: TypeAlias = tuple[float, float]
@@ -73,11 +75,11 @@ class World:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
 
     @classmethod
-    def read(cls, path: Path) -> World:
+    def read(cls, path: Path, skills: SkillTable | None = None) -> World:
         """Read a world file; a UserError names the line of what is wrong, and how to mend it."""
         from codebotler.core.world_file import read_world
 
-        return read_world(path)
+        return read_world(path, skills)
 
     def to_yaml(self) -> str:
         """This world as the text of a world file."""

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import re
+from collections.abc import Iterator
+from contextlib import suppress
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -22,14 +26,24 @@ from pydantic import (
     model_validator,
 )
 
+from codebotler.core.program import parse_expression
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.skills.values import Scalar, written_call
+from codebotler.core.words import listed
 from codebotler.core.world import Answer, Person, Point, Room, World
 from codebotler.core.yaml_files import Place, YamlFile
 
 
-def read_world(path: Path) -> World:
-    """Read a world file; a UserError names the line of what is wrong, and how to mend it."""
+def read_world(path: Path, skills: SkillTable | None = None) -> World:
+    """Read a world file; a UserError names the line of what is wrong, and how to mend it.
+
+    Args:
+        path: of the file.
+        skills: of which it may say what their calls return; None if that is not to be checked.
+    """
     file = YamlFile.read(path)
-    return file.validate(WorldFile).world(file)
+    return file.validate(WorldFile).world(file, skills=skills)
 
 
 Text = Annotated[str, StringConstraints(strict=True)]
@@ -128,8 +142,18 @@ class WorldFile(_Form):
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
     truths: dict[Name, Value | list[Value]] = {}
 
-    def world(self, file: YamlFile, at: Place = ()) -> World:
-        """The world that it describes, or a UserError about a room or a regex."""
+    def _truths(
+        self, file: YamlFile, at: Place, skills: SkillTable | None
+    ) -> Iterator[tuple[str, Scalar | tuple[Scalar, ...]]]:
+        for statement, value in self.truths.items():
+            try:
+                asked = _truth(statement, value, skills)
+            except ValueError as error:
+                raise file.wrong(str(error), *at, statement) from None
+            yield asked, tuple(value) if isinstance(value, list) else value
+
+    def world(self, file: YamlFile, at: Place = (), skills: SkillTable | None = None) -> World:
+        """The world that it describes, or a UserError about a room, a regex or a truth."""
         names = [room.name for room in self.rooms]
         for index, room in enumerate(self.rooms):
             for other in names[:index]:
@@ -163,8 +187,51 @@ class WorldFile(_Form):
             robot=self.robot,
             about=self.about,
             may_wait_forever=self.may_wait_forever,
-            truths=tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in self.truths.items()),
+            truths=tuple(self._truths(file, (*at, "truths"), skills)),
         )
+
+
+_CALL = re.compile(r"\w+\(.*\)")
+
+
+def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
+    """A statement as skills ask for it; a ValueError if its value is none that it can have."""
+    if not _CALL.fullmatch(statement):
+        if not isinstance(value, bool):
+            raise ValueError(f'"{statement}" is {value!r}; write true or false')
+        return statement
+    node: ast.expr = ast.Constant(None)
+    given: list[object] = []
+    with suppress(SyntaxError, ValueError, RecursionError):
+        node = parse_expression(statement)
+        given = [ast.literal_eval(one) for one in node.args] if isinstance(node, ast.Call) else []
+    match node:
+        case ast.Call(ast.Name(name), arguments, []) if len(arguments) == len(given):
+            pass
+        case _:
+            raise ValueError(f'"{statement}" is no call; write it as in read_gauge("boiler")')
+    if skills is not None and len(skills) > len(SKILLS):
+        _expect_possible(name, given, value, skills)
+    return written_call(name, given)
+
+
+def _expect_possible(name: str, given: list[object], value: object, skills: SkillTable) -> None:
+    """A ValueError if a call cannot come to a value, or the world does not decide that."""
+    if name not in skills:
+        alike = get_close_matches(name, skills, 1)
+        raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
+    row = skills[name]
+    if not row.is_by_lot:
+        raise ValueError(f"the code of {name} decides what comes of it; say what is true of what it asks for")
+    if len(given) != len(row.parameters) or not all(
+        parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
+    ):
+        raise ValueError(f"{name} takes other arguments: {row.signature}")
+    kinds = [kind for kind, _ in row.fails]
+    if value in kinds or (row.returns.base is not None and row.returns.fits(value)):
+        return
+    returned = [] if row.returns.base is None else [row.returns.words]
+    raise ValueError(f"{name} cannot come to {value!r}; write {listed([*returned, *kinds], 'or')}")
 
 
 _ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary

@@ -34,7 +34,7 @@ def activity(line: Line) -> str:
         return f"executing {visible(line['skill'])}"
     if skill.recording is None:
         return skill.verb.ing
-    if skill.recording.more or not skill.recording.text:
+    if skill.recording.more or skill.verb.object or not skill.recording.text:
         return skill.verb.with_object(skill.verb.ing, _given(skill.recording, line))
     text = shortened(room_name(str(line["arguments"][skill.recording.text])), 100)
     if skill.recording.is_drive:
@@ -82,7 +82,7 @@ def _skill(line: Line) -> str:
         return shortened(written_call(line["skill"], list(arguments.values())))
     if skill.recording is None:
         return skill.verb.third
-    if skill.recording.more or not skill.recording.text:
+    if skill.recording.more or skill.verb.object or not skill.recording.text:
         return skill.verb.with_object(skill.verb.third, _given(skill.recording, line))
     text = str(arguments[skill.recording.text])
     words = f'{skill.verb.third} "{shortened(room_name(text) if skill.recording.is_drive else text)}"'

@@ -10,10 +10,13 @@ from concurrent.futures import CancelledError as FutureCancelledError
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
+from traceback import extract_tb
 from typing import Any
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.files import loaded
+from codebotler.core.skills.table import Skill
+from codebotler.core.words import listed
 from codebotler.robots.base import (
     Argument,
     CancelledError,
@@ -61,6 +64,8 @@ class OwnRobot:
         self._body = _made(Path(path), kind)
         methods = {skill: self._method(skill) for skill in self.skills}
         self._methods = {skill: method for skill, method in methods.items() if method is not None}
+        for skill, method in self._methods.items():
+            _expect_fit(kind, method, self.skills[skill])
         self.missing: Mapping[str, str] = {
             skill: f"{kind} has no method {skill}" for skill in self.skills if skill not in self._methods
         }
@@ -179,6 +184,20 @@ class OwnRobot:
                 self._running = None
 
 
+def _expect_fit(kind: str, method: Callable[..., Any], skill: Skill) -> None:
+    """UserError if a method does not take what programs pass to its skill."""
+    code = getattr(method, "__code__", None)
+    try:
+        inspect.signature(method).bind(*(parameter.name for parameter in skill.parameters))
+    except TypeError:
+        takes = ", ".join(["self", *(parameter.name for parameter in skill.parameters)])
+        file, line = (None, None) if code is None else (code.co_filename, code.co_firstlineno)
+        sentence = f"{kind}.{skill.name} does not take what programs pass; write def {skill.name}({takes})"
+        raise UserError(sentence, file=file, line=line) from None
+    except ValueError:  # it has no signature that Python knows
+        return
+
+
 def _run(loop: asyncio.AbstractEventLoop) -> None:
     """Run a loop until it is stopped."""
     try:
@@ -190,21 +209,32 @@ def _run(loop: asyncio.AbstractEventLoop) -> None:
 
 def _made(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
     """An object of a class in a file; a UserError if it cannot be a robot."""
-    made = getattr(loaded(path), kind, None)
-    if not inspect.isclass(made):
-        raise UserError(f"it has no class {kind}", file=path)
+    module = loaded(path)
+    classes = [
+        n for n, one in vars(module).items() if inspect.isclass(one) and one.__module__ == module.__name__
+    ]
+    if kind not in classes:
+        hint = f"; its classes are {listed(classes)}" if classes else ""
+        raise UserError(f"it has no class {kind}{hint}", file=path)
+    made = getattr(module, kind)
     line = inspect.getsourcelines(made)[1]
     for method, why in NEEDED.items():
         if not callable(getattr(made, method, None)):
-            raise UserError(f"{kind} has no method {method}, {why}", file=path, line=line)
+            raise UserError(
+                f"{kind} has no method {method}, {why}; add def {method}(self)", file=path, line=line
+            )
     try:
         return made()
     except Exception as error:
         raise UserError(f"{kind}() failed: {_said(error)}", file=path, line=line) from error
 
 
+OURS = str(Path(__file__).parents[1])
 NEEDED = {"stop": "which stops the robot at once", "rooms": "which lists the rooms"}
 
 
 def _said(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+    """An error in words, with the last line of a file of the user's that it came through."""
+    own = [frame for frame in extract_tb(error.__traceback__) if not frame.filename.startswith(OURS)]
+    where = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+    return f"{type(error).__name__}: {error}{where}"

@@ -12,7 +12,7 @@ from typing import get_args
 from codebotler.core.program import parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.skills.values import ValueType, as_text
+from codebotler.core.skills.values import TRUTH, ValueType, as_text
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
@@ -67,6 +67,7 @@ class _Parser:
         self.text = re.sub(r"[\r\n\f]", " ", text).strip()
         self.bytes = self.text.encode(errors="replace")  # in which `ast` counts columns
         self.recordings = skills.recordings
+        self.skill_of = {s.recording.kind: s for s in skills.rows if s.recording}
         self.types = {
             s.recording.kind: {p.name: p.type for p in s.parameters} for s in skills.rows if s.recording
         }
@@ -212,6 +213,10 @@ class _Parser:
             case "returned":
                 if not (isinstance(what, ast.Constant) and isinstance(what.value, bool)):
                     raise self.expected("True or False", what)
+                if not self.skill_of[element.kind].returns == TRUTH:
+                    raise self.error(
+                        inner, f"returned is about skills that return True or False; {element.kind} does not"
+                    )
                 return replace(element, found=what.value)
         if element.kind != self.question:
             raise self.error(inner, "to is about questions; use ask, mention or answered")
@@ -293,6 +298,8 @@ class _Parser:
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
         close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
+        if what == "element" and not close:
+            hint += ", or a skill of your own, whose file --skills or a suite names"
         return self.error(at, f"unknown {what} {name}; {hint}")
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:

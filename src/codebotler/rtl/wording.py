@@ -24,7 +24,7 @@ _LOOKS: Mapping[bool, Mapping[Form, str]] = {
 _MOST_LISTED = 5
 _TEXT = r"[\w ',;:!%@&/-]+"
 _ALTERNATIVES = re.compile(rf"{_TEXT}(?:\|{_TEXT})*")
-_EXACT = re.compile(r"\^([\w ]+)\$")
+_EXACT = re.compile(r"\^([\w -]+(?:\\?\.\d+)?)\$")
 _WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
 
 
@@ -36,21 +36,35 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
     elif element.answer is not None:
         got = {"base": "get", "past": "got", "ing": "getting"}[form]
         done = f"{got} an answer {described(element.answer)}"
+    elif verb(element.kind).object:
+        told = verb(element.kind)
+        wanted = [_part(text, thing) for text in (element.text, *element.more)]
+        done = told.with_object(getattr(told, form), [*wanted, *[thing] * told.object.count("{")], "")
     else:
         done = f"{getattr(verb(element.kind), form)} {_wanted(element, thing)}"
     if element.mention:
         done += " in the question or an option"
     if element.options is not None and not is_any(element.options):
         done += f" offering an option {described(element.options)}"
-    if element.more:
+    if element.more and not verb(element.kind).object:
         done = f"{done.rstrip()}, {listed([*filter(None, map(described, element.more))])}".rstrip(", ")
     if element.found is not None and element.kind != "check":
-        done = f"{done.rstrip()}: {verb(element.kind).results[element.found]}"
+        done = f'{done.rstrip()} with the result "{verb(element.kind).results[element.found]}"'
     if element.to is not None:
         done = f"{done.rstrip()} of somebody {described(element.to)}"
     if element.holding is not None:
         done = f"{done.rstrip()} while holding something {described(element.holding)}"
     return done.rstrip() if element.place is None else f"{done.rstrip()} in {room(Regex(element.place))}"
+
+
+def _part(text: Text, thing: str) -> str:
+    """One of the things that a verb is done to, among other words."""
+    match text:
+        case Regex(pattern) if exact := _EXACT.fullmatch(pattern):
+            return exact[1]
+        case Regex(pattern) if _ALTERNATIVES.fullmatch(pattern):
+            return named(pattern)
+    return f"{thing} {described(text)}".rstrip()
 
 
 def _wanted(element: EventPattern, thing: str) -> str:
@@ -66,14 +80,20 @@ def _wanted(element: EventPattern, thing: str) -> str:
 
 def happening(event: Event, element: EventPattern) -> str:
     """The object of what the robot did, and whatever else an element compares."""
-    thing = room_name(event.text) if event.kind == "goto" else quoted(event.text)
+    told = verb(event.kind)
+    if told.object:
+        thing = told.with_object("", [brief(text) for text in (event.text, *event.more)], "").strip()
+    elif takes_nothing(event.kind):
+        thing = ""
+    else:
+        thing = room_name(event.text) if event.kind == "goto" else quoted(event.text)
     if event.options and (element.mention or not is_any(element.options)):
         thing += f" with the options {listed(few([quoted(option.text) for option in event.options]))}"
     if element.answer is not None:
         thing += (
             " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
         )
-    if event.more:
+    if event.more and not told.object:
         thing += f", {', '.join(map(quoted, event.more))}"
     if element.found is not None and event.kind != "check":
         thing += "" if event.found is None else f" ({verb(event.kind).results[event.found]})"

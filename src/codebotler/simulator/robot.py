@@ -95,6 +95,7 @@ class SimulatedRobot:
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
         self.line: int | None = None
+        self._at_work: Skill | None = None  # one of a user's own
         self.events: list[Event] = []
 
     # Made when they are first needed: whose run is remembered needs neither.
@@ -258,6 +259,8 @@ class SimulatedRobot:
                 )
             return plain(known)
         results = possible(row.returns)
+        if len(results) == 1 and not row.fails:
+            return results[0]
         words = [f"gives {result!r}" if result is not None else "works" for result in results]
         number = self.lot(call, words, [f"fails: {when}" for _, when in row.fails])
         if number >= len(results):
@@ -266,13 +269,16 @@ class SimulatedRobot:
 
     def fail(self, kind: str) -> NoReturn:
         """End a skill with an error that it declares."""
-        for row in self.skills.rows:
-            for declared, when in row.fails:
-                if declared == kind:
-                    raise RobotError(kind, f"{row.name}: {when}")
-        raise UserError(
-            f'no skill declares the error "{kind}"; name it in `fails`, with the clause that says when'
-        )
+        row = self._at_work
+        declared = {} if row is None else dict(row.fails)
+        if row is not None and kind in declared:
+            raise RobotError(kind, f"{row.name}: {declared[kind]}")
+        from difflib import get_close_matches  # noqa: PLC0415 - children have no use for it
+
+        alike = get_close_matches(kind, declared, 1)
+        hint = f"did you mean {alike[0]}?" if alike else "name it in `fails`, with the clause that says when"
+        sentence = f'{row.name if row else "the skill"} declares no error "{kind}"; {hint}'
+        raise UserError(sentence) if row is None else _wrong(row, sentence)
 
     def lot(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
         """Draw which of some outcomes a statement has in this world: the same one each time."""
@@ -291,6 +297,7 @@ class SimulatedRobot:
         is_tried = row.recording is not None and row.recording.when_tried
         if event is not None and is_tried:
             self.events.append(event)
+        self._at_work = row
         result: Result = called(row, self, arguments)
         if event is not None:
             if not is_tried:
@@ -353,13 +360,19 @@ def called(row: Skill, robot: SimulatedRobot, arguments: Sequence[Argument]) -> 
             tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
         ]
         line = lines[-1] if lines else code.co_firstlineno
-        sentence = f"{row.name} failed: {type(error).__name__}: {error}"
+        said = str(error).replace(type(robot).__name__, "Simulation")
+        sentence = f"{row.name} failed: {type(error).__name__}: {said}"
         raise UserError(sentence, file=code.co_filename, line=line) from error
     fitting = [option.text for option in arguments[-1]] if row.recording and row.recording.options else None  # type: ignore[union-attr]
     if (fitting is not None and result not in fitting) or not row.returns.fits(result):
-        sentence = f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}"
-        raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
+        raise _wrong(row, f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")
     return result
+
+
+def _wrong(row: Skill, sentence: str) -> UserError:
+    """An error that names the file and the line of a skill's function."""
+    code = getattr(row.does, "__wrapped__", row.does).__code__  # type: ignore[union-attr]  # a function
+    return UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
 
 
 def _tracebacks(error: BaseException) -> Iterator[TracebackType]:

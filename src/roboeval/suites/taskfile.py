@@ -173,7 +173,7 @@ class _Reader:
         for number, world in enumerate(worlds):
             at = ("worlds", number)
             require = self._requirements(world.require, world.robot, (*at, "require"))
-            yield Scenario(world.world(self.file, at), require)
+            yield Scenario(world.world(self.file, at, self.skills), require)
 
     def ablated(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
         if any(world.ablation is None for world in worlds):
@@ -181,7 +181,7 @@ class _Reader:
         for number, form in enumerate(worlds):
             at = ("worlds", number)
             people = form.people if form.ablation_people is None else form.ablation_people
-            world = form.model_copy(update={"people": people}).world(self.file, at)
+            world = form.model_copy(update={"people": people}).world(self.file, at, self.skills)
             require = self._requirements(form.ablation or [], world.robot, (*at, "ablation"))
             yield Scenario(world, require)
 

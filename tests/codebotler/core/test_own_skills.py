@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.declaration import RTL_WORDS, by_name
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
@@ -223,6 +223,15 @@ BAD = {
     "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "{to}, which is no parameter",
     "@skill(ros='Wave')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"Wave" is no ROS action',
     "@skill(fails={'KeyError': 'x'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "must have a name",
+    "@skill\ndef wiggle(who: str) -> None: 'Wiggle.'": "wiggle must take the simulation and then",
+    "@skill\nasync def wiggle(sim) -> None: 'Wiggle.'": "wiggle is async, but the function of a skill is not",
+    "@skill(fail={})\ndef wiggle(sim) -> None: 'Wiggle.'": "@skill has no option fail; did you mean fails?",
+    "@skill(fails=['A'])\ndef wiggle(sim) -> None: 'Wiggle.'": "fails of wiggle must be errors with clauses",
+    "@skill(seconds='2')\ndef wiggle(sim) -> None: 'Wiggle.'": "must be a number from 0 on, not '2'",
+    "@skill(results=('a', 'b', 'c'))\ndef wiggle(sim) -> bool: 'Wiggle.'": "must be two texts",
+    "@skill(names={'who': 'room'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "names of wiggle must be",
+    "@skill(event='a b')\ndef wiggle(sim) -> None: 'Wiggle.'": "event of wiggle must be a name, or None",
+    "@skill\ndef wiggle(sim, who: str) -> 'int | None': 'Wiggle.'": "the result of wiggle, int | None,",
     "@skill(text='whom')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "wiggle has no parameter whom",
     "def wiggle(sim, who: str) -> None: 'Wiggle.'": "it declares no skill; put @skill above a function",
     "def wiggle(": "it is no Python",
@@ -249,7 +258,7 @@ def test_what_is_wrong_with_a_file_is_one_sentence_with_its_line(tmp_path: Path,
     [
         ("return 1 / 0", "wiggle failed: ZeroDivisionError: division by zero"),
         ("return 3", "wiggle returned 3, but it declares bool"),
-        ("sim.fail('Other')", 'no skill declares the error "Other"'),
+        ("sim.fail('Other')", 'wiggle declares no error "Other"'),
     ],
 )
 @pytest.mark.parametrize("road", ROADS)
@@ -260,6 +269,64 @@ def test_a_function_that_fails_ends_the_command_with_a_sentence(
     path.write_text(HEAD + f"@skill\ndef wiggle(sim: Simulation) -> bool:\n    'Wiggle.'\n    {body}\n")
     with pytest.raises(UserError, match=message):
         ran(pool, skills_from(path), ["wiggle()"], road)
+
+
+TRUTHS = {
+    "reed('a'): 1": "there is no skill reed; did you mean read?",
+    "open_gate('a'): true": "the code of open_gate decides what comes of it",
+    "read(3): 1": "read takes other arguments: read(what: str) -> int",
+    "read('a', 'b'): 1": "read takes other arguments",
+    "read('a'): 1.5": "read cannot come to 1.5; write a whole number or Broken",
+    "read('a'): Broke": "read cannot come to 'Broke'; write a whole number or Broken",
+    "read(a): 1": "is no call; write it as in",
+    "read(what='a'): 1": "is no call; write it as in",
+    "the sun shines: maybe": "is 'maybe'; write true or false",
+}
+
+
+@pytest.mark.parametrize("truth", TRUTHS)
+def test_a_truth_that_cannot_be_is_refused_with_its_line(tmp_path: Path, truth: str) -> None:
+    (tmp_path / "lab.py").write_text(READS)
+    path = tmp_path / "world.yaml"
+    path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truth}\n")
+    with pytest.raises(UserError) as caught:
+        World.read(path, skills_from(tmp_path / "lab.py"))
+    assert TRUTHS[truth] in str(caught.value)
+    assert caught.value.line == 4
+
+
+def test_truths_say_what_calls_come_to_however_they_are_quoted(tmp_path: Path) -> None:
+    (tmp_path / "lab.py").write_text(READS)
+    path = tmp_path / "world.yaml"
+    truths = "read('a'): 7\n  read(\"b\"): Broken\n  gate a is shut: true\n"
+    path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truths}")
+    table = skills_from(tmp_path / "lab.py")
+    world = World.read(path, table)
+    robot = SimulatedRobot(world, skills=table)
+    assert robot.perform("read", ["a"]) == 7
+    with pytest.raises(RobotError, match="read: it is broken"):
+        robot.perform("read", ["b"])
+    with pytest.raises(RobotError, match="open_gate: it is shut"):
+        robot.perform("open_gate", ["a"])
+    (tmp_path / "again.yaml").write_text(world.to_yaml())
+    assert World.read(tmp_path / "again.yaml", table) == world
+
+
+READS = (
+    HEAD
+    + """
+@skill(fails={"Broken": "it is broken"})
+def read(sim: Simulation, what: str) -> int:
+    "Read."
+
+@skill(fails={"Broken": "it is shut"})
+def open_gate(sim: Simulation, gate: str) -> bool:
+    "Open."
+    if sim.truth(f"gate {gate} is shut"):
+        sim.fail("Broken")
+    return True
+"""
+)
 
 
 def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:

@@ -157,7 +157,9 @@ def test_a_stop_that_fails_is_told(write: Write) -> None:
     time.sleep(0.1)
     robot.cancel()
     thread.join(SOON)
-    assert told == ["Spot.stop failed: OSError: the line is dead; STOP THE ROBOT BY HAND"]
+    (sentence,) = told
+    assert sentence.startswith("Spot.stop failed: OSError: the line is dead (lab_robot_")
+    assert sentence.endswith(".py, line 5); STOP THE ROBOT BY HAND")
 
 
 def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:
@@ -170,6 +172,12 @@ def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:
     ("source", "message"),
     [
         ("", r"it has no class Spot"),
+        ("class Sport: pass\n", r"it has no class Spot; its classes are Sport"),
+        ("from pathlib import Path as Spot\n", r"it has no class Spot"),
+        (
+            "class Spot:\n    stop = rooms = print\n    def say(self): pass\n",
+            r"line 3: Spot\.say does not take what programs pass; write def say\(self, message\)",
+        ),
         ("class Spot:\n    def rooms(self): pass\n", r"line 1: Spot has no method stop, which stops"),
         ("class Spot:\n    def stop(self): pass\n", r"Spot has no method rooms, which lists"),
         (

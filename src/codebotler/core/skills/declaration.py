@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import functools
 from collections.abc import Callable, Mapping
+from math import inf
 from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
@@ -138,6 +139,7 @@ class _Declaration:
 
     def skill(self) -> Skill:
         """The skill, which its events are known by from now on."""
+        self.check_options()
         self.check_name()
         parameters, returns = self.parameters(), self.returns()
         recording = self.recording(parameters)
@@ -172,6 +174,12 @@ class _Declaration:
         code = self.does.__code__
         raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
 
+    def check_options(self) -> None:
+        """Refuse options that are not what they must be."""
+        for name, (fits, wanted) in OPTIONS.items():
+            if not fits(self.said[name]):
+                self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
+
     def check_name(self) -> None:
         kind = self.said["event"] or self.name
         if self.name in TAKEN:
@@ -181,7 +189,15 @@ class _Declaration:
 
     def parameters(self) -> tuple[Parameter, ...]:
         code = self.does.__code__
-        if not code.co_argcount or code.co_kwonlyargcount or code.co_flags & (0x04 | 0x08):
+        if code.co_flags & COROUTINE:
+            self.wrong(f"{self.name} is async, but the function of a skill is not; write def")
+        first = self.annotation(code.co_varnames[0]) if code.co_argcount else None
+        if (
+            not code.co_argcount
+            or code.co_kwonlyargcount
+            or code.co_flags & MORE_ARGUMENTS
+            or value_type(first or object) is not None
+        ):
             self.wrong(
                 f"{self.name} must take the simulation and then, by position, what programs pass, "
                 "as in (sim: Simulation, door: str)"
@@ -207,20 +223,27 @@ class _Declaration:
     def returns(self) -> ValueType:
         if "return" not in self.does.__annotations__:
             self.wrong(f"{self.name} does not say what it returns; write -> None, or another type")
-        return self.type_of("return", "what it returns")
+        return self.type_of("return", "the result")
 
     def type_of(self, name: str, what: str) -> ValueType:
-        annotation = self.does.__annotations__[name]
-        if isinstance(annotation, str):
-            try:
-                annotation = eval(annotation, self.does.__globals__)  # noqa: S307 - of the user's own file
-            except Exception as error:  # noqa: BLE001 - whatever it is, that is no type
-                self.wrong(f"{what} of {self.name} cannot be read: {error}")
+        try:
+            annotation = self.annotation(name)
+        except Exception as error:  # noqa: BLE001 - whatever it is, that is no type
+            self.wrong(f"{what} of {self.name} cannot be read: {error}")
         found = value_type(annotation)
         if found is None:
             written = getattr(annotation, "__name__", str(annotation))
             self.wrong(f"{what} of {self.name}, {written}, is none that skills can have; use {USABLE}")
         return found
+
+    def annotation(self, name: str) -> object:
+        """An annotation, evaluated if it is a text; that of the simulation may be nothing that is there."""
+        annotation: object = self.does.__annotations__.get(name)
+        if not isinstance(annotation, str):
+            return annotation
+        if name == self.does.__code__.co_varnames[0] and annotation not in vars(builtins):
+            return object
+        return eval(annotation, self.does.__globals__)  # noqa: S307 - of the user's own file
 
     def recording(self, parameters: tuple[Parameter, ...]) -> Recording | None:
         event = self.said["event"]
@@ -272,6 +295,37 @@ class _Declaration:
         return RosAction(kind, server, goal, result, package=package)
 
 
+COROUTINE, MORE_ARGUMENTS = 0x80, 0x04 | 0x08  # among the flags of code
+OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+    "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a text such as "open {door}"'),
+    "past": (lambda it: isinstance(it, str), "a text"),
+    "results": (
+        lambda it: isinstance(it, tuple | list) and len(it) == 2 and all(isinstance(one, str) for one in it),  # noqa: PLR2004 - for False and True
+        "two texts, for False and True",
+    ),
+    "fails": (
+        lambda it: (
+            isinstance(it, Mapping) and all(isinstance(one, str) for pair in it.items() for one in pair)
+        ),
+        'errors with clauses, as in {"DoorLocked": "the door is locked"}',
+    ),
+    "ros": (
+        lambda it: it is None or isinstance(it, str | RosAction),
+        "a text such as lab_msgs/OpenDoor:/open_door",
+    ),
+    "example": (lambda it: isinstance(it, str), "a text, the call of the skill"),
+    "event": (
+        lambda it: it is None or (isinstance(it, str) and (it or "x").isidentifier()),
+        "a name, or None",
+    ),
+    "text": (lambda it: isinstance(it, str), "the name of a parameter"),
+    "names": (lambda it: isinstance(it, str), 'a text such as "room", about the parameter `text`'),
+    "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
+    "when_tried": (lambda it: isinstance(it, bool), "True or False"),
+    "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number from 0 on"),
+    "is_idle": (lambda it: isinstance(it, bool), "True or False"),
+    "adds_event": (lambda it: isinstance(it, bool), "True or False"),
+}
 ROS_TYPES = {"str": "string", "int": "int64", "float": "float64", "bool": "bool"}
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import sys
+from difflib import get_close_matches
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
+from codebotler.core.skills.declaration import OPTIONS
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import OWN, Skill, SkillTable
 
@@ -24,8 +27,7 @@ def skills_from(*files: Path | str) -> SkillTable:
         UserError: a file cannot be run, declares no skill, or one whose name is taken.
     """
     rows = [*SKILLS.rows]
-    for file in files:
-        path = Path(file)
+    for path in {Path(file).resolve(): Path(file) for file in files}.values():
         found = declared_in(path)
         if not found:
             raise UserError("it declares no skill; put @skill above a function", file=path)
@@ -78,6 +80,9 @@ def loaded(path: Path) -> ModuleType:
     return module
 
 
+UNKNOWN_OPTION = re.compile(r"skill\(\) got an unexpected keyword argument '(\w+)'")
+
+
 def _refused(path: Path, error: Exception) -> UserError:
     """Why a file cannot be used, by the line at which it failed."""
     if isinstance(error, UserError):
@@ -85,9 +90,12 @@ def _refused(path: Path, error: Exception) -> UserError:
     if isinstance(error, SyntaxError):
         return UserError(f"it is no Python: {error.msg}", file=path, line=error.lineno)
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
-    return UserError(
-        f"it cannot be run: {type(error).__name__}: {error}", file=path, line=lines[-1] if lines else None
-    )
+    sentence = f"it cannot be run: {type(error).__name__}: {error}"
+    if named := UNKNOWN_OPTION.fullmatch(str(error)):
+        alike = get_close_matches(named[1], OPTIONS, 1)
+        hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(OPTIONS)}"
+        sentence = f"@skill has no option {named[1]}; {hint}"
+    return UserError(sentence, file=path, line=lines[-1] if lines else None)
 
 
 def _expect_new(row: Skill, rows: list[Skill]) -> None:

@@ -129,6 +129,11 @@ class Skill:
         return replace(self, does=does, is_idle=False)
 
     @property
+    def is_by_lot(self) -> bool:
+        """Whether its function has no code, so that lots decide what comes of it."""
+        return hasattr(self.does, "__wrapped__")
+
+    @property
     def call(self) -> str:
         """A call of it that models are shown."""
         return self.example or written_call(self.name, [_sample(each) for each in self.parameters])

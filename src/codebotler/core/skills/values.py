@@ -130,7 +130,7 @@ def possible(value: ValueType) -> tuple[Any, ...]:
     """Some values of a type, from which a result is drawn by lot."""
     if value.is_list:
         some = possible(ValueType(value.base, choices=value.choices))
-        return [], [some[0]], list(some[:2])
+        return [some[0]], [], [some[0], some[-1]]
     if value.base is None:
         return (None,)
     return value.choices or SOME[value.base]
