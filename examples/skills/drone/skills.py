@@ -2,6 +2,8 @@
 
 from codebotler import Simulation, skill
 
+ON_THE_GROUND = {"NotFlying": "the drone is on the ground"}
+
 
 @skill(verb="take off", fails={"TooWindy": "it is too windy"}, seconds=5, ros="drone_msgs/TakeOff:/take_off")
 def take_off(sim: Simulation) -> None:
@@ -12,9 +14,7 @@ def take_off(sim: Simulation) -> None:
 
 
 @skill(
-    verb="photograph {subject} {shots} times",
-    fails={"NotFlying": "the drone is on the ground"},
-    ros="drone_msgs/Photograph:/photograph",
+    verb="take {shots} photographs of {subject}", fails=ON_THE_GROUND, ros="drone_msgs/Photograph:/photograph"
 )
 def photograph(sim: Simulation, subject: str, shots: int) -> int:
     """Photograph something from the air; return how many of the shots are sharp."""
@@ -23,7 +23,7 @@ def photograph(sim: Simulation, subject: str, shots: int) -> int:
     return shots if sim.truth(f"{subject} is well lit") else 0
 
 
-@skill(verb="land", fails={"NotFlying": "the drone is on the ground"}, seconds=5, ros="drone_msgs/Land:/land")
+@skill(verb="land", fails=ON_THE_GROUND, seconds=5, ros="drone_msgs/Land:/land")
 def land(sim: Simulation) -> None:
     """Land."""
     if not sim.state.pop("flies", False):

@@ -2,12 +2,11 @@
 
 from codebotler import Simulation, skill
 
+COMES, OPENS = ("it does not come", "it comes"), ("nobody opens", "somebody opens")
+FAILS = {"LiftNotHere": "the lift was not called, or did not come", "NoSuchFloor": "the floors are 0 to 5"}
 
-@skill(
-    verb="call the lift",
-    results=("it does not come", "it comes"),
-    ros="hotel_msgs/CallLift:/call_lift",
-)
+
+@skill(verb="call the lift", results=COMES, ros="hotel_msgs/CallLift:/call_lift")
 def call_lift(sim: Simulation) -> bool:
     """Call the lift to this floor; False if it does not come."""
     comes = sim.truth("the lift comes")
@@ -15,13 +14,7 @@ def call_lift(sim: Simulation) -> bool:
     return comes
 
 
-@skill(
-    verb="ride to floor {floor}",
-    past="rode",
-    fails={"LiftNotHere": "the lift was not called, or did not come", "NoSuchFloor": "the floors are 0 to 5"},
-    seconds=20,
-    ros="hotel_msgs/RideTo:/ride_to",
-)
+@skill(verb="ride to floor {floor}", fails=FAILS, seconds=20, ros="hotel_msgs/RideTo:/ride_to")
 def ride_to(sim: Simulation, floor: int) -> None:
     """Ride to a floor from 0 to 5, in the lift that was called before."""
     if not 0 <= floor <= 5:
@@ -30,10 +23,6 @@ def ride_to(sim: Simulation, floor: int) -> None:
         sim.fail("LiftNotHere")
 
 
-@skill(
-    verb="knock at room {room}",
-    results=("nobody opens", "somebody opens"),
-    ros="hotel_msgs/Knock:/knock",
-)
+@skill(verb="knock at room {room}", results=OPENS, ros="hotel_msgs/Knock:/knock")
 def knock(sim: Simulation, room: int) -> bool:
     """Knock at the door of a room; True if somebody opens."""

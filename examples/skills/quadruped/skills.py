@@ -2,14 +2,10 @@
 
 from codebotler import Simulation, skill
 
+OPENS, LOCKED = ("it did not move", "it opened"), {"DoorLocked": "the door is locked"}
 
-@skill(
-    verb="open {door}",
-    results=("it did not move", "it opened"),
-    fails={"DoorLocked": "the door is locked"},
-    ros="lab_msgs/OpenDoor:/open_door",
-    example='open_door("glass door")',
-)
+
+@skill(verb="open {door}", results=OPENS, fails=LOCKED, ros="lab_msgs/OpenDoor:/open_door")
 def open_door(sim: Simulation, door: str) -> bool:
     """Open a door of the room; False if it did not move."""
     if sim.truth(f"{door} is locked"):

@@ -4,6 +4,8 @@ from typing import Literal
 
 from codebotler import Simulation, skill
 
+FAILS = {"ReceptacleClosed": "the drawer is closed", "ReceptacleFull": "there is no room left in it"}
+
 
 @skill(verb="open {receptacle}", ros="lab_msgs/OpenReceptacle:/open_receptacle")
 def open_receptacle(sim: Simulation, receptacle: Literal["drawer", "shelf", "bin"]) -> None:
@@ -11,11 +13,7 @@ def open_receptacle(sim: Simulation, receptacle: Literal["drawer", "shelf", "bin
     sim.state[receptacle] = "open"
 
 
-@skill(
-    verb="put {item} into the {receptacle}",
-    fails={"ReceptacleClosed": "the drawer is closed", "ReceptacleFull": "there is no room left in it"},
-    ros="lab_msgs/Tidy:/tidy",
-)
+@skill(verb="put {item} into the {receptacle}", fails=FAILS, ros="lab_msgs/Tidy:/tidy")
 def tidy(sim: Simulation, item: str, receptacle: Literal["drawer", "shelf", "bin"]) -> None:
     """Take a thing from the table and put it into a receptacle; a drawer must have been opened."""
     if receptacle == "drawer" and "drawer" not in sim.state:

@@ -29,7 +29,7 @@ from pydantic import (
 from codebotler.core.program import parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.skills.values import Scalar, written_call
+from codebotler.core.skills.values import Scalar, plain, written_call
 from codebotler.core.words import listed
 from codebotler.core.world import Answer, Person, Point, Room, World
 from codebotler.core.yaml_files import Place, YamlFile
@@ -212,6 +212,8 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
             raise ValueError(f'"{statement}" is no call; write it as in read_gauge("boiler")')
     if skills is not None and len(skills) > len(SKILLS):
         _expect_possible(name, given, value, skills)
+        taken = zip(skills[name].parameters, given, strict=True)
+        given = [plain(parameter.type.wanted(one)) for parameter, one in taken]
     return written_call(name, given)
 
 

@@ -259,7 +259,7 @@ class Mission:
             try:
                 live.stop()
             finally:
-                self._end(State.FAILED, _reason(error))
+                self._end(State.FAILED, _reason(error), is_lost=isinstance(error, RobotLostError))
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
@@ -278,15 +278,15 @@ class Mission:
         finally:
             worker.close()
 
-    def _end(self, state: State, reason: str = "", line: int | None = None) -> None:
-        """End, unless it has ended; a mission that ends after a stop is stopped."""
+    def _end(self, state: State, reason: str = "", line: int | None = None, *, is_lost: bool = False) -> None:
+        """End, unless it has ended; a mission that ends after a stop is stopped, if the robot is not lost."""
         try:
             with self._writing:
                 if self.has_ended:
                     return
                 if self._live is not None:
                     self.trace = self._live.trace
-                if self._stopped_by is not None and reason != UNCONFIRMED:
+                if self._stopped_by is not None and reason != UNCONFIRMED and not is_lost:
                     state, reason, line = State.STOPPED, stop_text(self._stopped_by), self._broken_at
                 if self._stopped_by is not None and self.state is State.RUNNING:
                     self._be_stopping()

@@ -36,7 +36,7 @@ def activity(line: Line) -> str:
         return skill.verb.ing
     if skill.recording.more or skill.verb.object or not skill.recording.text:
         return skill.verb.with_object(skill.verb.ing, _given(skill.recording, line))
-    text = shortened(room_name(str(line["arguments"][skill.recording.text])), 100)
+    text = shortened(room_name(as_text(line["arguments"][skill.recording.text])), 100)
     if skill.recording.is_drive:
         return f"driving to {text}"
     return f'{skill.verb.ing} "{text}"' if skill.recording.is_spoken else f"{skill.verb.ing} {text}"
@@ -84,7 +84,7 @@ def _skill(line: Line) -> str:
         return skill.verb.third
     if skill.recording.more or skill.verb.object or not skill.recording.text:
         return skill.verb.with_object(skill.verb.third, _given(skill.recording, line))
-    text = str(arguments[skill.recording.text])
+    text = as_text(arguments[skill.recording.text])
     words = f'{skill.verb.third} "{shortened(room_name(text) if skill.recording.is_drive else text)}"'
     options = arguments.get(skill.recording.options or "")
     return f"{words} [{shortened(' | '.join(options))}]" if options else words

@@ -145,14 +145,14 @@ def prompt_for(
 
 def stub(skill: Skill) -> str:
     """A skill as models are shown it; one of a user's own with an example, and when it fails."""
-    lines = [skill.doc]
+    lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")
     if skill not in SKILLS.rows:
         result = "" if skill.returns.base is None else "result = "
         lines.append(f"Example: {result}{skill.call}")
     if len(lines) == 1:
-        return f'def {skill.signature}:\n    """{skill.doc}"""'
+        return f'def {skill.signature}:\n    """{lines[0]}"""'
     return f'def {skill.signature}:\n    """' + "\n\n    ".join(lines) + '\n    """'
 
 

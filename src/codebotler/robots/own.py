@@ -16,6 +16,7 @@ from typing import Any
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.files import loaded
 from codebotler.core.skills.table import Skill
+from codebotler.core.skills.values import plain
 from codebotler.core.words import listed
 from codebotler.robots.base import (
     Argument,
@@ -71,13 +72,17 @@ class OwnRobot:
         }
         self._stopped = True
         self._is_busy = False
+        self._order, self._told = threading.Lock(), threading.Event()
         self._failed_stop = ""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._running: Future[Any] | None = None
 
     def _method(self, skill: str) -> Callable[..., Any] | None:
         """What carries out a skill; `rooms()` lists the rooms if nothing else does."""
-        method = getattr(self._body, skill, None)
+        try:
+            method = getattr(self._body, skill, None)
+        except Exception as error:
+            raise UserError(f"{self.name}.{skill} is no method: {_said(error)}") from error
         if method is None and skill == "get_all_rooms":
             method = self._body.rooms
         return method if callable(method) else None
@@ -88,7 +93,8 @@ class OwnRobot:
             self._loop = asyncio.new_event_loop()
             self._thread = threading.Thread(target=_run, args=(self._loop,), daemon=True)
             self._thread.start()
-        self._stopped = False
+        self._stopped, self._failed_stop = False, ""
+        self._told.clear()
         connect = getattr(self._body, "connect", None)
         if connect is not None:
             try:
@@ -110,13 +116,10 @@ class OwnRobot:
         row = self.skills[skill]
         if skill not in self._methods:
             raise RobotError("SkillWithoutMethod", self.missing[skill])
-        given = [
-            list(one) if isinstance(one, tuple) else parameter.type.wanted(one)
-            for parameter, one in zip(row.parameters, arguments, strict=True)
-        ]
+        given = [parameter.type.wanted(one) for parameter, one in zip(row.parameters, arguments, strict=True)]
         self._is_busy = True
         try:
-            result: Result = self._finished(self._methods[skill](*given))
+            result: Result = plain(self._finished(self._methods[skill](*given)))
         except Exception as error:
             self._expect_no_stop()
             kind = type(error).__name__
@@ -124,27 +127,39 @@ class OwnRobot:
                 raise
             if kind in dict(row.fails):
                 raise RobotError(kind, str(error) or f"{skill}: {dict(row.fails)[kind]}") from error
-            raise RobotLostError(f"{self.name}.{skill} failed: {_said(error)}") from error
+            self.cancel()
+            failed = f"; {self._failed_stop}" if self._failed_stop else ""
+            raise RobotLostError(f"{self.name}.{skill} failed: {_said(error)}{failed}") from error
         finally:
             self._is_busy = False
         self._expect_no_stop()
         return result
 
     def _expect_no_stop(self) -> None:
+        """Raise what a stop makes of a skill, once it is known whether that has worked."""
+        if not self._stopped:
+            return
+        if not self._told.wait(STOPS):
+            raise RobotLostError(f"{self.name}.stop has not returned after {STOPS:.0f} s; {BY_HAND}")
         if self._failed_stop:
             raise RobotLostError(self._failed_stop)
-        if self._stopped:
-            raise CancelledError
+        raise CancelledError
 
     def cancel(self) -> None:
         """Call `stop`, and cancel what is awaited."""
-        was_stopped, self._stopped = self._stopped, True
+        with self._order:
+            was_stopped, self._stopped = self._stopped, True
+            if was_stopped:
+                return
+            self._told.clear()
         self.clock.stop()
         try:
-            if not was_stopped:
-                self._finished(self._body.stop(), STOPS)
+            self._finished(self._body.stop(), STOPS)
         except Exception as error:  # noqa: BLE001 - a stop raises nothing
-            self._failed_stop = f"{self.name}.stop failed: {_said(error)}; {BY_HAND}"
+            why = "it took too long" if isinstance(error, TimeoutError) else _said(error)
+            self._failed_stop = f"{self.name}.stop failed: {why}; {BY_HAND}"
+        finally:
+            self._told.set()
         if (running := self._running) is not None:
             running.cancel()
 
@@ -179,6 +194,9 @@ class OwnRobot:
             return future.result(patience)
         except FutureCancelledError:
             raise CancelledError from None
+        except TimeoutError:
+            future.cancel()
+            raise
         finally:
             if patience is None:
                 self._running = None

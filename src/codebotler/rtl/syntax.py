@@ -186,7 +186,16 @@ class _Parser:
     def value(self, node: ast.expr, wanted: ValueType) -> formulas.Text:
         """A text that matches; for a number or a truth value, also itself."""
         if wanted.base == "str":
-            return self.matched(node)
+            text = self.matched(node)
+            if wanted.choices and not any(text.matches(as_text(one)) for one in wanted.choices):
+                raise self.error(node, f"this is none of {', '.join(map(as_text, wanted.choices))}")
+            return text
+        if wanted.base == "bool" and not (
+            isinstance(node, ast.Constant) and isinstance(node.value, bool | str)
+        ):
+            raise self.expected("True or False", node)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isalpha():
+            raise self.expected(f"{wanted.words}, or a regex for it", node)
         match node:
             case ast.Constant(int() | float() as value) | ast.UnaryOp(
                 ast.USub(), ast.Constant(int() | float() as value)
@@ -292,7 +301,8 @@ class _Parser:
             hint = f'{name} takes a question and an option, as in {name}("tea", ".*")'
             raise self.error(at, f"{hint}; mention(...) takes a text that may be in either")
         if wanted is not None and found != wanted:
-            raise self.error(at, f"{name} takes {wanted} argument{'s' * (wanted > 1)}, not {found}")
+            takes = f"{wanted or 'no'} argument{'s' * (wanted > 1)}"
+            raise self.error(at, f"{name} takes {takes}, not {found}")
         return call.args
 
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:

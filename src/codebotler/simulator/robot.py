@@ -248,7 +248,7 @@ class SimulatedRobot:
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of the skill's type
         """What comes of a skill of which nobody says what it does: a result of its type, or its error."""
-        row, call = self.skills[skill], written_call(skill, arguments)
+        row, call = self.skills[skill], written_call(skill, plain(arguments))
         known, kinds = dict(self.world.truths).get(call), [kind for kind, _ in row.fails]
         if known in kinds:
             self.fail(str(known))
@@ -258,7 +258,8 @@ class SimulatedRobot:
                     f"the world says that {call} gives {known!r}; {skill} returns {row.returns.words}"
                 )
             return plain(known)
-        results = possible(row.returns)
+        asks = [one for one, parameter in zip(arguments, row.parameters, strict=True) if parameter.is_options]
+        results = tuple(asks[0]) if asks and asks[0] else possible(row.returns)
         if len(results) == 1 and not row.fails:
             return results[0]
         words = [f"gives {result!r}" if result is not None else "works" for result in results]
@@ -343,6 +344,10 @@ class SimulatedRobot:
         self.events[-1] = Event(*asked, last.place, last.time, last.holding, last.to)
 
 
+SKILL_FAILED = "SkillFailed"
+"""The kind of error where the function of a user's own skill raises what it does not declare."""
+
+
 def called(row: Skill, robot: SimulatedRobot, arguments: Sequence[Argument]) -> Any:  # noqa: ANN401 - of its type
     """What the function of a skill returns; UserError where it returns or raises what it does not declare."""
     assert row.does is not None, "the robot was made with it"
@@ -353,16 +358,17 @@ def called(row: Skill, robot: SimulatedRobot, arguments: Sequence[Argument]) -> 
     code = getattr(row.does, "__wrapped__", row.does).__code__
     try:
         result = plain(row.does(robot, *given))
-    except (RobotError, UserError):
+    except (RobotError, UserError, KeyboardInterrupt):
         raise
-    except Exception as error:
+    except BaseException as error:
         lines = [
             tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
         ]
-        line = lines[-1] if lines else code.co_firstlineno
+        where = f"{code.co_filename}, line {lines[-1] if lines else code.co_firstlineno}"
         said = str(error).replace(type(robot).__name__, "Simulation")
-        sentence = f"{row.name} failed: {type(error).__name__}: {said}"
-        raise UserError(sentence, file=code.co_filename, line=line) from error
+        raise RobotError(
+            SKILL_FAILED, f"{row.name} failed in {where}: {type(error).__name__}: {said}"
+        ) from error
     fitting = [option.text for option in arguments[-1]] if row.recording and row.recording.options else None  # type: ignore[union-attr]
     if (fitting is not None and result not in fitting) or not row.returns.fits(result):
         raise _wrong(row, f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from math import inf
 from typing import TypeAlias
 
@@ -47,7 +48,8 @@ class SkillProtocol:
                 Status.KILLED, "Crash", f"the program spoke on the robot's line: {error}"
             )
         except BaseException:
-            self.child.end()
+            with suppress(LostProcessError):  # which would hide what the robot says
+                self.child.end()
             raise
         if final is None and self.ledger.limit is None:
             return self._died(self.child.ended())

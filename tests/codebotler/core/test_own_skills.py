@@ -18,8 +18,9 @@ from codebotler.core.skills.verbs import Verb, verb_of
 from codebotler.core.trace import Event, Outcome, Status, trace_data, trace_from
 from codebotler.core.world import Room, World
 from codebotler.prompts import prompt_for
-from codebotler.rtl import holds, parse
+from codebotler.rtl import RtlSyntaxError, holds, parse
 from codebotler.rtl.syntax import AROUND, LOOKS, QUESTIONS, TEXTS
+from codebotler.rtl.wording import done_to
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
@@ -129,10 +130,10 @@ def test_values_of_every_type_go_there_and_back(pool: WorkerPool, every: SkillTa
         ("text(3)", "TypeError", "text: one must be text, not int"),
         ("whole(True)", "TypeError", "whole: one must be a whole number, not bool"),
         ("whole(2.0)", "TypeError", "whole: one must be a whole number, not float"),
-        ("whole(10 ** 30)", "ValueError", "whole: one is too large"),
+        ("whole(10 ** 30)", "ValueError", "whole: one is out of range"),
         ("share('1')", "TypeError", "share: one must be a number, not str"),
-        ("share(float('inf'))", "ValueError", "share: one is too large"),
-        ("share(float('nan'))", "ValueError", "share: one is too large"),
+        ("share(float('inf'))", "ValueError", "share: one is out of range"),
+        ("share(float('nan'))", "ValueError", "share: one is out of range"),
         ("truth(1)", "TypeError", "truth: one must be True or False, not int"),
         ("paint('green', 'wall')", "ValueError", 'paint: colour must be "red" or "blue", not \'green\''),
         ("paint('red', 3)", "TypeError", 'paint: where must be "door" or "wall", not int'),
@@ -216,7 +217,7 @@ BAD = {
     "@skill\ndef wiggle(sim, who: None) -> None: 'Wiggle.'": "a parameter of wiggle cannot be None",
     "@skill\ndef wiggle(sim, who: str): 'Wiggle.'": "wiggle does not say what it returns; write -> None",
     "@skill\ndef wiggle(sim, who: str) -> None: pass": "wiggle has no docstring",
-    "@skill\ndef print(sim, who: str) -> None: 'Wiggle.'": "print is a name that Python or every program",
+    "@skill\ndef print(sim, who: str) -> None: 'Wiggle.'": "print is a name that Python, every program",
     "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": "found means something else in formulas",
     "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is a skill go_to already",
     "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
@@ -256,7 +257,6 @@ def test_what_is_wrong_with_a_file_is_one_sentence_with_its_line(tmp_path: Path,
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ("return 1 / 0", "wiggle failed: ZeroDivisionError: division by zero"),
         ("return 3", "wiggle returned 3, but it declares bool"),
         ("sim.fail('Other')", 'wiggle declares no error "Other"'),
     ],
@@ -327,6 +327,81 @@ def open_gate(sim: Simulation, gate: str) -> bool:
     return True
 """
 )
+
+
+@pytest.mark.parametrize("road", ROADS)
+@pytest.mark.parametrize("body", ["return 1 / 0", "raise SystemExit(3)", "return sim.nothing"])
+def test_what_a_function_raises_is_an_error_of_its_skill_and_ends_that_run_only(
+    pool: WorkerPool, tmp_path: Path, body: str, road: str
+) -> None:
+    path = tmp_path / "bad.py"
+    path.write_text(HEAD + f"@skill\ndef wiggle(sim: Simulation) -> bool:\n    'Wiggle.'\n    {body}\n")
+    outcome = ran(pool, skills_from(path), ["say('a')", "wiggle()"], road)
+    assert outcome.error is not None
+    assert (outcome.status, outcome.error.kind, outcome.line) == (
+        Status.ROBOT_ERROR,
+        "SkillFailed",
+        3 + len(ROADS[road][:1]),
+    )
+    assert outcome.error.message.startswith(f"wiggle failed in {path}, line 7: ")
+    assert "SimulatedRobot" not in outcome.error.message
+
+
+def test_minus_zero_is_zero_to_formulas(pool: WorkerPool, every: SkillTable) -> None:
+    outcome = ran(pool, every, ["share(-0.0)"], "tame")
+    assert holds(parse("tr.Exists(share(0))", skills=every), outcome.trace)
+
+
+@pytest.mark.parametrize(
+    ("formula", "message"),
+    [
+        ('tr.Exists(paint("green"))', "this is none of red, blue"),
+        ('tr.Exists(paint("red", "floor"))', "this is none of door, wall"),
+        ('tr.Exists(whole("two"))', "expected a whole number, or a regex for it"),
+        ("tr.Exists(truth(1))", "expected True or False"),
+        ("tr.Exists(returned(True, whole(1)))", "returned is about skills that return True or False"),
+        ("tr.Exists(nothing(1))", "nothing takes no argument, not 1"),
+        ('tr.Exists(paint("red", "door", "x"))', "paint takes 1 to 2 arguments, not 3"),
+    ],
+)
+def test_formulas_that_can_never_match_are_refused(every: SkillTable, formula: str, message: str) -> None:
+    with pytest.raises(RtlSyntaxError, match=message):
+        parse(formula, skills=every)
+
+
+def test_a_file_may_import_what_lies_beside_it_and_declares_each_name_once(tmp_path: Path) -> None:
+    (tmp_path / "my_constants_of_doors.py").write_text("DOOR = 'gate'\n")
+    (tmp_path / "lab.py").write_text(
+        HEAD
+        + "from my_constants_of_doors import DOOR\n@skill\ndef wiggle(sim) -> None: 'W.'\nalias = wiggle\n"
+    )
+    assert list(skills_from(tmp_path / "lab.py", tmp_path / "lab.py"))[len(SKILLS) :] == ["wiggle"]
+    (tmp_path / "twice.py").write_text(HEAD + "@skill\ndef wiggle(sim) -> None: 'Wiggle.'\n" * 2)
+    with pytest.raises(UserError, match="there is a skill wiggle already"):
+        skills_from(tmp_path / "twice.py")
+
+
+def test_a_question_of_ones_own_is_answered_by_lot(tmp_path: Path, pool: WorkerPool) -> None:
+    (tmp_path / "lab.py").write_text(
+        HEAD + "@skill(to='who')\ndef vote(sim, who: str, about: str, options: list[str]) -> str: 'Vote.'\n"
+    )
+    table = skills_from(tmp_path / "lab.py")
+    outcome = ran(pool, table, ["say(vote('all', 'Tea?', ['yes', 'no']))"], "tame")
+    vote, said = outcome.trace
+    assert (vote.text, vote.to, vote.answer) == ("tea?", "all", said.text)
+
+
+def test_the_words_of_a_verb_follow_its_event(tmp_path: Path) -> None:
+    (tmp_path / "lab.py").write_text(
+        HEAD
+        + "@skill(verb='put {item} into {box}', text='box')\n"
+        + "def stow(sim, item: str, box: str) -> None: 'Put.'\n"
+    )
+    table = skills_from(tmp_path / "lab.py")
+    robot = SimulatedRobot(WORLD, skills=table)
+    robot.perform("stow", ["pen", "drawer"])
+    assert robot.trace == (Event("stow", "drawer", more=("pen",)),)
+    assert done_to(robot.trace[0], "put") == "put pen into drawer"
 
 
 def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:

@@ -18,8 +18,10 @@ import pytest
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
+from codebotler.missions.mission import Mission
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Robot, RobotLostError
 from codebotler.robots.open import open_robot
+from codebotler.robots.reservation import Reservation
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 Write: TypeAlias = Callable[[str], Robot]
@@ -160,6 +162,55 @@ def test_a_stop_that_fails_is_told(write: Write) -> None:
     (sentence,) = told
     assert sentence.startswith("Spot.stop failed: OSError: the line is dead (lab_robot_")
     assert sentence.endswith(".py, line 5); STOP THE ROBOT BY HAND")
+
+
+STOPS_BADLY = {
+    "raises": "def stop(self): self.event.set(); raise RuntimeError('the brake failed')",
+    "raises late": "def stop(self): self.event.set(); time.sleep(1); raise OSError('the brake failed')",
+    "async": "async def stop(self): self.event.set(); raise RuntimeError('the brake failed')",
+}
+
+
+@pytest.mark.parametrize("stop", STOPS_BADLY.values(), ids=STOPS_BADLY)
+def test_a_mission_whose_robot_could_not_be_stopped_has_failed(
+    write: Write, tmp_path: Path, stop: str
+) -> None:
+    robot = write(
+        f"""
+    def __init__(self): self.event = threading.Event()
+    {stop}
+    def rooms(self): return ["hall"]
+    def say(self, message): self.event.wait(60)
+"""
+    )
+    with Reservation(robot, tmp_path) as reserved, Mission(tmp_path, robot.name) as mission:
+        mission.draft("def task_program():\n    say('hello')\n")
+        mission.check([])
+        mission.approve()
+        threading.Timer(1.5, mission.stop).start()
+        assert mission.run(reserved) == "failed"
+        assert "the brake failed" in mission.summary.reason
+        assert mission.summary.reason.endswith("STOP THE ROBOT BY HAND")
+
+
+def test_a_robot_gets_members_of_enumerations_and_gives_them_back(tmp_path: Path) -> None:
+    (tmp_path / "skills.py").write_text(
+        "from enum import Enum\nfrom codebotler import Simulation, skill\n"
+        "class Level(Enum):\n    LOW = 1\n    HIGH = 2\n"
+        "@skill\ndef set_levels(sim: Simulation, levels: list[Level], to: float) -> Level:\n    'Set.'\n"
+    )
+    (tmp_path / "lab.py").write_text(
+        "class Spot:\n"
+        "    def stop(self): pass\n"
+        "    def rooms(self): return ['hall']\n"
+        "    def set_levels(self, levels, to):\n"
+        "        assert isinstance(to, float)\n"
+        "        return levels[1]\n"
+    )
+    robot = open_robot(f"{tmp_path / 'lab.py'}:Spot", Options(skills=skills_from(tmp_path / "skills.py")))
+    robot.connect()
+    assert robot.perform("set_levels", [(1, 2), 3]) == 2
+    robot.disconnect()
 
 
 def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:

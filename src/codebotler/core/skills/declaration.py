@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import ast
 import builtins
 import functools
+import re
 from collections.abc import Callable, Mapping
+from keyword import iskeyword
 from math import inf
+from types import FunctionType
 from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill
-from codebotler.core.skills.values import NOTHING, ValueType, value_type
+from codebotler.core.skills.values import NOTHING, TEXT, ValueType, plain, value_type
 from codebotler.core.skills.verbs import Verb, verb_of
 
-TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins)})
+TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"})
 RTL_WORDS = frozenset(
     {
         *("at", "holding", "to", "found", "missed", "mention", "answered", "returned", "tr"),
@@ -22,6 +26,7 @@ RTL_WORDS = frozenset(
 )
 """What formulas call other things by than events."""
 _DECLARED: dict[str, Skill] = {}
+_BY_MODULE: dict[str, list[Skill]] = {}
 PAPER = "codebotler.core.skills.paper"
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
@@ -34,6 +39,11 @@ def by_name(name: str) -> Skill | None:
 def all_names() -> list[str]:
     """The names of all skills declared in this process."""
     return list(_DECLARED)
+
+
+def declared_by(module: str) -> list[Skill]:
+    """The skills that a module has declared, in its order."""
+    return list(_BY_MODULE.get(module, ()))
 
 
 def by_event(kind: str) -> Skill | None:
@@ -125,9 +135,13 @@ def skill(
     }
     said |= {"event": event, "text": text, "names": names, "to": to, "when_tried": when_tried}
     said |= {"seconds": seconds, "is_idle": is_idle, "adds_event": adds_event}
-    if does is not None:
-        return _Declaration(does, said).skill()
-    return lambda function: _Declaration(function, said).skill()
+
+    def declare(function: Callable[..., Any]) -> Skill:
+        if not isinstance(function, FunctionType):
+            raise UserError(f"@skill belongs above a function, not above {function!r:.80}")
+        return _Declaration(function, said).skill()
+
+    return declare if does is None else declare(does)
 
 
 class _Declaration:
@@ -156,7 +170,7 @@ class _Declaration:
             doc,
             recording,
             self.ros(parameters, returns),
-            self.verb(parameters),
+            self.verb(parameters, recording),
             self.said["seconds"],
             is_idle=self.said["is_idle"],
             does=_drawn(self.does) if _is_empty(self.does) else self.does,
@@ -164,6 +178,8 @@ class _Declaration:
             fails=tuple(fails.items()),
             example=self.said["example"],
         )
+        self.check_example(row)
+        _BY_MODULE.setdefault(self.does.__module__, []).append(row)
         known = _DECLARED.get(self.name)
         if known is None or getattr(known.does, "__module__", "") != PAPER:
             _DECLARED[self.name] = row
@@ -180,10 +196,21 @@ class _Declaration:
             if not fits(self.said[name]):
                 self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
 
+    def check_example(self, row: Skill) -> None:
+        """Refuse an example that is no call of the skill."""
+        try:
+            call = ast.parse(row.call, mode="eval").body
+        except (SyntaxError, ValueError):
+            call = ast.Constant(None)
+        match call:
+            case ast.Call(ast.Name(name)) if name == self.name:
+                return
+        self.wrong(f"the example of {self.name} is no call of it: {row.call}")
+
     def check_name(self) -> None:
         kind = self.said["event"] or self.name
         if self.name in TAKEN:
-            self.wrong(f"{self.name} is a name that Python or every program already has; choose another one")
+            self.wrong(f"{self.name} is a name that Python, every program or every robot has; choose another")
         if kind in RTL_WORDS:
             self.wrong(f"{kind} means something else in formulas; choose another name")
 
@@ -213,12 +240,11 @@ class _Declaration:
         types = [self.type_of(name, f"the type of the parameter {name}") for name in names]
         if NOTHING in types:
             self.wrong(f"a parameter of {self.name} cannot be None; use {USABLE}")
-        of_options = self.options(names)
-        return tuple(Parameter(n, t, n == of_options) for n, t in zip(names, types, strict=True))
-
-    def options(self, names: tuple[str, ...]) -> str | None:
-        """The parameter that lists the options of a question."""
-        return next((name for name in names if name == "options"), None)
+        asks = self.returns() == TEXT  # a question lists its options, and returns one of them
+        return tuple(
+            Parameter(n, t, asks and n == "options" and t == ValueType(is_list=True))
+            for n, t in zip(names, types, strict=True)
+        )
 
     def returns(self) -> ValueType:
         if "return" not in self.does.__annotations__:
@@ -256,6 +282,8 @@ class _Declaration:
         for name in filter(None, (text, to)):
             if name not in names:
                 self.wrong(f"{self.name} has no parameter {name}")
+        if to and options is None:
+            self.wrong("`to` is about questions, which have a parameter options: list[str]; leave it out")
         more = tuple(name for name in names if name not in {text, to})
         return Recording(
             event or self.name, text, options, to, self.said["names"], self.said["when_tried"], more
@@ -264,18 +292,20 @@ class _Declaration:
     def fails(self) -> Mapping[str, str]:
         fails: Mapping[str, str] = self.said["fails"]
         for kind in fails:
-            if not kind.isidentifier() or kind == VIOLATION or hasattr(builtins, kind):
+            if not kind.isidentifier() or iskeyword(kind) or kind == VIOLATION or hasattr(builtins, kind):
                 self.wrong(
                     f'the error "{kind}" of {self.name} must have a name of its own, such as "DoorLocked"'
                 )
         return fails
 
-    def verb(self, parameters: tuple[Parameter, ...]) -> Verb | None:
+    def verb(self, parameters: tuple[Parameter, ...], recording: Recording | None) -> Verb | None:
         verb = self.said["verb"]
         if not isinstance(verb, str):
             return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb is a text")
         try:
             names = [each.name for each in parameters]
+            if recording is not None:  # in the order in which events have them
+                names = [name for name in (recording.text, *recording.more) if name]
             return verb_of(verb, names, self.said["results"], self.said["past"])
         except ValueError as error:
             self.wrong(f"{error}")
@@ -286,15 +316,25 @@ class _Declaration:
             return ros
         full, colon, server = ros.partition(":")
         package, slash, kind = full.partition("/")
-        if not (colon and slash and package.isidentifier() and kind.isidentifier() and server.strip("/")):
+        if not (
+            colon
+            and slash
+            and package.isidentifier()
+            and re.fullmatch(r"[A-Z]\w*", kind)
+            and server.strip("/")
+        ):
             self.wrong(
                 f'"{ros}" is no ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
             )
+        odd = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
+        if odd:
+            self.wrong(f"{odd[0]} of {self.name} would be no field of a ROS message; use small letters")
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)
 
 
+SORTS = ("room", "object", "object or person", "thing", "")
 COROUTINE, MORE_ARGUMENTS = 0x80, 0x04 | 0x08  # among the flags of code
 OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a text such as "open {door}"'),
@@ -319,7 +359,7 @@ OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "a name, or None",
     ),
     "text": (lambda it: isinstance(it, str), "the name of a parameter"),
-    "names": (lambda it: isinstance(it, str), 'a text such as "room", about the parameter `text`'),
+    "names": (lambda it: it in SORTS, "one of " + ", ".join(f'"{one}"' for one in SORTS)),
     "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
     "when_tried": (lambda it: isinstance(it, bool), "True or False"),
     "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number from 0 on"),
@@ -346,6 +386,6 @@ def _empty(_sim: object) -> None:
 def _drawn(does: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(does)
     def drawn(sim: Any, *arguments: Any) -> Any:  # noqa: ANN401 - as any skill
-        return sim.outcome(does.__name__, arguments)
+        return sim.outcome(does.__name__, plain(arguments))
 
     return drawn

@@ -12,7 +12,7 @@ from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.declaration import OPTIONS
+from codebotler.core.skills.declaration import OPTIONS, declared_by
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import OWN, Skill, SkillTable
 
@@ -39,9 +39,7 @@ def skills_from(*files: Path | str) -> SkillTable:
 
 def declared_in(path: Path) -> list[Skill]:
     """The skills that a file declares, in its order."""
-    module = loaded(path)
-    found = [value for value in vars(module).values() if isinstance(value, Skill)]
-    return [row for row in found if getattr(row.does, "__module__", "") == module.__name__]
+    return declared_by(loaded(path).__name__)
 
 
 def files_of(skills: SkillTable) -> dict[str, str]:
@@ -72,9 +70,12 @@ def loaded(path: Path) -> ModuleType:
     module = module_from_spec(spec)
     module.__file__ = where
     sys.modules[name] = module
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:  # so that it can import what lies beside it, as a script can
+        sys.path.append(folder)
     try:
         exec(compile(source, str(path), "exec", dont_inherit=True), vars(module))  # noqa: S102 - the user's own code
-    except Exception as error:  # noqa: BLE001 - whatever the file raises
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever the file raises
         del sys.modules[name]
         raise _refused(path, error) from None
     return module
@@ -83,14 +84,15 @@ def loaded(path: Path) -> ModuleType:
 UNKNOWN_OPTION = re.compile(r"skill\(\) got an unexpected keyword argument '(\w+)'")
 
 
-def _refused(path: Path, error: Exception) -> UserError:
+def _refused(path: Path, error: BaseException) -> UserError:
     """Why a file cannot be used, by the line at which it failed."""
-    if isinstance(error, UserError):
+    if isinstance(error, UserError) and error.file is not None:
         return error
     if isinstance(error, SyntaxError):
         return UserError(f"it is no Python: {error.msg}", file=path, line=error.lineno)
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
-    sentence = f"it cannot be run: {type(error).__name__}: {error}"
+    is_ours = isinstance(error, UserError)
+    sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
     if named := UNKNOWN_OPTION.fullmatch(str(error)):
         alike = get_close_matches(named[1], OPTIONS, 1)
         hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(OPTIONS)}"
@@ -100,6 +102,9 @@ def _refused(path: Path, error: Exception) -> UserError:
 
 def _expect_new(row: Skill, rows: list[Skill]) -> None:
     kinds = {other.recording.kind for other in rows if other.recording is not None}
+    topic = None if row.ros is None else row.ros.server
+    if topic is not None and topic in {other.ros.server for other in rows if other.ros is not None}:
+        row.wrong(f"another skill has the ROS action {topic} already; choose another topic")
     if row.name in {other.name for other in rows}:
         row.wrong(f"there is a skill {row.name} already; choose another name")
     if row.recording is not None and row.recording.kind in kinds:

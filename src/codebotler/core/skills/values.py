@@ -40,7 +40,7 @@ class ValueType:
     @property
     def annotation(self) -> str:
         """The type as programs and models see it, such as `list[str]` or `Literal["red", "green"]`."""
-        quoted = (f'"{one}"' if isinstance(one, str) else repr(one) for one in self.choices)
+        quoted = map(_written, self.choices)
         one = f"Literal[{', '.join(quoted)}]" if self.choices else str(self.base)
         return f"list[{one}]" if self.is_list else one
 
@@ -160,5 +160,5 @@ def as_text(value: object) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(as_text, value))
     if isinstance(value, float) and value.is_integer():
-        return f"{value:.0f}"
+        return f"{value:.0f}" if value else "0"  # which has a sign
     return str(value).lower() if isinstance(value, bool) else str(value)

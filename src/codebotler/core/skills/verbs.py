@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 PAST: Mapping[str, str] = {
-    **dict.fromkeys(("beat", "cut", "hit", "let", "put", "read", "set", "shut", "spread"), ""),
+    **dict.fromkeys(
+        ("beat", "cut", "hit", "let", "put", "quit", "read", "reset", "set", "shut", "split"), ""
+    ),
     "bend": "bent",
     "bind": "bound",
     "blow": "blew",
@@ -66,6 +68,12 @@ PAST: Mapping[str, str] = {
 }
 """The past of irregular verbs that robots may need; empty where it is the verb itself."""
 
+STRESSED_AT_THE_END = frozenset(
+    {
+        *("begin", "commit", "control", "emit", "equip", "omit"),
+        *("permit", "refer", "reset", "submit", "transfer", "unplug"),
+    }
+)
 PLACE = re.compile(r"\{(\w+)\}")
 
 
@@ -96,11 +104,14 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
         ValueError: the template names what is no parameter, or has no verb.
     """
     head, _, rest = template.strip().partition(" ")
-    if not head.isalpha():
+    head = head.lower()
+    if not (head.isascii() and head.isalpha()):
         raise ValueError(f'the verb "{template}" must begin with a verb such as "open"')
     for name in PLACE.findall(template):
         if name not in parameters:
             raise ValueError(f'the verb "{template}" names {{{name}}}, which is no parameter')
+    if set("{}") & set(PLACE.sub("", template)):
+        raise ValueError(f'the verb "{template}" has a brace that is no parameter in braces')
     fixed, brace, _ = rest.partition("{")
     particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
     if rest and not brace:
@@ -137,5 +148,6 @@ def _ing(verb: str) -> str:
 
 
 def _doubled(verb: str) -> str:
-    """A verb as it is before `ed` and `ing`: a short one doubles its last consonant."""
-    return verb + verb[-1] if re.fullmatch(r"[^aeiou]*[aeiou][^aeiouwxy]", verb) else verb
+    """A verb as it is before `ed` and `ing`: after a short, stressed vowel its consonant is doubled."""
+    is_short = re.fullmatch(r"(?:[^aeiou]*|.*qu)[aeiou][^aeiouwxy]", verb) is not None
+    return verb + verb[-1] if is_short or verb in STRESSED_AT_THE_END else verb

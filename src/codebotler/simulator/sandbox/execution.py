@@ -269,7 +269,7 @@ def check_fit(name: str, parameter: Parameter, value: Any, given: type) -> None:
     if choices and value not in choices:
         raise ValueError(f"{name}: {named} must be {words}, not {repr(value)[:100]}")
     if (given is int and not -LARGEST <= value <= LARGEST) or (given is float and value - value != 0):
-        raise ValueError(f"{name}: {named} is too large")
+        raise ValueError(f"{name}: {named} is out of range")
 
 
 def value_text(value: Any) -> str:  # noqa: ANN401 - a text, a number, a truth value, or a list of these
