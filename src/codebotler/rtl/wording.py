@@ -25,6 +25,7 @@ _MOST_LISTED = 5
 _TEXT = r"[\w ',;:!%@&/-]+"
 _ALTERNATIVES = re.compile(rf"{_TEXT}(?:\|{_TEXT})*")
 _EXACT = re.compile(r"\^([\w -]+(?:\\?\.\d+)?)\$")
+_PLAIN = re.compile(rf"{_ALTERNATIVES.pattern}|{_EXACT.pattern}")
 _WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
 
 
@@ -73,7 +74,7 @@ def _wanted(element: EventPattern, thing: str) -> str:
     if element.kind == "goto":
         return room(element.text, "any" if thing == "anything" else "a")
     match element.text:
-        case Regex(pattern) if not _is_spoken(element.kind) and _ALTERNATIVES.fullmatch(pattern):
+        case Regex(pattern) if not _is_spoken(element.kind) and _PLAIN.fullmatch(pattern):
             return named(pattern)
     return f"{thing} {described(element.text)}".rstrip()
 
