@@ -54,7 +54,7 @@ class InstructionSolutions(BaseModel):
 class RecordedFile(BaseModel):
     """The part of a file of solutions that the recorded models need; the benchmark reads the rest."""
 
-    recorded: tuple[InstructionSolutions, ...]
+    recorded: tuple[InstructionSolutions, ...] = ()
 
 
 class UnknownInstructionError(ModelError):
