@@ -31,7 +31,7 @@ def message_types(actions: list[Message]) -> dict[str, Any]:
         package, name = parts_of(action["type"])
         module = _messages_of(package)
         if not hasattr(module, name + "Action"):
-            build(module, package, name, action["definition"])
+            build(module, name, action["definition"], package)
         found[action["type"]] = getattr(module, name + "Action")
     return found
 
@@ -53,7 +53,7 @@ def _messages_of(package: str) -> types.ModuleType:
         return module
 
 
-def build(module: types.ModuleType, package: str, name: str, definition: str) -> None:
+def build(module: types.ModuleType, name: str, definition: str, package: str = PACKAGE) -> None:
     """Add the seven message classes of an action to a module of a package."""
     import actionlib_msgs.msg
     import std_msgs.msg
