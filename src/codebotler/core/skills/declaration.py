@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import builtins
 import functools
 import re
@@ -198,6 +197,10 @@ class _Declaration:
 
     def check_example(self, row: Skill) -> None:
         """Refuse an example that is no call of the skill."""
+        if not row.example:
+            return
+        import ast  # noqa: PLC0415 - children have no use for it
+
         try:
             call = ast.parse(row.call, mode="eval").body
         except (SyntaxError, ValueError):
