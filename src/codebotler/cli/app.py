@@ -182,7 +182,10 @@ def skills(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Show skills as models see them, and try each in imagined worlds."""
+    """Show skills as models see them, and try them.
+
+    Each example is called in 40 imagined worlds.
+    """
     from codebotler.cli.skills import data, view, write_new
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import print_json, print_rich
