@@ -364,13 +364,14 @@ def called(row: Skill, robot: SimulatedRobot, arguments: Sequence[Argument]) -> 
         lines = [
             tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
         ]
-        where = f"{code.co_filename}, line {lines[-1] if lines else code.co_firstlineno}"
+        file = code.co_filename.rpartition("/")[2]  # the folder is another one elsewhere, and rows are not
+        where = f"{file}, line {lines[-1] if lines else code.co_firstlineno}"
         said = str(error).replace(type(robot).__name__, "Simulation")
         raise RobotError(
             SKILL_FAILED, f"{row.name} failed in {where}: {type(error).__name__}: {said}"
         ) from error
-    fitting = [option.text for option in arguments[-1]] if row.recording and row.recording.options else None  # type: ignore[union-attr]
-    if (fitting is not None and result not in fitting) or not row.returns.fits(result):
+    asks = [one for one, parameter in zip(given, row.parameters, strict=True) if parameter.is_options]
+    if (asks and result not in asks[0]) or not row.returns.fits(result):
         raise _wrong(row, f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")
     return result
 

@@ -343,7 +343,7 @@ def test_what_a_function_raises_is_an_error_of_its_skill_and_ends_that_run_only(
         "SkillFailed",
         3 + len(ROADS[road][:1]),
     )
-    assert outcome.error.message.startswith(f"wiggle failed in {path}, line 7: ")
+    assert outcome.error.message.startswith("wiggle failed in bad.py, line 7: ")
     assert "SimulatedRobot" not in outcome.error.message
 
 

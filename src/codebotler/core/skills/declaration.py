@@ -45,6 +45,11 @@ def declared_by(module: str) -> list[Skill]:
     return list(_BY_MODULE.get(module, ()))
 
 
+def forget(module: str) -> None:
+    """Forget what a module has declared that could not be run to its end."""
+    _BY_MODULE.pop(module, None)
+
+
 def by_event(kind: str) -> Skill | None:
     """The skill declared in this process that leaves events of a kind, which is all that these say of it."""
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), None)

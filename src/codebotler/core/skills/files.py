@@ -12,7 +12,7 @@ from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.declaration import OPTIONS, declared_by
+from codebotler.core.skills.declaration import OPTIONS, declared_by, forget
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import OWN, Skill, SkillTable
 
@@ -77,6 +77,7 @@ def loaded(path: Path) -> ModuleType:
         exec(compile(source, str(path), "exec", dont_inherit=True), vars(module))  # noqa: S102 - the user's own code
     except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever the file raises
         del sys.modules[name]
+        forget(name)
         raise _refused(path, error) from None
     return module
 
