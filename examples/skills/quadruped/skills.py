@@ -18,6 +18,6 @@ def climb(sim: Simulation, stairs: str) -> None:
     """Climb stairs of the room, up or down."""
 
 
-@skill(verb="read {gauge}", is_idle=True, ros="lab_msgs/ReadGauge:/read_gauge")
+@skill(verb="read {gauge}", ros="lab_msgs/ReadGauge:/read_gauge")
 def read_gauge(sim: Simulation, gauge: str) -> float:
     """Read a gauge in the room, in bar."""

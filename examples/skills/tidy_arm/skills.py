@@ -22,6 +22,6 @@ def tidy(sim: Simulation, item: str, receptacle: Literal["drawer", "shelf", "bin
         sim.fail("ReceptacleFull")
 
 
-@skill(verb="look at the table", is_idle=True, ros="lab_msgs/SeenOnTable:/seen_on_table")
+@skill(verb="look at the table", ros="lab_msgs/SeenOnTable:/seen_on_table")
 def seen_on_table(sim: Simulation) -> list[Literal["cup", "spoon", "can", "pen"]]:
     """List what lies on the table."""

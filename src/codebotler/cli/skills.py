@@ -48,7 +48,7 @@ def open_door(sim: Simulation, door: str) -> bool:  # str, int, float, bool, Lit
     return sim.truth(f"{{door}} opens")
 
 
-@skill(verb="measure the temperature", is_idle=True)
+@skill(verb="measure the temperature")
 def temperature(sim: Simulation) -> float:
     """Measure the temperature in the room, in degrees Celsius."""
     ...  # nothing is simulated: the result is drawn by lot
