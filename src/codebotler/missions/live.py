@@ -18,6 +18,8 @@ from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, room_
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
 
+TELLING = 6.0  # seconds within which a robot has been told to stop
+
 
 class Note(Protocol):
     """Logs an event, from any thread; the `picture` of one is bytes."""
@@ -59,7 +61,7 @@ class LiveRobot:
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
-        self._stopped = threading.Event()
+        self._stopped, self._told = threading.Event(), threading.Event()
         self._fault: OSError | None = None
 
     @property
@@ -82,6 +84,13 @@ class LiveRobot:
             self.robot.cancel()
         finally:
             self.robot.clock.stop()
+            self._told.set()
+
+    def why_unstopped(self) -> str:
+        """Why the robot could not be stopped, once it was told; empty if it was, as far as it knows."""
+        if self._stopped.is_set():
+            self._told.wait(TELLING)
+        return str(getattr(self.robot, "failed_stop", ""))  # which only robots of users have
 
     def sleep_until(self, now: float) -> None:
         """Let time pass by the robot's clock, or raise StoppedError."""

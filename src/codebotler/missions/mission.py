@@ -259,8 +259,13 @@ class Mission:
             try:
                 live.stop()
             finally:
-                self._end(State.FAILED, _reason(error), is_lost=isinstance(error, RobotLostError))
+                is_lost, reason = isinstance(error, RobotLostError), _reason(error)
+                if not is_lost and (trouble := live.why_unstopped()):
+                    is_lost, reason = True, trouble
+                self._end(State.FAILED, reason, is_lost=is_lost)
         else:
+            if self._stopped_by is not None and (trouble := live.why_unstopped()):
+                return self._end(State.FAILED, trouble, is_lost=True)
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
             reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"

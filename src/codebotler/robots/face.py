@@ -218,6 +218,11 @@ class RobotWithFace:
         options = tuple(map(str, offered))
         return options[self._face.ask(", ".join(map(str, given.values())), text, options)]
 
+    @property
+    def failed_stop(self) -> str:
+        """Why the other robot could not be stopped; empty if it could, or does not say."""
+        return str(getattr(self._robot, "failed_stop", ""))
+
     def cancel(self) -> None:
         """Withdraw the question, and stop the other robot."""
         try:

@@ -51,6 +51,9 @@ class OwnRobot:
         name: by which the user named it: the file and the class.
         options: a user's.
 
+    Attributes:
+        failed_stop: why it could not be stopped; empty if it could.
+
     Raises:
         UserError: there is no such file or class, or it lacks what every robot needs.
     """
@@ -73,7 +76,8 @@ class OwnRobot:
         self._stopped = True
         self._is_busy = False
         self._order, self._told = threading.Lock(), threading.Event()
-        self._failed_stop = ""
+        self._told.set()  # there is nothing to tell
+        self.failed_stop = ""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._running: Future[Any] | None = None
 
@@ -93,8 +97,7 @@ class OwnRobot:
             self._loop = asyncio.new_event_loop()
             self._thread = threading.Thread(target=_run, args=(self._loop,), daemon=True)
             self._thread.start()
-        self._stopped, self._failed_stop = False, ""
-        self._told.clear()
+        self._stopped, self.failed_stop = False, ""
         connect = getattr(self._body, "connect", None)
         if connect is not None:
             try:
@@ -128,7 +131,7 @@ class OwnRobot:
             if kind in dict(row.fails):
                 raise RobotError(kind, str(error) or f"{skill}: {dict(row.fails)[kind]}") from error
             self.cancel()
-            failed = f"; {self._failed_stop}" if self._failed_stop else ""
+            failed = f"; {self.failed_stop}" if self.failed_stop else ""
             raise RobotLostError(f"{self.name}.{skill} failed: {_said(error)}{failed}") from error
         finally:
             self._is_busy = False
@@ -141,23 +144,25 @@ class OwnRobot:
             return
         if not self._told.wait(STOPS):
             raise RobotLostError(f"{self.name}.stop has not returned after {STOPS:.0f} s; {BY_HAND}")
-        if self._failed_stop:
-            raise RobotLostError(self._failed_stop)
+        if self.failed_stop:
+            raise RobotLostError(self.failed_stop)
         raise CancelledError
 
     def cancel(self) -> None:
         """Call `stop`, and cancel what is awaited."""
         with self._order:
             was_stopped, self._stopped = self._stopped, True
-            if was_stopped:
-                return
-            self._told.clear()
+            if not was_stopped:
+                self._told.clear()
         self.clock.stop()
+        if was_stopped:
+            self._told.wait(STOPS)  # by another call
+            return
         try:
             self._finished(self._body.stop(), STOPS)
         except Exception as error:  # noqa: BLE001 - a stop raises nothing
             why = "it took too long" if isinstance(error, TimeoutError) else _said(error)
-            self._failed_stop = f"{self.name}.stop failed: {why}; {BY_HAND}"
+            self.failed_stop = f"{self.name}.stop failed: {why}; {BY_HAND}"
         finally:
             self._told.set()
         if (running := self._running) is not None:

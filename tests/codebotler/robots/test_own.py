@@ -21,6 +21,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.missions.mission import Mission
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Robot, RobotLostError
 from codebotler.robots.open import open_robot
+from codebotler.robots.own import OwnRobot
 from codebotler.robots.reservation import Reservation
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -172,22 +173,32 @@ STOPS_BADLY = {
 
 
 @pytest.mark.parametrize("stop", STOPS_BADLY.values(), ids=STOPS_BADLY)
-def test_a_mission_whose_robot_could_not_be_stopped_has_failed(
-    write: Write, tmp_path: Path, stop: str
+@pytest.mark.parametrize("program", ["say('hello')", "import time\n    say('a')\n    time.sleep(60)"])
+def test_a_mission_of_a_robot_that_could_not_be_stopped_has_failed(
+    write: Write, tmp_path: Path, stop: str, program: str
 ) -> None:
     robot = write(
         f"""
-    def __init__(self): self.event = threading.Event()
+    def __init__(self): self.event, self.begun = threading.Event(), threading.Event()
     {stop}
     def rooms(self): return ["hall"]
-    def say(self, message): self.event.wait(60)
+    def say(self, message):
+        self.begun.set()
+        if message == "hello": self.event.wait(60)
 """
     )
+    assert isinstance(robot, OwnRobot)
     with Reservation(robot, tmp_path) as reserved, Mission(tmp_path, robot.name) as mission:
-        mission.draft("def task_program():\n    say('hello')\n")
+        mission.draft(f"def task_program():\n    {program}\n")
         mission.check([])
         mission.approve()
-        threading.Timer(1.5, mission.stop).start()
+
+        def stop_soon() -> None:
+            assert robot._body.begun.wait(60)
+            time.sleep(0.2)
+            mission.stop()
+
+        threading.Thread(target=stop_soon).start()
         assert mission.run(reserved) == "failed"
         assert "the brake failed" in mission.summary.reason
         assert mission.summary.reason.endswith("STOP THE ROBOT BY HAND")

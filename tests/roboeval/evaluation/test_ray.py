@@ -200,7 +200,7 @@ def test_control_c_ends_it_and_keeps_what_was_judged(nodes: Nodes, tmp_path: Pat
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
     assert process.returncode == 130
-    assert err.splitlines()[-1].startswith("roboeval: stopped; "), err
+    assert any(line.startswith("roboeval: stopped; ") for line in err.splitlines()), err  # Ray may log more
     assert all(json.loads(line) for line in rows.read_text().splitlines())
 
 
