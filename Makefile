@@ -1,7 +1,7 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
 # installed (this folder, or a wheel), VENV where, EXTRAS with which extras.
 #
-#   make test       what to run before each commit; TESTS names files or folders to run instead of all
+#   make test       what to run before each commit, with the tutorial of own skills; TESTS names what to run instead
 #   make test-all   that, and everything below
 #     test-slow            tests that take seconds of a processor each
 #     test-suites          the tasks of both suites as data: linted, and judged on programs with known verdicts
@@ -63,6 +63,7 @@ serve: $(VENV)/installed
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)
+	$(if $(TESTS),,$(BIN)/python -m pytest tests/guide/test_pages.py -k own-skills)
 
 test-all: test test-slow test-suites test-guide test-ros1 test-browser test-faulty-server test-transformers test-pyrobosim \
 	test-inspect test-ray

@@ -94,7 +94,7 @@ def _refused(path: Path, error: BaseException) -> UserError:
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
     is_ours = isinstance(error, UserError)
     sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
-    if named := UNKNOWN_OPTION.fullmatch(str(error)):
+    if named := UNKNOWN_OPTION.match(str(error)):
         alike = get_close_matches(named[1], OPTIONS, 1)
         hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(OPTIONS)}"
         sentence = f"@skill has no option {named[1]}; {hint}"
