@@ -22,9 +22,9 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
-from roboeval.mutation import control_flow, misuse
 from roboeval.mutation.mutants import Mutant, mutants, originals
 from roboeval.mutation.operator import Context, Operator, operators_in
+from roboeval.mutation.operators import control_flow, misuse
 from roboeval.suites.load import Suite, load_suite
 
 SETS = Path(__file__).parents[1] / "examples" / "skills"

@@ -13,8 +13,8 @@ from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided, samples
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.simulator.robot import found_in
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rules import found_in
 from codebotler.simulator.sampled_robot import PEOPLE
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"

@@ -58,6 +58,27 @@ SkillsOption = Annotated[
         metavar="FILE",
     ),
 ]
+MapOption = Annotated[
+    Path | None,
+    typer.Option(help="The world file, for the robot and for the map; by default an office for --robot sim."),
+]
+ModelsOption = Annotated[
+    list[str] | None, typer.Option(help="A model that may write programs; may be given several times.")
+]
+FaceTimeoutOption = Annotated[float, typer.Option(min=1, help="Seconds that people have to answer there.")]
+RetriesOption = Annotated[
+    int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
+]
+RepairOption = Annotated[
+    bool,
+    typer.Option(
+        "--repair", help="When asking again, show the rejected program and its problems; once by default."
+    ),
+]
+RecordOption = Annotated[Path | None, typer.Option(help="Add a line of JSON for every attempt to this file.")]
+ShowPromptOption = Annotated[
+    bool, typer.Option("--show-prompt", help="Print the prompt without asking a model.")
+]
 TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
 TopPOption = Annotated[
     float,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -10,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
+from codebotler.models.base import Model, SamplingSettings
+from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
 from codebotler.models.recorded import is_recorded
 
 VARIABLE = "CODEBOTLER_MODEL"
@@ -49,3 +52,15 @@ def chosen_model(name: str | None = None, base_url: str | None = None) -> Chosen
         config = YamlFile.read(file).validate(ConfigFile)
     name = name or os.environ.get(VARIABLE, "").strip() or config.model
     return ChosenModel(name, base_url or (config.base_url if name == config.model else None))
+
+
+def opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:
+    """What opens models by their names; names that make no sense are refused at once."""
+    for each in models:
+        kind_of(each)
+    if base_url is not None:
+        expect_server(*models)
+    return lambda name: open_model(
+        name,
+        SamplingSettings(base_url=chosen_model(name, base_url).base_url if runs_on_server(name) else None),
+    )

@@ -23,8 +23,8 @@ from codebotler.robots.base import (
     no_feedback,
 )
 from codebotler.robots.clock import Clock
-from codebotler.simulator.robot import SimulatedRobot, resolve_room
-from codebotler.simulator.rules import ENDLESS, WORDS_FOR_PEOPLE, Rules
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import ENDLESS, WORDS_FOR_PEOPLE, Rules, resolve_room
 
 ROBOT_RULES = Rules(
     literals="as-written", people="own-name-or-word", words_for_people=WORDS_FOR_PEOPLE, limits=ENDLESS

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-import re
 from _blake2 import blake2b  # of `hashlib`, which would bring OpenSSL into every child
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
+from codebotler.core.skills.calling import called
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import Scalar, plain, possible, written_call
 from codebotler.core.trace import Event, Option, Trace, attempted
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.rules import PAPER, Matching, Rules
+from codebotler.simulator.rules import PAPER, Matching, Rules, choose, finds, is_called, resolve_room
 
 if TYPE_CHECKING:
     from codebotler.simulator.rule_guard import RuleGuard
@@ -279,7 +277,9 @@ class SimulatedRobot:
         alike = get_close_matches(kind, declared, 1)
         hint = f"did you mean {alike[0]}?" if alike else "name it in `fails`, with the clause that says when"
         sentence = f'{row.name if row else "the skill"} declares no error "{kind}"; {hint}'
-        raise UserError(sentence) if row is None else _wrong(row, sentence)
+        if row is None:
+            raise UserError(sentence)
+        row.wrong(sentence)
 
     def lot(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
         """Draw which of some outcomes a statement has in this world: the same one each time."""
@@ -344,51 +344,6 @@ class SimulatedRobot:
         self.events[-1] = Event(*asked, last.place, last.time, last.holding, last.to)
 
 
-SKILL_FAILED = "SkillFailed"
-"""The kind of error where the function of a user's own skill raises what it does not declare."""
-
-
-def called(row: Skill, robot: SimulatedRobot, arguments: Sequence[Argument]) -> Any:  # noqa: ANN401 - of its type
-    """What the function of a skill returns; UserError where it returns or raises what it does not declare."""
-    assert row.does is not None, "the robot was made with it"
-    given = [
-        [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)  # type: ignore[union-attr]  # options
-        for parameter, argument in zip(row.parameters, arguments, strict=True)
-    ]
-    code = getattr(row.does, "__wrapped__", row.does).__code__
-    try:
-        result = plain(row.does(robot, *given))
-    except (RobotError, UserError, KeyboardInterrupt):
-        raise
-    except BaseException as error:
-        lines = [
-            tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
-        ]
-        file = code.co_filename.rpartition("/")[2]  # the folder is another one elsewhere, and rows are not
-        where = f"{file}, line {lines[-1] if lines else code.co_firstlineno}"
-        said = str(error).replace(type(robot).__name__, "Simulation")
-        raise RobotError(
-            SKILL_FAILED, f"{row.name} failed in {where}: {type(error).__name__}: {said}"
-        ) from error
-    asks = [one for one, parameter in zip(given, row.parameters, strict=True) if parameter.is_options]
-    if (asks and result not in asks[0]) or not row.returns.fits(result):
-        raise _wrong(row, f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")
-    return result
-
-
-def _wrong(row: Skill, sentence: str) -> UserError:
-    """An error that names the file and the line of a skill's function."""
-    code = getattr(row.does, "__wrapped__", row.does).__code__  # type: ignore[union-attr]  # a function
-    return UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
-
-
-def _tracebacks(error: BaseException) -> Iterator[TracebackType]:
-    traceback = error.__traceback__
-    while traceback is not None:
-        yield traceback
-        traceback = traceback.tb_next
-
-
 def own_skills(robot: SimulatedRobot, kind: type[SimulatedRobot]) -> tuple[str, ...]:
     """The skills of a robot that those of its kind do not have, or have in another way."""
     if type(robot) is not kind:
@@ -401,98 +356,6 @@ def own_skills(robot: SimulatedRobot, kind: type[SimulatedRobot]) -> tuple[str, 
 _USUAL = {name: row.does for name, row in SKILLS.items()}
 
 
-def found_in(label: str, request: str) -> bool:
-    """Whether a label of the world, a regex, is found in a request of the program."""
-    return _pattern(label).search(request) is not None
-
-
-def finds(request: str, label: str, matching: Matching) -> bool:
-    """Whether a request of the program finds a label of the world, a regex, or is that label."""
-    pattern = label if matching == "label-in-request" else whole_words(label)
-    return found_in(pattern, request) or request.lower() == label.lower()
-
-
-@lru_cache(maxsize=4096)
-def whole_words(label: str) -> str:
-    """A regex that finds another one as whole words, in the singular or the plural."""
-    return rf"(?<!\w)(?:{_anchored(label)})(?:e?s)?(?!\w)"
-
-
-@lru_cache(maxsize=4096)
-def _pattern(label: str) -> re.Pattern[str]:
-    return re.compile(_anchored(label), re.IGNORECASE | re.DOTALL)
-
-
-_ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
-
-
-def _anchored(label: str) -> str:
-    """A label whose choices that begin with `.*` are tried at the start only, which takes linear time.
-
-    The same is found: such a choice that is found anywhere is found from the start.
-    """
-    return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
-
-
-def is_called(person: Person, request: str, rules: Rules) -> bool:
-    """Whether a request means a person: by no name, their own, or a word for people."""
-    if rules.people == "answer-to-any-name" or not request.strip():
-        return True
-    return any(finds(request, name, rules.matching) for name in (person.name, *rules.words_for_people))
-
-
 def no_room(location: str) -> RobotError:
     """The error of a drive to what is no room."""
     return RobotError("GoToInvalidLocation", f'there is no room "{location}"')
-
-
-def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """The first room whose name is found in a request; by whole words, one of just that name before it."""
-    return _resolved(tuple(rooms), request, matching)
-
-
-@lru_cache(maxsize=65_536)
-def _resolved(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
-    if matching == "whole-words" and request in rooms:
-        return request
-    return next((room for room in rooms if finds(request, room, matching)), None)
-
-
-def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Rules = PAPER) -> int | None:
-    """The position of the option that an answer means.
-
-    The answer is looked for in the options. Failing that, a yes or a no is looked for in other words, if the
-    rules have any; and any other answer is a yes or a no to the question. An answer that is a number means
-    the nearest option that there is, counted from 1, or from the end if it is negative.
-    """
-    if isinstance(answer, int):
-        return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
-    direct = _first_saying((answer,), options, rules.matching)
-    if direct is not None:
-        return direct
-    if answer in {"yes", "no"} and rules.words_for_no:
-        return _in_other_words(answer, options, rules)
-    means = "yes" if finds(question, answer, rules.matching) else "no"
-    found = _first_saying((means,), options, rules.matching)
-    return _in_other_words(means, options, rules) if found is None and rules.words_for_no else found
-
-
-def _in_other_words(answer: str, options: tuple[Option, ...], rules: Rules) -> int | None:
-    """Which option means yes or no; the only one that does not mean no means yes, whatever it says."""
-    if answer == "no":
-        return _first_saying(rules.words_for_no, options, rules.matching)
-    no = ("no", *rules.words_for_no)
-    may_be = [n for n, option in enumerate(options) if not _says(option.text, no, rules.matching)]
-    meant = [n for n in may_be if _says(options[n].text, rules.words_for_yes, rules.matching)]
-    return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
-
-
-def _first_saying(words: tuple[str, ...], options: tuple[Option, ...], matching: Matching) -> int | None:
-    return next(
-        (number for number, option in enumerate(options) if _says(option.text, words, matching)), None
-    )
-
-
-@lru_cache(maxsize=65_536)
-def _says(text: str, words: tuple[str, ...], matching: Matching) -> bool:
-    return any(finds(text, word, matching) for word in words)

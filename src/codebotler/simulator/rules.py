@@ -1,10 +1,16 @@
-"""The rules by which programs are simulated; a suite chooses them, a robot needs none."""
+"""The rules by which programs are simulated, which a suite chooses, and what requests mean by them."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Literal, TypeAlias
+
+from codebotler.core.trace import Option
+from codebotler.core.world import Answer, Person
 
 WORDS_FOR_PEOPLE = (
     *("person", "people", "human", "someone", "somebody", "anyone", "anybody", "everyone", "everybody"),
@@ -49,3 +55,98 @@ class Rules:
 
 PAPER = Rules()
 ENDLESS = Limits(calls=10**12, trace=10**12)  # on a robot, where each skill refuels the program
+
+
+# --- what requests mean by them
+
+
+def found_in(label: str, request: str) -> bool:
+    """Whether a label of the world, a regex, is found in a request of the program."""
+    return _pattern(label).search(request) is not None
+
+
+def finds(request: str, label: str, matching: Matching) -> bool:
+    """Whether a request of the program finds a label of the world, a regex, or is that label."""
+    pattern = label if matching == "label-in-request" else whole_words(label)
+    return found_in(pattern, request) or request.lower() == label.lower()
+
+
+@lru_cache(maxsize=4096)
+def whole_words(label: str) -> str:
+    """A regex that finds another one as whole words, in the singular or the plural."""
+    return rf"(?<!\w)(?:{_anchored(label)})(?:e?s)?(?!\w)"
+
+
+@lru_cache(maxsize=4096)
+def _pattern(label: str) -> re.Pattern[str]:
+    return re.compile(_anchored(label), re.IGNORECASE | re.DOTALL)
+
+
+_ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
+
+
+def _anchored(label: str) -> str:
+    """A label whose choices that begin with `.*` are tried at the start only, which takes linear time.
+
+    The same is found: such a choice that is found anywhere is found from the start.
+    """
+    return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
+
+
+def is_called(person: Person, request: str, rules: Rules) -> bool:
+    """Whether a request means a person: by no name, their own, or a word for people."""
+    if rules.people == "answer-to-any-name" or not request.strip():
+        return True
+    return any(finds(request, name, rules.matching) for name in (person.name, *rules.words_for_people))
+
+
+def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
+    """The first room whose name is found in a request; by whole words, one of just that name before it."""
+    return _resolved(tuple(rooms), request, matching)
+
+
+@lru_cache(maxsize=65_536)
+def _resolved(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
+    if matching == "whole-words" and request in rooms:
+        return request
+    return next((room for room in rooms if finds(request, room, matching)), None)
+
+
+def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Rules = PAPER) -> int | None:
+    """The position of the option that an answer means.
+
+    The answer is looked for in the options. Failing that, a yes or a no is looked for in other words, if the
+    rules have any; and any other answer is a yes or a no to the question. An answer that is a number means
+    the nearest option that there is, counted from 1, or from the end if it is negative.
+    """
+    if isinstance(answer, int):
+        return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
+    direct = _first_saying((answer,), options, rules.matching)
+    if direct is not None:
+        return direct
+    if answer in {"yes", "no"} and rules.words_for_no:
+        return _in_other_words(answer, options, rules)
+    means = "yes" if finds(question, answer, rules.matching) else "no"
+    found = _first_saying((means,), options, rules.matching)
+    return _in_other_words(means, options, rules) if found is None and rules.words_for_no else found
+
+
+def _in_other_words(answer: str, options: tuple[Option, ...], rules: Rules) -> int | None:
+    """Which option means yes or no; the only one that does not mean no means yes, whatever it says."""
+    if answer == "no":
+        return _first_saying(rules.words_for_no, options, rules.matching)
+    no = ("no", *rules.words_for_no)
+    may_be = [n for n, option in enumerate(options) if not _says(option.text, no, rules.matching)]
+    meant = [n for n in may_be if _says(options[n].text, rules.words_for_yes, rules.matching)]
+    return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
+
+
+def _first_saying(words: tuple[str, ...], options: tuple[Option, ...], matching: Matching) -> int | None:
+    return next(
+        (number for number, option in enumerate(options) if _says(option.text, words, matching)), None
+    )
+
+
+@lru_cache(maxsize=65_536)
+def _says(text: str, words: tuple[str, ...], matching: Matching) -> bool:
+    return any(finds(text, word, matching) for word in words)

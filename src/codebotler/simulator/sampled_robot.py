@@ -15,14 +15,9 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Option
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World
-from codebotler.simulator import robot as real
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.robot import (
-    SimulatedRobot,
-    Thing,
-    own_skills,
-)
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.robot import SimulatedRobot, Thing, no_room, own_skills
+from codebotler.simulator.rules import Rules, finds
 
 if TYPE_CHECKING:
     from codebotler.simulator.rule_guard import RuleGuard
@@ -58,7 +53,7 @@ class RoomMap:
     def room(self, request: str) -> str | None:
         """The room that a request finds; None if there is no such room."""
         if not (self.guessed or self.plain):
-            return next((r for r in self.rooms if real.finds(request, r, "label-in-request")), None)
+            return next((r for r in self.rooms if finds(request, r, "label-in-request")), None)
         wanted = request.strip()
         same = [room for room in self.rooms if room.strip().casefold() == wanted.casefold()]
         within = (room for room in self.rooms if room.casefold() in wanted.casefold())
@@ -72,7 +67,7 @@ class RoomMap:
             return [*named, *([] if leads_to is None or leads_to in named else [leads_to])]
         if self.guessed or self.plain:
             return [room for room in self.rooms if room.strip().casefold() in wanted]
-        return [room for room in self.rooms if real.finds(request, room, "label-in-request")]
+        return [room for room in self.rooms if finds(request, room, "label-in-request")]
 
 
 # --- facts
@@ -272,7 +267,7 @@ class SampledRobot(SimulatedRobot):
         self.record("goto", location)
         room = self.room_map.room(location)
         if room is None:
-            raise real.no_room(location)
+            raise no_room(location)
         self.room = room
 
     def look(self, entity: str) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import polars as pl
 
-from codebotler.simulator.robot import resolve_room
+from codebotler.simulator.rules import resolve_room
 from roboeval.analysis.metrics import (
     Estimate,
     by_formula,

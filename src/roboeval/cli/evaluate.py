@@ -15,9 +15,12 @@ from roboeval.cli.options import (
     EngineOption,
     IsolationOption,
     JsonOption,
+    KeepOption,
     ProcessOption,
+    RedoOption,
     RulesOption,
     SeedOption,
+    SourceArgument,
     SuiteOption,
     TasksOption,
     WorkersOption,
@@ -40,19 +43,12 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    source: Annotated[
-        str, typer.Argument(help="A run, a .jsonl, a folder or zip of .py completions, or recorded:NAME.")
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Keep completions and verdicts in this run folder.", parser=named("a run")),
-    ] = None,
+    source: SourceArgument,
+    out: KeepOption = None,
     suite: SuiteOption = "paper",
     tasks: TasksOption = None,
     ablation: AblationOption = False,
-    redo: Annotated[
-        bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
-    ] = False,
+    redo: RedoOption = False,
     workers: WorkersOption = None,
     worlds: WorldsOption = None,
     seed: SeedOption = None,

@@ -9,12 +9,13 @@ import typer
 
 from roboeval.cli.options import (
     AblationOption,
+    InWorldOption,
     JsonOption,
     RunArgument,
     SuiteOption,
+    TaskOption,
     load,
     open_current,
-    task_names,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
@@ -32,12 +33,8 @@ def find(
     negated: Annotated[
         bool, typer.Option("--not", help="Find completions for which the formula does not hold.")
     ] = False,
-    task: Annotated[
-        str | None, typer.Option(help="Only completions of this task.", autocompletion=task_names)
-    ] = None,
-    world: Annotated[
-        str | None, typer.Option(help="Only in this world: its number, from 1, or its description.")
-    ] = None,
+    task: TaskOption = None,
+    world: InWorldOption = None,
     most: Annotated[int, typer.Option("--groups", min=0, help="How many groups of failures to show.")] = 10,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,

@@ -67,6 +67,22 @@ def named(what: str) -> Callable[[str], Path]:
     return path
 
 
+SourceArgument = Annotated[
+    str, typer.Argument(help="A run, a .jsonl, a folder or zip of .py completions, or recorded:NAME.")
+]
+KeepOption = Annotated[
+    Path | None,
+    typer.Option(help="Keep completions and verdicts in this run folder.", parser=named("a run")),
+]
+RedoOption = Annotated[
+    bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
+]
+TaskOption = Annotated[
+    str | None, typer.Option(help="Only completions of this task.", autocompletion=task_names)
+]
+InWorldOption = Annotated[
+    str | None, typer.Option(help="Only in this world: its number, from 1, or its description.")
+]
 RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=named("a run"))]
 SuiteOption = Annotated[
     str,

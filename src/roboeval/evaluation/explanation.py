@@ -17,7 +17,7 @@ from codebotler.core.trace import Event, Trace, trace_from
 from codebotler.core.words import counted
 from codebotler.core.world import World
 from codebotler.rtl import explain
-from codebotler.simulator.robot import resolve_room
+from codebotler.simulator.rules import resolve_room
 from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.suites.load import Scenario, Suite
 

@@ -12,7 +12,7 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
-from codebotler.simulator.robot import whole_words
+from codebotler.simulator.rules import whole_words
 from roboeval.evaluation.failures import failure
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import chain, zip_longest
 
 from codebotler.core.cachedproperty import cached_property
-from roboeval.mutation import control_flow, counting, manipulation, misuse, navigation, speech
 from roboeval.mutation.operator import Context, Operator, operators_in
+from roboeval.mutation.operators import control_flow, counting, manipulation, misuse, navigation, speech
 from roboeval.mutation.program_tree import ProgramTree, changed, read
 from roboeval.suites.load import Task
 from roboeval.suites.solutions import bare_diff, solutions

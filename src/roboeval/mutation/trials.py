@@ -66,11 +66,7 @@ def mutation_score(
     before = dict(zip(programs, watched(ran, f"running {task.name}", len(programs)), strict=True))
     asked = [tuple(one.asked_by(prompt) for one in scenarios) for prompt in range(len(task.prompts))]
     faults = {original: [fault_in(before[original], one) for one in asked] for original in programs}
-    judges = {
-        original: _asked_by_those_it_fits(scenarios, found)
-        for original, found in faults.items()
-        if None in found
-    }
+    judges = {one: _asked_by_fitting(scenarios, found) for one, found in faults.items() if None in found}
     right = tuple(original for original in programs if original in judges)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
     made = drawn(mutants(right, context), most, seed)
@@ -82,16 +78,12 @@ def mutation_score(
         task=task.name,
         worlds=len(scenarios),
         right=right,
-        wrong=tuple(
-            (original, found[-1]) for original, found in faults.items() if found[-1] and None not in found
-        ),
+        wrong=tuple((one, found[-1]) for one, found in faults.items() if found[-1] and None not in found),
         mutants=tuple(map(TriedMutant, made, results)),
     )
 
 
-def _asked_by_those_it_fits(
-    scenarios: Sequence[Scenario], faults: Sequence[Result | None]
-) -> tuple[Scenario, ...]:
+def _asked_by_fitting(scenarios: Sequence[Scenario], faults: Sequence[Result | None]) -> tuple[Scenario, ...]:
     """The scenarios with what those prompts ask for by which an original has no fault."""
     fitting = [prompt for prompt, fault in enumerate(faults) if fault is None]
     return tuple(one.asked_by(*fitting) for one in scenarios)

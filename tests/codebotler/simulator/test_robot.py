@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.robot import Result, SimulatedRobot, Thing, _pattern, choose, resolve_room
-from codebotler.simulator.rules import Matching, Rules
+from codebotler.simulator.robot import Result, SimulatedRobot, Thing
+from codebotler.simulator.rules import Matching, Rules, _pattern, choose, resolve_room
 from roboeval.evaluation.explanation import located
 
 Texts: TypeAlias = tuple[str, ...]

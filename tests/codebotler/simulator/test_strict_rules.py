@@ -8,8 +8,8 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import SimulatedRobot, choose, resolve_room
-from codebotler.simulator.rules import PAPER, WORDS_FOR_PEOPLE, Rules
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import PAPER, WORDS_FOR_PEOPLE, Rules, choose, resolve_room
 from roboeval.suites.schema import RulesFile
 
 STRICT = Rules(

@@ -7,9 +7,9 @@ from collections import Counter
 import pytest
 
 from codebotler.core.world import Room, World
-from roboeval.mutation import misuse
 from roboeval.mutation.mutants import OPERATORS, Mutant, Original, drawn, mutants, originals
 from roboeval.mutation.operator import Context, operators_in
+from roboeval.mutation.operators import misuse
 from roboeval.suites.load import Suite
 
 CONTEXT = Context.of([World((Room("hall"), Room("lobby"), Room("kitchen")), "hall")])

@@ -12,7 +12,7 @@ from types import FunctionType
 from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
-from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill
+from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, refuse
 from codebotler.core.skills.values import NOTHING, TEXT, ValueType, plain, value_type
 from codebotler.core.skills.verbs import Verb, verb_of
 
@@ -129,16 +129,7 @@ def skill(
     Raises:
         UserError: it cannot be a skill; the sentence names the file and the line.
     """
-    said: dict[str, Any] = {
-        "verb": verb,
-        "past": past,
-        "results": results,
-        "fails": fails or {},
-        "ros": ros,
-        "example": example,
-    }
-    said |= {"event": event, "text": text, "names": names, "to": to, "when_tried": when_tried}
-    said |= {"seconds": seconds, "is_idle": is_idle, "adds_event": adds_event}
+    said = {**locals(), "fails": fails or {}}
 
     def declare(function: Callable[..., Any]) -> Skill:
         if not isinstance(function, FunctionType):
@@ -191,8 +182,7 @@ class _Declaration:
 
     def wrong(self, sentence: str) -> NoReturn:
         """Raise a UserError that names the function's file and line."""
-        code = self.does.__code__
-        raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
+        refuse(self.does, sentence)
 
     def check_options(self) -> None:
         """Refuse options that are not what they must be."""

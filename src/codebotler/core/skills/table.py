@@ -140,16 +140,21 @@ class Skill:
 
     def wrong(self, sentence: str) -> NoReturn:
         """Raise a UserError that names the file and the line of its function."""
-        code = getattr(getattr(self.does, "__wrapped__", self.does), "__code__", None)
-        if code is None:
-            raise UserError(sentence)
-        raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
+        refuse(self.does, sentence)
 
     @property
     def signature(self) -> str:
         """The skill as a Python signature, such as `go_to(location: str) -> None`."""
         arguments = ", ".join(f"{p.name}: {p.type.annotation}" for p in self.parameters)
         return f"{self.name}({arguments}) -> {self.returns.annotation}"
+
+
+def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
+    """Raise a UserError that names the file and the line of a function, if it has any."""
+    code = getattr(getattr(does, "__wrapped__", does), "__code__", None)
+    if code is None:
+        raise UserError(sentence)
+    raise UserError(sentence, file=code.co_filename, line=code.co_firstlineno)
 
 
 def _sample(parameter: Parameter) -> object:

@@ -1,0 +1,226 @@
+"""The commands that operate a robot: run, missions, robots, serve, virtual-robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from codebotler.cli import options
+from codebotler.core.terminal import note, print_text
+
+
+def run(
+    program: Annotated[
+        str,
+        typer.Argument(
+            metavar="PROGRAM|INSTRUCTION", help="A program file, - for standard input, or an instruction."
+        ),
+    ],
+    robot: options.RobotOption = "sim",
+    world: Annotated[
+        Path | None,
+        typer.Option(help="The world file of a simulated robot; by default an office for --robot sim."),
+    ] = None,
+    model: options.ModelOption = None,
+    base_url: options.BaseUrlOption = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Run the program without asking.")] = False,
+    despite_problems: Annotated[
+        bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
+    ] = False,
+    shows_all: options.AllOption = False,
+    speed: options.SpeedOption = 1.0,
+    address: options.AddressOption = "",
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
+    rules: options.RulesOption = None,
+    skills: options.SkillsOption = None,
+) -> None:
+    """Check a program, ask for approval, and run it on a robot.
+
+    Ctrl-C stops the robot; the exit status is then 130.
+    """
+    from codebotler.checking.rules import read_rules
+    from codebotler.cli import run
+    from codebotler.cli.run import Request
+    from codebotler.core.files import home
+    from codebotler.core.skills.files import skills_from
+    from codebotler.core.world import World
+    from codebotler.models.base import SamplingSettings
+    from codebotler.models.chosen import chosen_model
+    from codebotler.models.open import open_model
+    from codebotler.robots.base import Options
+    from codebotler.robots.open import open_robot
+
+    chosen = chosen_model(model, base_url)
+    table = skills_from(*(skills or ()))
+    house_rules = () if rules is None else read_rules(rules, table)
+    request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
+    asked = SamplingSettings(base_url=chosen.base_url)
+    world = options.world_or_office(robot, world)
+    settings = Options(
+        world=None if world is None else World.read(world, table),
+        speed=speed or None,
+        address=address,
+        ros_python=ros_python,
+        skills=table,
+    )
+    body = open_robot(robot, settings)
+    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked)))
+
+
+def missions(
+    mission: Annotated[
+        str | None, typer.Argument(metavar="ID", help="Show this one; `last` is the last one.")
+    ] = None,
+    mcap: Annotated[
+        Path | None, typer.Option(help="Write the mission and its program to this MCAP file, for Foxglove.")
+    ] = None,
+    clock: Annotated[str, typer.Option(help="With --mcap: wall, or robot for simulated time.")] = "wall",
+    skills: options.SkillsOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """List past missions, or show what happened in one."""
+    from codebotler.cli.missions import show_mission, show_missions, write_mission
+    from codebotler.core.errors import UserError
+    from codebotler.core.files import home
+    from codebotler.core.skills.files import skills_from
+
+    if mcap is not None and mission is None:
+        raise UserError("--mcap writes one mission; name it, or `last`")
+    if mcap is not None and json:
+        raise UserError("--mcap and --json exclude each other; give one of them")
+    if clock not in {"wall", "robot"}:
+        raise UserError(f'unknown clock "{clock}"; use wall or robot')
+    table = skills_from(*(skills or ()))
+    if mission is None:
+        show_missions(home(), json=json)
+    elif mcap is None:
+        show_mission(home(), mission, json=json)
+    else:
+        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall", skills=table)
+
+
+def robots(
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """List the kinds of robots, and which of them work here.
+
+    For the others, it shows what is missing and how to install it.
+    """
+    from dataclasses import asdict
+
+    from codebotler.cli.views import robots_view
+    from codebotler.core.terminal import print_json, print_rich
+    from codebotler.robots.open import all_readiness
+
+    found = all_readiness(ros_python)
+    if json:
+        print_json([asdict(kind) for kind in found])
+    else:
+        print_rich(robots_view(found))
+
+
+def serve_page(
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
+    name: options.NameOption = None,
+    token: options.TokenOption = None,
+    no_token: options.NoTokenOption = False,
+    robot: options.RobotOption = "sim",
+    world: options.MapOption = None,
+    model: options.ModelsOption = None,
+    base_url: options.BaseUrlOption = None,
+    speed: options.SpeedOption = 1.0,
+    address: options.AddressOption = "",
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
+    face: Annotated[
+        bool, typer.Option("--face", help="Have the robot speak and ask on a page of its own, /face.")
+    ] = False,
+    face_timeout: options.FaceTimeoutOption = 60.0,
+    face_token: Annotated[
+        str | None, typer.Option(help="The token that opens the face; a new one by default.")
+    ] = None,
+    stop_when_alone: Annotated[
+        float | None,
+        typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
+    ] = None,
+    runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
+    rules: options.RulesOption = None,
+    skills: options.SkillsOption = None,
+) -> None:
+    """Serve the web page for operating a robot.
+
+    Ctrl-C ends it, which also stops the robot.
+    """
+    from codebotler.checking.rules import read_rules
+    from codebotler.cli.run import tell_missing
+    from codebotler.core.files import home
+    from codebotler.core.skills.files import skills_from
+    from codebotler.core.world import World
+    from codebotler.models.chosen import chosen_model, opener
+    from codebotler.robots.base import Options
+    from codebotler.robots.face import Face
+    from codebotler.robots.open import open_robot, open_with_face
+    from codebotler.web.access import Access, Place
+    from codebotler.web.console import Console
+    from codebotler.web.frame import installed_pages
+    from codebotler.web.server import serve
+
+    table = skills_from(*(skills or ()))
+    house_rules = () if rules is None else read_rules(rules, table)
+    place = Place(host, port, tuple(name or ()))
+    access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
+    world = options.world_or_office(robot, world)
+    known = None if world is None else World.read(world, table)
+    models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
+    settings = Options(known, speed or None, address, ros_python, table)
+    shown = Face(face_timeout) if face else None
+    opened = opener(models, base_url)
+    body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
+    tell_missing(body)
+    console = Console(body, home(), opened, models=models, world=known, face=shown, rules=house_rules)
+    serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
+
+
+def virtual_robot(
+    world: Annotated[Path, typer.Option(help="The world file in which the robot lives.")],
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="The port of the ROS master; by default from ROS_MASTER_URI, or 11311."
+        ),
+    ] = None,
+    speed: Annotated[
+        float, typer.Option(help="The speed of the robot's clock as a multiple of real time, such as 20.")
+    ] = 1.0,
+    ros_python: Annotated[
+        Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
+    ] = options.ROS_PYTHON,
+    skills: options.SkillsOption = None,
+) -> None:
+    """Offer a simulated robot's skills on ROS 1.
+
+    It starts a ROS master if none answers; Ctrl-C ends it.
+    """
+    from contextlib import suppress
+
+    from codebotler.core.skills.files import skills_from
+    from codebotler.core.world import World
+    from codebotler.robots.ros.virtual import VirtualRobot
+
+    def show(line: str) -> None:
+        with suppress(OSError):  # the robot goes on where nobody reads any more
+            print_text(line)
+
+    table = skills_from(*(skills or ()))
+    known = World.read(world, table)
+    robot = VirtualRobot(known, speed=speed, port=port, python=ros_python, show=show, skills=table)
+    try:
+        started = robot.start()
+        what = "a ROS master was started" if started else "joined the ROS master"
+        note(f"{what} at {robot.address}; the robot is ready, Ctrl-C ends it")
+        robot.wait()
+    finally:
+        robot.stop()

@@ -1,0 +1,49 @@
+"""Calls the function of a user's own skill, and says what is wrong with what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from types import TracebackType
+from typing import Any
+
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.skills.table import Skill
+from codebotler.core.skills.values import plain
+
+SKILL_FAILED = "SkillFailed"
+"""The kind of error where the function of a user's own skill raises what it does not declare."""
+
+
+def called(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
+    """What the function of a skill returns; UserError where it returns or raises what it does not declare."""
+    assert row.does is not None, "the robot was made with it"
+    given = [
+        [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)
+        for parameter, argument in zip(row.parameters, arguments, strict=True)
+    ]
+    code = getattr(row.does, "__wrapped__", row.does).__code__
+    try:
+        result = plain(row.does(robot, *given))
+    except (RobotError, UserError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        lines = [
+            tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
+        ]
+        file = code.co_filename.rpartition("/")[2]  # the folder is another one elsewhere, and rows are not
+        where = f"{file}, line {lines[-1] if lines else code.co_firstlineno}"
+        said = str(error).replace(type(robot).__name__, "Simulation")
+        raise RobotError(
+            SKILL_FAILED, f"{row.name} failed in {where}: {type(error).__name__}: {said}"
+        ) from error
+    asks = [one for one, parameter in zip(given, row.parameters, strict=True) if parameter.is_options]
+    if (asks and result not in asks[0]) or not row.returns.fits(result):
+        row.wrong(f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")
+    return result
+
+
+def _tracebacks(error: BaseException) -> Iterator[TracebackType]:
+    traceback = error.__traceback__
+    while traceback is not None:
+        yield traceback
+        traceback = traceback.tb_next
