@@ -16,6 +16,7 @@ MEND = "pip install 'codebotler[pyrobosim]'"
 
 
 def test_what_is_missing_is_said_with_the_mend(monkeypatch: pytest.MonkeyPatch) -> None:
+    all_readiness()  # imports the other kinds, which are to keep the real function
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
     assert (kind.works, kind.mend) == (False, MEND)
