@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,10 +15,11 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room, World
-from codebotler.robots.base import Options
+from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import rosbridge
-from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.robot import RosRobot, Waits, actions_of
 from codebotler.robots.ros.virtual import VirtualRobot
+from codebotler.robots.ros.worker import WORKERS
 from ros_graph import Graph
 
 SKILLS = """
@@ -79,3 +82,26 @@ def test_values_of_every_type_go_there_and_back(robot: RosRobot) -> None:
     with pytest.raises(RobotError, match="something was spilt") as caught:
         robot.perform("mix", ["too much", 1, 1, False, "shake"])
     assert caught.value.kind == "Spilt"
+
+
+def test_messages_belong_to_the_package_that_a_skill_names(table: SkillTable) -> None:
+    actions = [action for name, action in actions_of(table).items() if name in {"mix", "sum_up", "say"}]
+    said = subprocess.run(
+        [str(ROS_PYTHON), "-c", TYPES, str(WORKERS), json.dumps(actions)],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert sorted(said.split()) == [
+        "lab_msgs/MixAction",
+        "other_msgs/SumAction",
+        "robot_actions_pkg/SayAction",
+    ]
+
+
+TYPES = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from message_types import message_types
+print(*(spec._type for spec in message_types(json.loads(sys.argv[2])).values()))
+"""

@@ -259,13 +259,8 @@ class Mission:
             try:
                 live.stop()
             finally:
-                is_lost, reason = isinstance(error, RobotLostError), _reason(error)
-                if not is_lost and (trouble := live.why_unstopped()):
-                    is_lost, reason = True, trouble
-                self._end(State.FAILED, reason, is_lost=is_lost)
+                self._end(State.FAILED, _reason(error), is_lost=isinstance(error, RobotLostError))
         else:
-            if self._stopped_by is not None and (trouble := live.why_unstopped()):
-                return self._end(State.FAILED, trouble, is_lost=True)
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
             reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"
@@ -285,6 +280,9 @@ class Mission:
 
     def _end(self, state: State, reason: str = "", line: int | None = None, *, is_lost: bool = False) -> None:
         """End, unless it has ended; a mission that ends after a stop is stopped, if the robot is not lost."""
+        if self._live is not None and self._stopped_by is not None and not is_lost and reason != UNCONFIRMED:
+            unstopped = self._live.why_unstopped()
+            state, reason, is_lost = (State.FAILED, unstopped, True) if unstopped else (state, reason, False)
         try:
             with self._writing:
                 if self.has_ended:

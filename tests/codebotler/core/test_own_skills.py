@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.checking.check import check
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.declaration import RTL_WORDS, by_name
 from codebotler.core.skills.files import skills_from
@@ -379,6 +380,41 @@ def test_a_file_may_import_what_lies_beside_it_and_declares_each_name_once(tmp_p
     (tmp_path / "twice.py").write_text(HEAD + "@skill\ndef wiggle(sim) -> None: 'Wiggle.'\n" * 2)
     with pytest.raises(UserError, match="there is a skill wiggle already"):
         skills_from(tmp_path / "twice.py")
+
+
+def test_two_skills_with_one_ros_action_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "lab.py"
+    action = "@skill(ros='lab_msgs/Wiggle:/wiggle')\n"
+    path.write_text(
+        HEAD + f"{action}def wiggle(sim) -> None: 'W.'\n{action}def jiggle(sim, how: str) -> None: 'J.'\n"
+    )
+    with pytest.raises(UserError, match="another skill has the ROS action /wiggle already"):
+        skills_from(path)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind"),
+    [("text(3)", "TypeError"), ("paint('green', 'wall')", "ValueError"), ("whole()", "TypeError")],
+)
+def test_misuse_is_a_problem_even_where_all_errors_are_caught(
+    every: SkillTable, call: str, kind: str
+) -> None:
+    program = f"def task_program():\n    try:\n        {call}\n    except {{}}:\n        say('no')\n"
+    (problem,) = check(program.format("Exception"), rooms=["hall"], skills=every).problems
+    assert (problem.kind, problem.line) == (kind, 3)
+    assert check(program.format(kind), rooms=["hall"], skills=every).problems == ()
+
+
+def test_a_call_of_what_is_not_defined_is_a_problem_even_where_all_errors_are_caught() -> None:
+    program = "def task_program():\n    try:\n        {}\n    except Exception:\n        say('no')\n"
+    (problem,) = check(program.format("open_hatch('a')"), rooms=["hall"]).problems
+    assert (problem.kind, problem.line) == ("NameError", 3)
+    assert problem.message.endswith("if it is a skill of your own, name its file with --skills")
+    assert check(program.format("say(hatch)"), rooms=["hall"]).problems == ()
+
+
+def test_events_with_fewer_arguments_than_a_formula_names_do_not_match(every: SkillTable) -> None:
+    assert not holds(parse('tr.Exists(paint("red", "wall"))', skills=every), (Event("paint", "red"),))
 
 
 def test_a_question_of_ones_own_is_answered_by_lot(tmp_path: Path, pool: WorkerPool) -> None:

@@ -15,10 +15,10 @@ from mcap.reader import make_reader
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
-from codebotler.core.skills.values import NOTHING
+from codebotler.core.skills.values import NOTHING, ValueType
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.log import Line, Summary, events_of
-from codebotler.missions.mcap import Clock, export, write_mcap
+from codebotler.missions.mcap import Clock, export, schema_of, write_mcap
 from codebotler.missions.mission import Mission
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
@@ -174,3 +174,15 @@ def test_no_other_file_is_touched(mission: tuple[Summary, list[Line]], tmp_path:
     assert other.read_text() == "of the user"
     assert sorted(tmp_path.iterdir()) == [path, other]
     assert path.stat().st_mode == other.stat().st_mode
+
+
+def test_values_of_own_skills_have_schemas_of_their_types() -> None:
+    given = (
+        Parameter("colour", ValueType("str", choices=("red", "blue"))),
+        Parameter("coats", ValueType("int")),
+    )
+    row = Skill("paint", given, ValueType("float", is_list=True), "Paint.")
+    schema = schema_of(row)
+    assert schema["colour"] == {"type": "string", "enum": ["red", "blue"]}
+    assert schema["coats"] == {"type": "integer"}
+    assert schema["result"] == {"type": "array", "items": {"type": "number"}}

@@ -122,7 +122,7 @@ def test_declared_errors_reach_the_program_and_others_end_the_mission(tmp_path: 
     (tmp_path / "lab.py").write_text(
         "class DoorLocked(Exception): pass\n"
         "class Spot:\n"
-        "    def stop(self): pass\n"
+        f"    def stop(self): open({str(tmp_path / 'stopped')!r}, 'w').close()\n"
         "    def rooms(self): return ['hall']\n"
         "    def open_door(self, door):\n"
         "        if door == 'locked': raise DoorLocked\n"
@@ -133,8 +133,9 @@ def test_declared_errors_reach_the_program_and_others_end_the_mission(tmp_path: 
     with pytest.raises(RobotError, match="open_door: the door is locked") as caught:
         robot.perform("open_door", ["locked"])
     assert caught.value.kind == "DoorLocked"
-    with pytest.raises(RobotLostError, match=r"Spot\.open_door failed: AttributeError"):
+    with pytest.raises(RobotLostError, match=r"Spot\.open_door failed: AttributeError.*lab\.py, line 7"):
         robot.perform("open_door", ["other"])
+    assert (tmp_path / "stopped").exists()
     robot.disconnect()
 
 
