@@ -13,7 +13,7 @@ from rich.text import Text
 from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace
-from codebotler.rtl.wording import takes_nothing
+from codebotler.rtl.wording import done_with
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20
@@ -95,21 +95,17 @@ def step_text(step: Mapping[str, Any]) -> Text:
         return _drive(step, text)
     kind, result = step["kind"], step.get("found")
     verb = verb_for(kind)
-    told = f"{visible(kind)} {text}" if verb is None else step_words(step, verb.past)
+    told = (
+        f"{visible(kind)} {text}"
+        if verb is None
+        else done_with(kind, verb.past, [shortened(each) for each in (step["text"], *step.get("more", ()))])
+    )
     if "answer" in step:
         answer = "no answer" if step["answer"] is None else shortened(step["answer"])
         told += f" {_options(step['options'])} → {answer}"
     elif verb and result is not None:
         told += f": {verb.results[result]}"
     return Text(told)
-
-
-def step_words(step: Mapping[str, Any], form: str) -> str:
-    """A form of a step's verb, and to what it is done."""
-    given = [shortened(text) for text in (step["text"], *step.get("more", ()))]
-    verb = verb_for(step["kind"])
-    assert verb is not None, "the form is of its verb"
-    return verb.with_object(form, [] if takes_nothing(step["kind"]) else given)
 
 
 def _drive(step: Mapping[str, Any], request: str) -> Text:

@@ -19,7 +19,7 @@ from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import listed
 from codebotler.core.world import World
-from codebotler.rtl.wording import takes_nothing
+from codebotler.rtl.wording import done_with
 from codebotler.rtl.wording import verb as verb_of
 from codebotler.simulator.rule_guard import Rule
 
@@ -72,7 +72,7 @@ def step_sentence(event: Event) -> str:
     made_up = "another room" if is_drive else "something"
     quote = "" if verb.object else '"'
     given = [made_up if t in MADE_UP else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
-    told = [verb.with_object(verb.third, [] if takes_nothing(event.kind) else given, "")]
+    told = [done_with(event.kind, verb.third, given, "")]
     offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
     told += [f"offering {listed(offered)}"] if offered else []
     told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []

@@ -74,7 +74,7 @@ def _wanted(element: EventPattern, thing: str) -> str:
     if element.kind == "goto":
         return room(element.text, "any" if thing == "anything" else "a")
     match element.text:
-        case Regex(pattern) if not _is_spoken(element.kind) and _PLAIN.fullmatch(pattern):
+        case Regex(pattern) if not is_spoken(element.kind) and _PLAIN.fullmatch(pattern):
             return named(pattern)
     return f"{thing} {described(element.text)}".rstrip()
 
@@ -120,8 +120,12 @@ def event_words(event: Event) -> str:
 
 def done_to(event: Event, form: str, text: str | None = None) -> str:
     """A form of an event's verb, and to what it is done."""
-    given = [brief(event.text if text is None else text), *map(brief, event.more)]
-    return verb(event.kind).with_object(form, [] if takes_nothing(event.kind) else given)
+    return done_with(event.kind, form, [brief(event.text if text is None else text), *map(brief, event.more)])
+
+
+def done_with(kind: str, form: str, given: Sequence[str], quote: str = '"') -> str:
+    """A form of the verb of a kind of event, and what its skill was given."""
+    return verb(kind).with_object(form, [] if takes_nothing(kind) else given, quote)
 
 
 def takes_nothing(kind: str) -> bool:
@@ -136,7 +140,8 @@ def verb(kind: str) -> Verb:
     return verb_for(kind) or other
 
 
-def _is_spoken(kind: str) -> bool:
+def is_spoken(kind: str) -> bool:
+    """Whether the text of an event is said aloud."""
     row = by_event(kind)
     return row is not None and row.recording is not None and row.recording.is_spoken
 

@@ -11,9 +11,10 @@ from nicegui import ui
 
 from codebotler.checking.problems import Check, Sample
 from codebotler.checking.storyboard import cut, steps_of
-from codebotler.core.skills.declaration import by_event, verb_for
+from codebotler.core.skills.declaration import verb_for
 from codebotler.core.terminal import shortened
 from codebotler.core.words import brief, listed, room_name
+from codebotler.rtl.wording import done_with, is_spoken
 from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Lot, Whereabouts
 from codebotler.web.frame import PlainText
 
@@ -138,7 +139,7 @@ def draw_scene(
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:
-            look = f"deed deed-{deed.kind}" if is_spoken(deed.kind) else "deed"
+            look = f"deed deed-{deed.kind}" if deed.kind == "answer" or is_spoken(deed.kind) else "deed"
             shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
             _number(shown, deed.step, anchor)
 
@@ -207,15 +208,7 @@ def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
         return (Deed(kind, f"{shortened(kind)} {text}", number),)
     result = f": {verb.results[step['found']]}" if "found" in step else ""
     given = [text, *(shortened(each, MOST_TEXT) for each in step.get("more", ()))]
-    return (
-        Deed(kind, f"{verb.with_object(verb.third, [each for each in given if each], '')}{result}", number),
-    )
-
-
-def is_spoken(kind: str) -> bool:
-    """Whether the text of an event is said aloud."""
-    row = by_event(kind)
-    return kind == "answer" or (row is not None and row.recording is not None and row.recording.is_spoken)
+    return (Deed(kind, f"{done_with(kind, verb.third, given, '')}{result}", number),)
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
