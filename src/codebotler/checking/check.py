@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import cache, partial
+from typing import Protocol
 
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.room_names import MOST_ROOMS, lists_rooms, named_rooms
 from codebotler.checking.sampled import (
     SAMPLES,
     CheckSettings,
-    Run,
     SampledRuns,
     failures,
     first_samplers,
@@ -29,7 +30,7 @@ from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
-from codebotler.simulator.worker import Worker
+from codebotler.simulator.worker import Meanwhile, Worker
 
 START = "start_loc"  # models know it by this name from the paper
 AT_ONCE = 16  # worlds that a worker is given
@@ -74,18 +75,23 @@ def check(
     """
     expect_list(rooms, "the rooms")
     settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules))
-    known = room_map or _room_map(program, rooms, start, skills)
+    if room_map is None and (rooms, start) != (None, None):
+        room_map = _room_map(program, rooms, start, skills)
     with nullcontext(pool) if pool else WorkerPool(workers) as opened:
 
         def share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
             return run_samples(opened.here(), program, room_map, samplers, settings)
 
-        def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+        def run(room_map: RoomMap, samplers: Sequence[FactSampler], *, meanwhile: Meanwhile) -> list[Sample]:
             shares = [samplers[start :: opened.workers] for start in range(opened.workers)]
             futures = [opened.submit(share, room_map, each) for each in shares if each]
+            meanwhile()
             return [sample for future in futures for sample in future.result()]
 
-        return _checked(program, known, settings, run, AT_ONCE * opened.workers)
+        if samples > AT_ONCE:
+            known = room_map or _room_map(program, None, None, skills)
+            return _checked(program, known, settings, run, AT_ONCE * opened.workers)
+        return opened.submit(lambda: check_on(opened.here(), program, room_map, settings)).result()
 
 
 def check_on(
@@ -97,11 +103,12 @@ def check_on(
     """The same check on one worker, the calling thread's own, for checking many programs at the same time."""
     how = settings or CheckSettings()
 
-    def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-        return run_samples(worker, program, room_map, samplers, how)
+    def run(rooms: RoomMap, samplers: Sequence[FactSampler], *, meanwhile: Meanwhile) -> list[Sample]:
+        return run_samples(worker, program, rooms, samplers, how, meanwhile=meanwhile)
 
-    rooms = room_map or _room_map(program, None, None, how.skills)
-    return _checked(program, rooms, how, run)
+    worker.begin_to_prepare(program, how.skills, how.rules)
+    with worker.one_child():
+        return _checked(program, room_map or _room_map(program, None, None, how.skills), how, run)
 
 
 def checks_on(
@@ -117,34 +124,46 @@ def checks_on(
     def checked(number: int) -> Check:
         program, room_map = programs[number]
 
-        def run(rooms: RoomMap, wanted: Sequence[FactSampler]) -> list[Sample]:
+        def run(rooms: RoomMap, wanted: Sequence[FactSampler], *, meanwhile: Meanwhile) -> list[Sample]:
             if rooms == room_map and wanted == samplers:
                 return first[number].samples(worker, known[number])
-            return run_samples(worker, program, rooms, wanted, settings)
+            return run_samples(worker, program, rooms, wanted, settings, meanwhile=meanwhile)
 
-        return _checked(program, room_map, settings, run)
+        with worker.one_child():
+            return _checked(program, room_map, settings, run)
 
     return list(map(checked, range(len(programs))))
 
 
 def _checked(
-    program: str, room_map: RoomMap, settings: CheckSettings, run: Run, width: int = AT_ONCE
+    program: str, room_map: RoomMap, settings: CheckSettings, run: SampleRunner, width: int = AT_ONCE
 ) -> Check:
     tree = parsed(program, compiled=True)
     if isinstance(tree, Flaw):
         problem = Problem(tree.kind, tree.message, tree.line)
         return Check((problem,), (), room_map, settings.seed, settings.strict)
-    problems = static_problems(program, tree, room_map, settings.skills)
-    ran = sampled_runs(run, room_map, settings, width)
+    flaws = cache(partial(static_problems, program, tree, room_map, settings.skills))
+    ran = sampled_runs(partial(run, meanwhile=flaws), room_map, settings, width)
+    problems = list(flaws())
     for _ in range(GUESSES if room_map.guessed else 0):
         wider = _widened(room_map, ran)
         if wider == room_map:
             break
-        room_map, ran = wider, sampled_runs(run, wider, settings, width)
+        room_map, ran = wider, sampled_runs(partial(run, meanwhile=flaws), wider, settings, width)
     blamed = {problem.line for problem in problems}
     problems += [problem for problem in failures(ran, room_map) if problem.line not in blamed]
     problems.sort(key=lambda problem: problem.line or 0)
     return Check(tuple(problems), tuple(ran), room_map, settings.seed, settings.strict)
+
+
+class SampleRunner(Protocol):
+    """What runs a program in several worlds."""
+
+    def __call__(
+        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
+    ) -> list[Sample]:
+        """Run it, and call `meanwhile` once that is only waited for."""
+        ...
 
 
 # --- rooms

@@ -18,7 +18,7 @@ from codebotler.simulator.isolated_process import PROCESSOR_TIME
 from codebotler.simulator.rule_guard import Rule, RuleGuard
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
-from codebotler.simulator.worker import Job, Worker
+from codebotler.simulator.worker import NOTHING, Job, Meanwhile, Worker
 
 SAMPLES, MOST_SAMPLES = 5, 10_000
 EXPLORED = 2  # times as many worlds at most, to meet each fact in every way
@@ -83,12 +83,14 @@ def run_samples(
     room_map: RoomMap,
     samplers: Sequence[FactSampler],
     settings: CheckSettings,
+    *,
+    meanwhile: Meanwhile = NOTHING,
 ) -> list[Sample]:
     """Run a program in sampled worlds; of worlds that are alike to it, only the first may be run."""
     if not samplers:
         return []
     runs = SampledRuns(program, room_map, samplers, settings)
-    known = worker.run_tame([runs.job])
+    known = worker.run_tame([runs.job], meanwhile)
     return runs.samples(worker, {number: outcome for (_, number), outcome in known.items()})
 
 

@@ -8,10 +8,10 @@ import os
 import symtable
 import threading
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import islice
 from typing import Any
 
@@ -187,7 +187,26 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
     """The line and name of each use of an undefined name, and whether it is a local one used too early."""
-    # Imported where it is used: it takes a tenth of a second, which every command line would pay.
+    messages, names_in = _pyflakes()
+    # Names in annotations that are texts are never looked up when a program runs.
+    spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
+    with _PARSING:
+        found = names_in(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
+    return [
+        # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
+        (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
+        for m in found
+        for is_local in [isinstance(m, messages.UndefinedLocal)]
+        if (is_local or isinstance(m, messages.UndefinedName)) and (m.lineno, m.col) in spelled
+    ]
+
+
+@cache
+def _pyflakes() -> tuple[Any, Callable[..., Any]]:
+    """What pyflakes says, and what looks for it.
+
+    Imported where it is used: it takes a tenth of a second, which every command line would pay.
+    """
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - see above
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - the same
 
@@ -198,17 +217,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
             else:
                 super().addBinding(node, value)
 
-    # Names in annotations that are texts are never looked up when a program runs.
-    spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
-    with _PARSING:
-        found = Names(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
-    return [
-        # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
-        (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
-        for m in found
-        for is_local in [isinstance(m, messages.UndefinedLocal)]
-        if (is_local or isinstance(m, messages.UndefinedName)) and (m.lineno, m.col) in spelled
-    ]
+    return messages, Names
 
 
 # --- what is certainly wrong

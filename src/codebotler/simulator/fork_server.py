@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import marshal
 import os
 import socket
@@ -155,10 +156,33 @@ class ForkServer:
 
 
 class BatchServer(ForkServer):
-    """A fork server whose children run batches of tame programs."""
+    """A fork server whose children run batches of tame programs, and are forked ahead of time."""
 
     def __init__(self) -> None:
+        self._next: IsolatedProcess | None = None
         super().__init__(BATCH_SERVER)
+
+    def fork(self) -> IsolatedProcess:
+        """A fresh child, which may be ready already."""
+        child, self._next = self._next, None
+        return child or super().fork()
+
+    def fork_ahead(self) -> None:
+        """Have the next child forked now; the last one must have been killed."""
+        with contextlib.suppress(LostProcessError):  # whoever forks will learn of it
+            self._next = super().fork()
+
+    def close(self) -> None:
+        """End it, and the child that is ready with it."""
+        super().close()
+        if self._next is not None:
+            self._next.hang_up()
+
+    def forget(self) -> None:
+        """Close its descriptors in a forked process."""
+        super().forget()
+        if self._next is not None:
+            self._next.hang_up()
 
     def _set_up(self) -> None:
         """Let it run programs of ours, by which the interpreter learns; no address of these can be seen."""
@@ -166,3 +190,4 @@ class BatchServer(ForkServer):
         setup = marshal.dumps((rehearsal, WARM_UP_RUNS), WITHOUT_REFERENCES)
         self._door.sendall(len(setup).to_bytes(HEADER, "big") + setup)
         self.has_seccomp = self._read_report() == 1
+        self.fork_ahead()

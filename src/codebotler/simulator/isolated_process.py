@@ -19,7 +19,9 @@ import threading
 import time
 from collections.abc import Callable
 from functools import cache
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import CodeType
 from typing import IO
 
 from codebotler.core.cachedproperty import cached_property
@@ -109,26 +111,40 @@ def _written_file(further: tuple[str, ...]) -> IO[bytes]:
 def compiled_modules(compiler: Callable[[str, str], bytes], further: tuple[str, ...] = ()) -> bytes:
     """The code of all modules that isolated processes run, by name, as one message."""
     simulator, package = __package__, __package__ + ".sandbox"
-    sources = dict.fromkeys((simulator.partition(".")[0], simulator), "")
-    sources[package] = (SANDBOX / "__init__.py").read_text(encoding="utf-8")
-    for path in sorted(SANDBOX.glob("[a-z]*.py")):
-        sources[f"{package}.{path.stem}"] = path.read_text(encoding="utf-8")
-    for name in ("__future__", "types"):
-        sources[name] = inspect.getsource(importlib.import_module(name))
-    for name in further:
-        sources[name] = (
-            SANDBOX.parents[1].joinpath(*name.split(".")[1:]).with_suffix(".py").read_text("utf-8")
-        )
-    if further:
-        sources |= {CORE: "", f"{CORE}.skills": "", BATCHES: ""}
-    codes = {name: compiler(source, name) for name, source in sources.items()}
+    files = {package: str(SANDBOX / "__init__.py")}
+    files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}
+    files |= {name: inspect.getfile(importlib.import_module(name)) for name in ("__future__", "types")}
+    folder = SANDBOX.parents[1]
+    files |= {name: str(folder.joinpath(*name.split(".")[1:]).with_suffix(".py")) for name in further}
+    empty = [simulator.partition(".")[0], simulator, *([CORE, f"{CORE}.skills", BATCHES] if further else ())]
+    codes = {name: compiled_source("", name) for name in empty}
+    codes |= {name: compiler(file, name) for name, file in files.items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 
 
-def compiled(source: str, name: str) -> bytes:
+@cache
+def compiled(file: str, name: str) -> bytes:
     """The code of one module, the same however this interpreter was started."""
-    code = compile(source, f"<{name}>", "exec", dont_inherit=True, optimize=0)
-    return marshal.dumps(code, WITHOUT_REFERENCES)
+    if sys.flags.optimize:
+        return compiled_source(Path(file).read_text(encoding="utf-8"), name)
+    code = SourceFileLoader(name, file).get_code(name)
+    assert code is not None
+    return dumped(code, name)
+
+
+def compiled_source(source: str, name: str) -> bytes:
+    """The same of a module that is in no file, or in another form there."""
+    return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), name)
+
+
+def dumped(code: CodeType, name: str) -> bytes:
+    """Code that names no path, whose length would move what comes after it in memory."""
+
+    def nameless(code: CodeType) -> CodeType:
+        parts = (nameless(part) if isinstance(part, CodeType) else part for part in code.co_consts)
+        return code.replace(co_filename=f"<{name}>", co_consts=tuple(parts))
+
+    return marshal.dumps(nameless(code), WITHOUT_REFERENCES)
 
 
 # --- talking

@@ -105,7 +105,8 @@ class WorkerPool:
                 if self._stopping:
                     worker.stop()
             self._local.worker = worker
-            self._keep_together(worker)
+            if self.workers > 1:  # else a child runs on another core while this thread does something else
+                self._keep_together(worker)
         return worker
 
     def _keep_together(self, worker: Worker) -> None:

@@ -40,6 +40,7 @@ class Preparer:
     def __init__(self) -> None:
         self._process: IsolatedProcess | None = None
         self._served = 0
+        self._asked: tuple[tuple[str, ...], bool, Skills] | None = None  # and not yet answered
         self._last: tuple[tuple[str, bool, Skills], Prepared | Outcome] | None = None
 
     def prepare(self, source: str, *, lowercase: bool, skills: Skills) -> Prepared | Outcome:
@@ -63,6 +64,12 @@ class Preparer:
                 return results
         return [self.prepare(source, lowercase=lowercase, skills=skills) for source in sources]
 
+    def ask_ahead(self, source: str, *, lowercase: bool, skills: Skills) -> None:
+        """Let the process begin with what `prepare` will be asked for next."""
+        is_known = self._last is not None and self._last[0] == (source, lowercase, skills)
+        if not is_known and self._asked is None and self._served < SERVES and len(source) <= LONG:
+            self._send((source,), lowercase, skills)
+
     def start(self) -> IsolatedProcess:
         """The process, started now if there is none; what is sent to it waits until it is ready."""
         if self._process is None:
@@ -80,7 +87,7 @@ class Preparer:
 
     def close(self) -> None:
         """End the process; nothing may be running."""
-        process, self._process, self._served = self._process, None, 0
+        process, self._process, self._served, self._asked = self._process, None, 0, None
         if process is not None:
             process.end()
 
@@ -105,11 +112,23 @@ class Preparer:
 
     def _ask(self, sources: Sequence[str], lowercase: bool, skills: Skills) -> list[Prepared | Outcome]:  # noqa: FBT001 - private
         """The results for programs, up to the first at which the process has ended."""
-        process = self.start()
-        process.send((tuple(sources), lowercase, skills), at_once=True)
+        asked = tuple(sources), lowercase, skills
+        if self._asked is not None and self._asked != asked:  # ahead, for a program that was not run
+            self._answers(len(self._asked[0]))
+        if self._asked is None:
+            self._send(*asked)
+        return self._answers(len(sources))
+
+    def _send(self, sources: tuple[str, ...], lowercase: bool, skills: Skills) -> None:  # noqa: FBT001 - private
+        self.start().send((sources, lowercase, skills), at_once=True)
+        self._asked = sources, lowercase, skills
         self._served += len(sources)
+
+    def _answers(self, count: int) -> list[Prepared | Outcome]:
+        process = self.start()
+        self._asked = None
         results: list[Prepared | Outcome] = []
-        for _ in sources:
+        for _ in range(count):
             try:
                 answer = process.receive_bytes(len(PLAIN) + MAX_CODE)
             except (TimeoutError, ProtocolError):

@@ -6,15 +6,18 @@ import logging
 import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import TypeAlias
 
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fork_server import BatchServer, ForkServer
-from codebotler.simulator.isolated_process import LostProcessError, ProtocolError
+from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import SkillPerformer, kept
 from codebotler.simulator.preparer import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
 from codebotler.simulator.skill_protocol import SkillProtocol
 
@@ -22,6 +25,9 @@ EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 """A program, and what makes the robots with which it runs, one after the other."""
+Meanwhile: TypeAlias = Callable[[], object]
+"""What is done while a child runs programs; what it returns does not matter."""
+NOTHING: Meanwhile = bool
 
 
 class Worker:
@@ -34,6 +40,8 @@ class Worker:
 
     def __init__(self, *, one_process_per_run: bool = False) -> None:
         self._stopped = False
+        self._child: IsolatedProcess | None = None  # that runs batches
+        self._keeps_child = False
         self._one_process_per_run = one_process_per_run
         self._preparer = Preparer()
         self._preparer.start()  # beside the fork server
@@ -97,6 +105,7 @@ class Worker:
 
     def close(self) -> None:
         """End all processes; nothing may be running."""
+        self._end_child()
         self._preparer.close()
         while self._fork_servers:
             self._fork_servers.popitem()[1].close()
@@ -111,17 +120,24 @@ class Worker:
         lowercase = robot.rules.literals == "lowercase"
         return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
 
+    def begin_to_prepare(self, source: str, skills: SkillTable, rules: Rules) -> None:
+        """Compile a program while the caller makes ready the robots with which it will run next."""
+        self._preparer.ask_ahead(source, lowercase=rules.literals == "lowercase", skills=tuple(skills))
+
     # --- several tame programs in a child
 
-    def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
-        """The outcomes of tame programs, as far as they are certain, by the numbers of job and robot."""
+    def run_tame(self, jobs: Sequence[Job], meanwhile: Meanwhile = NOTHING) -> dict[tuple[int, int], Outcome]:
+        """The outcomes of tame programs, as far as they are certain, by the numbers of job and robot.
+
+        While a child runs them, `meanwhile` is called, unless none is tame.
+        """
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
         try:
             waiting = list(self._tame(jobs))
             while waiting:
-                waiting = self._run_batch(waiting, jobs, known)
+                waiting = self._run_batch(waiting, jobs, known, meanwhile)
         except (LostProcessError, OSError):
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
@@ -133,8 +149,11 @@ class Worker:
         if robot.guard is not None and robot.guard.may_refuse:
             return  # the child's copies refuse nothing
         lowercase = robot.rules.literals == "lowercase"
-        sources = [source for source, _ in jobs]
-        told = self._preparer.prepare_all(sources, lowercase=lowercase, skills=tuple(robot.skills))
+        sources, skills = [source for source, _ in jobs], tuple(robot.skills)
+        if len(sources) == 1:
+            told = [self._preparer.prepare(*sources, lowercase=lowercase, skills=skills)]
+        else:
+            told = self._preparer.prepare_all(sources, lowercase=lowercase, skills=skills)
         for number, prepared in enumerate(told):
             if isinstance(prepared, Prepared) and prepared.is_tame:
                 yield number, prepared.code, [new_robot() for new_robot in jobs[number][1]]
@@ -144,14 +163,16 @@ class Worker:
         batch: list[tuple[int, bytes, list[SimulatedRobot]]],
         jobs: Sequence[Job],
         known: dict[tuple[int, int], Outcome],
+        meanwhile: Meanwhile,
     ) -> list[tuple[int, bytes, list[SimulatedRobot]]]:
         """Run programs in one child; return those that it had not begun when it broke off, if it did."""
-        child = self._fork_server(BATCH_SERVER).fork()
+        child = self._child = self._child or self._fork_server(BATCH_SERVER).fork()
         for number, _, robots in batch:
             for _ in robots:
                 _log(jobs[number][0], "started")
-        told = outcomes(child, [(code, robots) for _, code, robots in batch])
+        told = outcomes(child, [(code, robots) for _, code, robots in batch], meanwhile)
         waiting = list(batch)
+        is_sound = False
         try:
             while waiting:
                 number, _, robots = waiting.pop(0)
@@ -160,12 +181,35 @@ class Worker:
                     if outcome is not None:
                         known[number, run] = outcome
                         _log_end(jobs[number][0], outcome)
+            is_sound = True
         except (LostProcessError, ProtocolError, TimeoutError):
             pass
         finally:
-            child.kill()
-            child.hang_up()
+            if not (is_sound and self._keeps_child):
+                self._end_child()
         return waiting
+
+    @contextmanager
+    def one_child(self) -> Iterator[None]:
+        """Let the same child run all batches meanwhile, which are of one program."""
+        self._keeps_child = True
+        try:
+            yield
+        finally:
+            self._keeps_child = False
+            self._end_child()
+
+    def _end_child(self) -> None:
+        """End the child that ran batches, and have the next one forked while nobody waits for it."""
+        child, self._child = self._child, None
+        if child is None:
+            return
+        with suppress(LostProcessError):  # its server has ended, and it with that
+            child.kill()
+        child.hang_up()
+        server = self._fork_servers.get(BATCH_SERVER)
+        if isinstance(server, BatchServer):
+            server.fork_ahead()
 
     # --- a child for each run
 

@@ -616,9 +616,10 @@ resource.setrlimit = with_fewer
 def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def compiled(source: str, name: str) -> bytes:
+    def compiled(file: str, name: str) -> bytes:
         prelude = LIKE_MACOS if name == "codebotler.simulator.sandbox" else ""
-        return isolated_process.compiled(
+        source = Path(file).read_text(encoding="utf-8")
+        return isolated_process.compiled_source(
             source.replace('"""The isolated', prelude + '"""The isolated', 1), name
         )
 

@@ -21,7 +21,7 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -33,9 +33,11 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Outcome, Status, outcome_data
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
-from codebotler.simulator.isolated_process import PROCESSOR_TIME
+from codebotler.simulator.fork_server import BatchServer
+from codebotler.simulator.isolated_process import PROCESSOR_TIME, IsolatedProcess
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
+from codebotler.simulator.sandbox import BATCH_SERVER
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import judge
 from roboeval.suites.load import Requirement, Scenario
@@ -146,9 +148,9 @@ def carry_the_marker() -> set[int]:
     return found
 
 
-def descriptors(pid: int) -> dict[str, str]:
+def descriptors(pid: int, besides: Container[int] = ()) -> dict[str, str]:
     found = {}
-    for link in list(Path(f"/proc/{pid}/fd").iterdir()):
+    for link in [link for link in Path(f"/proc/{pid}/fd").iterdir() if int(link.name) not in besides]:
         with contextlib.suppress(OSError):
             found[link.name] = str(link.readlink())
     return found
@@ -216,9 +218,18 @@ class Reach:
     def run(self, source: str) -> Outcome:
         outcome = self.worker.run(source, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
         until = time.monotonic() + 1  # the child was killed, which takes the kernel a moment
-        while time.monotonic() < until and living_below(*self.fork_servers()):
+        while time.monotonic() < until and self.living_below(*self.fork_servers()):
             select.select([], [], [], 0.001)
         return outcome
+
+    def living_below(self, *parents: int) -> set[int]:
+        """All processes below some but the one that was forked, after the run, for the next."""
+        return living_below(*parents) - {ahead.pid for ahead in self.ahead()}
+
+    def ahead(self) -> list[IsolatedProcess]:
+        """The child that was forked, after the run, for the next, if there is one."""
+        server = self.worker._fork_servers.get(BATCH_SERVER)
+        return [server._next] if isinstance(server, BatchServer) and server._next else []
 
     def files(self) -> dict[str, object]:
         """All that is below the folder, with contents, rights and times."""
@@ -238,10 +249,10 @@ class Reach:
             "files": self.files(),
             "who was spoken to": {name for name, number in spoken_to.items() if number in ready},
             "signals": list(self.signals),
-            "living processes": living_below(os.getpid()),
+            "living processes": self.living_below(os.getpid()),
             "processes with the marker": carry_the_marker(),
             "fork_servers": self.fork_servers(),
-            "descriptors": descriptors(os.getpid()),
+            "descriptors": descriptors(os.getpid(), besides={a._channel.fileno() for a in self.ahead()}),
             "descriptors of the fork servers": list(map(descriptors, self.fork_servers())),
         }
 

@@ -185,10 +185,11 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: 
         "            except BaseException: pass\n"
     )
     machine = Machine(does)
+    before = engine_processes()
     with pytest.raises(StoppedError):
         worker.run_live(stubborn, machine)
     assert machine.done == ["a"]
-    assert are_gone({child for pid in fork_servers() for child in children_of(pid)})
+    assert are_gone({child for pid in fork_servers() for child in children_of(pid)} - before)
     assert done(worker, "def task_program(): say('next')")[0] == ["next"]
 
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from codebotler.simulator.sandbox.isolation import Filter
 
     Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # a skill, what it was given, the answer
+    Batch: TypeAlias = tuple[Skills, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]
 
 __all__ = ["get_ready", "serve"]
 
@@ -60,7 +61,7 @@ def get_ready(
     seccomp = usable_filter()
     for _ in range(lessons):
         transcripts(run, rehearsal)
-    return door, run, execute, seccomp, BATCH_CPU_SECONDS
+    return door, run, lambda run: execute(run, rehearsal), seccomp, BATCH_CPU_SECONDS
 
 
 def receive_setup(door: socket) -> bytes:
@@ -72,14 +73,20 @@ def receive_setup(door: socket) -> bytes:
     return data
 
 
-def execute(run: TranscribedRun) -> None:
-    """Run a batch of programs that the engine sends, and send their transcripts."""
-    transcripts(run, receive_at_once(), send_frames)
+def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
+    """Run batches of programs that the engine sends, and send their transcripts, until the engine hangs up.
+
+    A child is forked before there is work for it. It rehearses first: what it writes to for the first time
+    is copied for it, which takes longer than most batches.
+    """
+    transcripts(run, rehearsal)
+    while True:
+        transcripts(run, receive_at_once(), send_frames)
 
 
 def transcripts(
     run: TranscribedRun,
-    batch: tuple[Skills, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]],
+    batch: Batch,
     send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # nobody listens to a rehearsal
 ) -> None:
     """Run programs, each in all of its worlds, and send the transcripts of each program."""

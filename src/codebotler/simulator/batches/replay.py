@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
@@ -63,12 +63,17 @@ def message(programs: Programs) -> tuple[Description, tuple[str, ...], bytes, li
     return described(robot), robot.own_skills, pickle.dumps(list(setups.values()), protocol=5), numbered
 
 
-def outcomes(child: IsolatedProcess, programs: Programs) -> Iterator[Outcome | None]:
+def outcomes(
+    child: IsolatedProcess, programs: Programs, meanwhile: Callable[[], object] = bool
+) -> Iterator[Outcome | None]:
     """Let a child run programs; the outcome of each run in order, None where another process must decide.
+
+    While the child is busy, `meanwhile` is called.
 
     Raises LostProcessError, ProtocolError or TimeoutError where the child says no more that can be used.
     """
     child.send(message(programs), at_once=True)
+    meanwhile()
     for _, robots in programs:
         for robot in robots:
             yield _outcome(child, robot)
