@@ -14,7 +14,8 @@ from pathlib import Path
 
 from codebotler.core.files import to_line, to_text
 from roboeval import evaluate, load_results, load_suite, recorded_completions
-from roboeval.analysis.metrics import overall, task_scores
+from roboeval.analysis.counts import tally_of, task_scores
+from roboeval.analysis.metrics import overall
 from roboeval.analysis.summary import failures
 from roboeval.evaluation.judge import head
 from roboeval.evaluation.runs.folder import Run
@@ -69,7 +70,7 @@ def main() -> None:
         table = load_results(run.path)
         print(f"{table.height:,} rows about {sum(1 for _ in run.rows('paper').open('rb')):,} completions")
         spent = timed("load_results", lambda: load_results(run.path))
-        timed("pass@1 and failures", lambda: (overall(task_scores(table), 1), failures(table)))
+        timed("pass@1 and failures", lambda: (overall(task_scores(table), 1), failures(tally_of(table))))
         print(f"load_results takes {spent / plain:.1f} times as long as parsing")
 
 

@@ -27,7 +27,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.pool import WorkerPool, shared_pool
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
@@ -47,7 +47,7 @@ def check(
     seed: int = 0,
     strict: bool = False,
     skills: SkillTable = SKILLS,
-    workers: int = 1,
+    workers: int | None = None,
     pool: WorkerPool | None = None,
     room_map: RoomMap | None = None,
     house_rules: Sequence[Rule] = (),
@@ -63,8 +63,8 @@ def check(
         seed: of the worlds: the same ones on every machine.
         strict: whether to draw also what the program takes for granted.
         skills: what the program may call.
-        workers: how many runs go on at the same time.
-        pool: what runs the programs, to be used for many checks; by default a new one.
+        workers: how many runs go on at the same time, in a pool that is started for this check.
+        pool: what runs the programs; by default the pool of this process, which starts with the first check.
         room_map: the rooms and the start, in place of those two, where more is known of them.
         house_rules: what a program must keep to in every world.
 
@@ -77,7 +77,7 @@ def check(
     settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules))
     if room_map is None and (rooms, start) != (None, None):
         room_map = _room_map(program, rooms, start, skills)
-    with nullcontext(pool) if pool else WorkerPool(workers) as opened:
+    with nullcontext(pool or shared_pool()) if workers is None else WorkerPool(workers) as opened:
 
         def share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
             return run_samples(opened.here(), program, room_map, samplers, settings)

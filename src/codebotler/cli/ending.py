@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import errno
+import gc
 import os
 import sys
 from functools import cache
@@ -41,6 +43,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     if sys.platform == "win32":
         note(f"{name}: {ON_WINDOWS}")
         raise SystemExit(1)
+    atexit.register(gc.freeze)  # to look for garbage at the end takes a tenth of the time of a long command
     open_streams()
     if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
         del os.environ["COLUMNS"]

@@ -53,6 +53,7 @@ class WorkerPool:
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers, thread_name_prefix="worker")
         self._local = threading.local()
+        self._takes_turns = one_process_per_run  # a thread and a child, at each skill call
         self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
         self._workers: list[Worker] = []
         self._idle: list[Worker] = []
@@ -105,15 +106,15 @@ class WorkerPool:
                 if self._stopping:
                     worker.stop()
             self._local.worker = worker
-            if self.workers > 1:  # else a child runs on another core while this thread does something else
+            if self._takes_turns:
                 self._keep_together(worker)
         return worker
 
     def _keep_together(self, worker: Worker) -> None:
         """Keep this thread and the processes of its worker on one core.
 
-        They take turns, and to wake one on another core costs more than a skill call. For that reason, too,
-        this thread does not push a child aside each time that it says something.
+        To wake one on another core costs more than a skill call. For that reason, too, this thread does not
+        push a child aside each time that it says something.
         """
         if sys.platform != "linux":
             return

@@ -7,14 +7,8 @@ from collections.abc import Iterator, Mapping
 import polars as pl
 
 from codebotler.simulator.rules import resolve_room
-from roboeval.analysis.metrics import (
-    Estimate,
-    by_formula,
-    completions_of,
-    mean_of,
-    prompt_scores,
-    task_scores,
-)
+from roboeval.analysis.counts import completions_of, prompt_scores, task_scores
+from roboeval.analysis.metrics import Estimate, by_formula, mean_of
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.results import Results

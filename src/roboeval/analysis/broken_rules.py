@@ -9,7 +9,8 @@ from typing import Any
 import polars as pl
 
 from codebotler.core.errors import VIOLATION
-from roboeval.analysis.metrics import Estimate, by_formula, overall, pass_at_1, task_scores
+from roboeval.analysis.counts import task_scores
+from roboeval.analysis.metrics import Estimate, by_formula, overall, pass_at_1
 from roboeval.evaluation.runs.completions import KEY
 
 DIFFERENCE = (-1.0, 1.0)

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import polars as pl
 
-from roboeval.analysis.metrics import completions_of, passed_count, prompts_of, task_scores
+from roboeval.analysis.counts import completions_of, task_scores
+from roboeval.analysis.metrics import passed_count, prompts_of
 from roboeval.analysis.resample import LIMITS, chances, rejected_share, requests, trials_by_prompt
 from roboeval.evaluation.runs.table import MILLION, Price
 

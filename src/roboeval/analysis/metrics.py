@@ -10,8 +10,6 @@ from itertools import accumulate
 from operator import mul
 from typing import TypeAlias
 
-import polars as pl
-
 # Values, those that resemble each other together: a prompt's, or those of all prompts of a task.
 Clusters: TypeAlias = Sequence[Sequence[float]]
 
@@ -118,40 +116,6 @@ class TaskScore:
     def highest(self, k: int) -> float:
         """The best prompt's pass@k, the upper end of the paper's error bars; raises as `pass_at` does."""
         return max(prompt.pass_at(k) for prompt in self.prompts)
-
-
-def completions_of(table: pl.DataFrame) -> pl.DataFrame:
-    """One row for each judged completion of a table that `load_results` gives."""
-    return table.filter(pl.col("world_number") == 0)
-
-
-def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
-    """How many completions of each prompt were judged (`n`) and passed (`c`), and its `pass@1`.
-
-    Args:
-        table: as `load_results` gives it.
-    """
-    counted = completions_of(table).group_by("task", "prompt", maintain_order=True)
-    return counted.agg(n=pl.len(), c=pl.col("passed").sum()).with_columns(
-        pl.struct("n", "c")
-        .map_elements(lambda one: pass_at_k(one["n"], one["c"], 1), return_dtype=pl.Float64)
-        .alias("pass@1")
-    )
-
-
-def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """How often completions pass, by task and prompt (paper, section IV.C).
-
-    Args:
-        table: as `load_results` gives it.
-        order: of the tasks; others come behind these, as they stand in the table.
-    """
-    prompts: dict[str, list[PromptScore]] = {
-        task: [] for task in [*order, *table["task"].unique(maintain_order=True)]
-    }
-    for task, prompt, n, c, _ in prompt_scores(table).sort("prompt", maintain_order=True).iter_rows():
-        prompts[task].append(PromptScore(task, prompt, n, c))
-    return tuple(TaskScore(task, tuple(scores)) for task, scores in prompts.items() if scores)
 
 
 def judged_count(prompts: Iterable[PromptScore]) -> int:

@@ -13,7 +13,7 @@ import polars as pl
 
 from codebotler.core.trace import Trace, trace_from
 from codebotler.rtl import Formula, Inconclusive, holds, parse
-from roboeval.analysis.metrics import completions_of
+from roboeval.analysis.counts import completions_of
 from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.rows import key_of
 

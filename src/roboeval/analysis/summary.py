@@ -7,24 +7,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import polars as pl
-
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import (
     Estimate,
     PromptScore,
     TaskScore,
-    completions_of,
     judged_count,
     overall,
     passed_count,
     prompts_of,
-    task_scores,
 )
+from roboeval.analysis.tally import Tally
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import how_many
-from roboeval.evaluation.runs.results import Scope
+from roboeval.evaluation.runs.scope import Scope
 from roboeval.suites.load import Suite
 
 
@@ -66,7 +63,7 @@ class Missing:
 
 
 def summary(
-    table: pl.DataFrame,
+    tally: Tally,
     suite: Suite,
     scope: Scope,
     *,
@@ -74,7 +71,7 @@ def summary(
     ablated: bool = False,
 ) -> Summary:
     """Count how completions did; raises UserError where there is none, or k is too large for a prompt."""
-    tasks = task_scores(table, suite.tasks)
+    tasks = tally.scores(suite.tasks)
     if not tasks:
         raise UserError(f"0 of {how_many(scope.total)} judged, so there are no results yet")
     try:
@@ -85,7 +82,7 @@ def summary(
     scored = {score.task for score in tasks}
     expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
     missing = _missing([name for name in expected if name not in scored], scope)
-    return Summary(tuple(k), tasks, estimates, failures(table), scope, missing, ablated)
+    return Summary(tuple(k), tasks, estimates, failures(tally), scope, missing, ablated)
 
 
 def _missing(tasks: Sequence[str], scope: Scope) -> Missing:
@@ -97,14 +94,12 @@ def _missing(tasks: Sequence[str], scope: Scope) -> Missing:
     )
 
 
-def failures(table: pl.DataFrame) -> tuple[Failures, ...]:
+def failures(tally: Tally) -> tuple[Failures, ...]:
     """How many completions, of one or more, failed by each class and kind (paper, section V.B)."""
-    completions = completions_of(table)
-    counted = completions.drop_nulls("failure_class").group_by("failure_class", "failure_kind").len()
     failed: dict[str, Counter[str]] = defaultdict(Counter)
-    for name, kind, count in counted.iter_rows():
+    for (name, kind), count in tally.failed.items():
         failed[name][kind] = count
-    n = completions.height
+    n = tally.judged.total()
 
     def of_class(name: str) -> Failures:
         counts = failed.get(name, Counter())
@@ -128,13 +123,12 @@ class Causes:
     counts: Mapping[tuple[str, str], int]  # by class and kind, ALL for the class; may be empty
 
 
-def causes(table: pl.DataFrame) -> Causes:
+def causes(tally: Tally) -> Causes:
     """How the completions of a run, one or more, ended (paper, section V.B)."""
-    found = failures(table)
-    passed = passed_count(prompts_of(task_scores(table)))
+    found = failures(tally)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
     return Causes(
-        {PASSED: passed / completions_of(table).height, **{one.name: one.share for one in found}},
+        {PASSED: tally.passed.total() / tally.judged.total(), **{one.name: one.share for one in found}},
         {one.name: {kind: count / one.count for kind, count in kinds[one.name]} for one in found},
         {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
     )

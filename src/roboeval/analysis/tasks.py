@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import completions_of, prompt_scores
+from roboeval.analysis.counts import completions_of, prompt_scores
 from roboeval.evaluation.explanation import reason
 from roboeval.evaluation.runs.completions import KEY, Completion, Key
 from roboeval.evaluation.runs.results import Results
@@ -104,14 +104,6 @@ def _failure_kinds(of_prompt: pl.DataFrame) -> list[dict[str, Any]]:
         {"class": name, "kind": kind, "count": count, "example": example}
         for name, kind, count, example in counted.iter_rows()
     ]
-
-
-def by_hand(models: Collection[str | None]) -> str:
-    """What a title adds if some models are recorded programs, which stand for no real model."""
-    recorded = [model for model in models if model is not None and model.startswith("recorded:")]
-    if not recorded:
-        return ""
-    return f" ({'' if len(recorded) == len(models) else 'some '}programs written by hand)"
 
 
 # --- which part of a run

@@ -12,7 +12,8 @@ import polars as pl
 from codebotler.core.errors import UserError
 from roboeval.analysis.cluster import Cluster, cluster_data, clusters, groups
 from roboeval.analysis.compare import Comparison, PromptScores, compared, comparison_data
-from roboeval.analysis.metrics import completions_of, pass_at_1, task_scores
+from roboeval.analysis.counts import completions_of, task_scores
+from roboeval.analysis.metrics import pass_at_1
 from roboeval.analysis.statistics import ROUNDING
 from roboeval.evaluation.runs.completions import KEY, how_many
 from roboeval.evaluation.runs.results import Results

@@ -67,7 +67,8 @@ PAIR = 2
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print by how much the second of two runs is better."""
     from roboeval.analysis.compare import compared, comparison_data, unlike
-    from roboeval.analysis.metrics import pass_at_1, task_scores
+    from roboeval.analysis.counts import task_scores
+    from roboeval.analysis.metrics import pass_at_1
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]

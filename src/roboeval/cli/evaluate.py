@@ -34,11 +34,11 @@ from roboeval.cli.output import fail, note, watched
 from roboeval.cli.show import house_of, print_summary
 
 if TYPE_CHECKING:
-    from polars import DataFrame
-
     from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run, Source
     from roboeval.evaluation.runs.rows import JudgedRow
+    from roboeval.evaluation.runs.table import TableBuilder
     from roboeval.suites.load import Suite
 
 
@@ -64,10 +64,10 @@ def evaluate(
     with engine_named(engine, workers, **isolation) as engine_for:
         from roboeval.analysis.metrics import judged_count
         from roboeval.analysis.summary import summary
+        from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
         from roboeval.evaluation.runs.folder import Run, tasks_to_judge
-        from roboeval.evaluation.runs.results import Scope
-        from roboeval.evaluation.runs.table import TableBuilder
+        from roboeval.evaluation.runs.scope import Scope
 
         judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
@@ -75,7 +75,7 @@ def evaluate(
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged, since they have no ablation: {', '.join(left)}")
-        builder, is_started = TableBuilder(), False
+        tally, table, is_started = Tally(), None if rules is None else _new_table(), False
         run = None if out is None else Run(out)
         try:
             opened = opened_source(source, judged_by)
@@ -88,19 +88,26 @@ def evaluate(
             running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
             for row in watched(rows, "judging", scope.total):
-                is_started = True  # an interrupted builder is in no state to be asked
-                builder.add(row)
-            table = builder.table()
-            counted = summary(table, judged_by, scope, ablated=ablation)
-            house = None if rules is None else house_of(run, judged_by, table, ablated=ablation)
+                is_started = True
+                tally.add(row)
+                if table is not None:
+                    table.add(row)
+            counted = summary(tally, judged_by, scope, ablated=ablation)
+            house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
         except KeyboardInterrupt:
             note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
             raise SystemExit(STOPPED) from None
         if run is not None:
-            _name_next_command(run, table, suite=suite, ablated=ablation, rules=rules)
+            _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
         if (left_out := scope.total - judged_count(counted.prompts)) > 0:
             _fail_with_some_left(how_many(left_out), scope.total, is_kept=run is not None)
+
+
+def _new_table() -> TableBuilder:
+    from roboeval.evaluation.runs.table import TableBuilder  # with polars, which takes a tenth of a second
+
+    return TableBuilder()
 
 
 def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoReturn:
@@ -110,15 +117,15 @@ def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoRetur
     raise SystemExit(1)
 
 
-def _name_next_command(run: Run, table: DataFrame, *, suite: str, ablated: bool, rules: Path | None) -> None:
+def _name_next_command(
+    run: Run, failed: Key | None, *, suite: str, ablated: bool, rules: Path | None
+) -> None:
     """Note where verdicts are kept, and the command that shows the first failure."""
-    from roboeval.evaluation.runs.completions import KEY, name_of
+    from roboeval.evaluation.runs.completions import name_of
 
-    failed = table.filter(~table["passed"]).select(KEY).head(1)
-    again = command(
-        "show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablated, rules=rules
-    )
-    does = "explains the first failure" if failed.height else "prints these tables again"
+    shown = [] if failed is None else [name_of(failed)]
+    again = command("show", run.path, *shown, suite=suite, ablated=ablated, rules=rules)
+    does = "explains the first failure" if shown else "prints these tables again"
     note(f"verdicts are in {run.path}; `{again}` {does}")
 
 

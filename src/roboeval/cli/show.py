@@ -50,6 +50,7 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
+    from roboeval.analysis.counts import tally_of
     from roboeval.analysis.summary import summary
     from roboeval.analysis.tasks import parse_selection
 
@@ -57,7 +58,7 @@ def show(
     selection = parse_selection(what, results.known_suite)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
-        counted = summary(results.table, results.known_suite, results.scope, k=ks, ablated=ablation)
+        counted = summary(tally_of(results.table), results.known_suite, results.scope, k=ks, ablated=ablation)
         house = (
             None
             if rules is None
@@ -100,14 +101,17 @@ def print_summary(
     house: BrokenRules | None = None,
 ) -> None:
     """Print the tables of an evaluation."""
-    from roboeval.analysis.broken_rules import broken_rules_data
     from roboeval.analysis.summary import summary_data
     from roboeval.cli.views.results import house_view, summary_view
     from roboeval.evaluation.runs.completions import name_of
 
     if as_json:
-        rules = {} if house is None else {"house_rules": broken_rules_data(house)}
-        print_json({**summary_data(counted), "stale": list(map(name_of, stale)), **rules})
+        data = {**summary_data(counted), "stale": list(map(name_of, stale))}
+        if house is not None:
+            from roboeval.analysis.broken_rules import broken_rules_data
+
+            data["house_rules"] = broken_rules_data(house)
+        print_json(data)
     else:
         print_rich(summary_view(counted, title=title))
         if house is not None:

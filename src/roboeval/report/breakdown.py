@@ -9,7 +9,7 @@ from typing import Any
 import polars as pl
 
 from roboeval.analysis.breakdown import by_ability, coming_back, phrasing, spread
-from roboeval.analysis.metrics import prompt_scores
+from roboeval.analysis.counts import prompt_scores
 from roboeval.evaluation.failures import CLASSES
 from roboeval.report.runs import JudgedRun, tasks_of
 from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from roboeval.analysis.cluster import Cluster, clusters, groups
+from roboeval.analysis.counts import tally_of
 from roboeval.analysis.summary import ALL, Causes, causes
 from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
@@ -32,7 +33,7 @@ def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple
     """The causes of each run, each followed by the published ones if they are wanted and known."""
     found: list[tuple[str, Causes]] = []
     for run in runs:
-        found.append((run.name, causes(run.table)))
+        found.append((run.name, causes(tally_of(run.table))))
         if with_published and (model := paper.model_of(run)) is not None:
             found.append((f"{run.name}, published", paper.causes(model)))
     return found
@@ -40,7 +41,7 @@ def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple
 
 def most_frequent(run: JudgedRun) -> str:
     """The most frequent kind of failure with its share of all completions, in words; empty if none fails."""
-    counts = {key: count for key, count in causes(run.table).counts.items() if key[1] != ALL}
+    counts = {key: count for key, count in causes(tally_of(run.table)).counts.items() if key[1] != ALL}
     if not counts:
         return ""
     (of, kind), count = max(counts.items(), key=lambda one: one[1])

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from roboeval.analysis.broken_rules import BrokenRules, broken_rules
-from roboeval.analysis.metrics import overall, task_scores
+from roboeval.analysis.counts import task_scores
+from roboeval.analysis.metrics import overall
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
 

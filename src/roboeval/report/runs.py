@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import polars as pl
 
 from codebotler.core.cachedproperty import cached_property
-from roboeval.analysis.metrics import TaskScore, completions_of, overall, pass_at_1, task_scores
+from roboeval.analysis.counts import completions_of, task_scores
+from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
 from roboeval.report.drawing import short_name

@@ -17,10 +17,9 @@ from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.cluster import Fix, nearest_fix
-from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, as_written, cut_told, error_sentence
 from roboeval.evaluation.failures import label_of
-from roboeval.evaluation.runs.completions import Key, name_of
+from roboeval.evaluation.runs.completions import Key, by_hand, name_of
 from roboeval.suites.task import describe_person, world_title
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import MissingError, RunStore

@@ -10,8 +10,8 @@ from urllib.parse import quote
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import mean_of
 from roboeval.analysis.summary import Failures
-from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.failures import label_of, plural_of
+from roboeval.evaluation.runs.completions import by_hand
 from roboeval.web.snapshot import Filter, Snapshot
 
 STEPS = 10

@@ -13,9 +13,8 @@ from typing import Any
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
-from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import GONE, completion_data
-from roboeval.evaluation.runs.completions import KEY, Key, how_many, name_of
+from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, name_of
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import Filter, Snapshot

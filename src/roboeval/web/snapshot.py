@@ -11,15 +11,8 @@ import polars as pl
 from fastapi import Query
 
 from codebotler.core.cachedproperty import cached_property
-from roboeval.analysis.metrics import (
-    Estimate,
-    TaskScore,
-    judged_count,
-    overall,
-    passed_count,
-    prompts_of,
-    task_scores,
-)
+from roboeval.analysis.counts import tally_of, task_scores
+from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
 from roboeval.analysis.summary import Failures, failures
 from roboeval.analysis.tasks import prompt_counts
 from roboeval.evaluation.runs.completions import KEY, Key
@@ -167,7 +160,7 @@ class Snapshot:
     @cached_property
     def failures(self) -> list[Failures]:
         """The classes of failures that there are, each with its kinds, the most frequent first."""
-        classes = failures(self.results.table) if self.judged else ()
+        classes = failures(tally_of(self.results.table)) if self.judged else ()
         return [
             replace(
                 of, kinds=tuple(sorted((k for k in of.kinds if k.count), key=lambda k: (-k.count, k.name)))

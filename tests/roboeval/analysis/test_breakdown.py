@@ -11,7 +11,7 @@ from codebotler.core.world import Room, World
 from made_results import VERDICT, results_of
 from made_up_runs import SUITE, made_up
 from roboeval.analysis.breakdown import by_ability, coming_back, never_returned, phrasing, spread
-from roboeval.analysis.metrics import prompt_scores
+from roboeval.analysis.counts import prompt_scores
 from roboeval.suites.load import Scenario
 
 WORLD = World((Room("start"), Room("kitchen")), "start", about="w")

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from made_results import table_of
+from roboeval.analysis.counts import task_scores
 from roboeval.analysis.metrics import (
     Estimate,
     PromptScore,
@@ -18,7 +19,6 @@ from roboeval.analysis.metrics import (
     pass_at_k,
     share_at_least,
     t_quantile,
-    task_scores,
     threshold_curve,
 )
 

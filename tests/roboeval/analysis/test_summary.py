@@ -13,12 +13,13 @@ import pytest
 
 from codebotler.core.errors import UserError
 from made_results import table_of
+from roboeval.analysis.counts import tally_of
 from roboeval.analysis.summary import ALL, Summary, kinds_in_order, summary_data
 from roboeval.analysis.summary import causes as causes_of
 from roboeval.analysis.summary import summary as summary_of
 from roboeval.cli.views.results import summary_view
 from roboeval.evaluation.failures import CLASSES
-from roboeval.evaluation.runs.results import Scope
+from roboeval.evaluation.runs.scope import Scope
 from roboeval.suites.load import Suite
 from small_run import ROWS, SUITE, TASK, printed, row
 
@@ -32,7 +33,7 @@ def summary(
     ablated: bool = False,
 ) -> Summary:
     scope = scope or Scope(Counter(row["task"] for row in rows))
-    return summary_of(table_of(rows), suite, scope, k=k, ablated=ablated)
+    return summary_of(tally_of(table_of(rows)), suite, scope, k=k, ablated=ablated)
 
 
 def test_a_summary_counts_tasks_prompts_and_failures() -> None:
@@ -177,7 +178,7 @@ def test_causes_are_shares_of_classes_and_of_their_kinds() -> None:
         row(0, 0),
         *(row(0, n, ("PythonError", kind)) for n, kind in enumerate(("X", "NameError", "X"), 1)),
     ]
-    found = causes_of(table_of([*rows, row(0, 4, ("TaskCompletionError", "Location"))]))
+    found = causes_of(tally_of(table_of([*rows, row(0, 4, ("TaskCompletionError", "Location"))])))
     assert found.classes == {
         "passed": pytest.approx(0.2),
         "PythonError": pytest.approx(0.6),
@@ -188,5 +189,5 @@ def test_causes_are_shares_of_classes_and_of_their_kinds() -> None:
     assert found.kinds["RobotExecutionError"] == {}
     assert found.counts["PythonError", "X"] == 2
     assert found.counts["PythonError", ALL] == 3
-    other = causes_of(table_of([row(0, 0, ("PythonError", "TypeError"))]))
+    other = causes_of(tally_of(table_of([row(0, 0, ("PythonError", "TypeError"))])))
     assert kinds_in_order([found, other], "PythonError") == ["NameError", "TypeError", "X"]

@@ -10,11 +10,13 @@ import pytest
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from made_results import results_of, table_of
+from roboeval.analysis.counts import tally_of
 from roboeval.analysis.summary import summary
 from roboeval.analysis.tasks import Selection, parse_selection, task_data
 from roboeval.cli.views.results import summary_view, task_view
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.results import Results, Scope
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.scope import Scope
 from small_run import HOSTILE, ROWS, SHOWN, SUITE, printed, row
 
 
@@ -55,7 +57,7 @@ def test_what_a_model_wrote_is_text(*, colour: bool) -> None:
     rows = [row(0, 0, ("PythonError", HOSTILE))]
     completions = [Completion(task="Visit", prompt=0, index=0, program="", instruction=HOSTILE)]
     views = [
-        summary_view(summary(table_of(rows), SUITE, Scope({})), title=HOSTILE),
+        summary_view(summary(tally_of(table_of(rows)), SUITE, Scope({})), title=HOSTILE),
         task_view(task_data(results(*completions, rows=rows), "Visit")),
     ]
     for view in views:

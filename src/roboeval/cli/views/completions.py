@@ -12,7 +12,6 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible
-from roboeval.analysis.tasks import by_hand
 from roboeval.cli.views.results import kind_view, prompt_lines
 from roboeval.evaluation.explanation import (
     GONE,
@@ -23,7 +22,7 @@ from roboeval.evaluation.explanation import (
     error_sentence,
     shown_lines,
 )
-from roboeval.evaluation.runs.completions import name_of
+from roboeval.evaluation.runs.completions import by_hand, name_of
 from roboeval.suites.task import world_title
 
 EXPLANATION = 2_000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.columns import Columns
@@ -15,13 +15,14 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.broken_rules import BrokenRules
 from roboeval.analysis.metrics import Estimate, judged_count
 from roboeval.analysis.summary import Failures, Missing, Summary
-from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED
 from roboeval.evaluation.failures import label_of, plural_of
-from roboeval.evaluation.runs.completions import how_many
+from roboeval.evaluation.runs.completions import by_hand, how_many
+
+if TYPE_CHECKING:
+    from roboeval.analysis.broken_rules import BrokenRules
 
 FEW = 3  # tasks that are named; of more, their number is told
 ALL_GONE = "the judged programs are no longer in this run"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -202,3 +202,11 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
                 )
     if not found:
         raise UserError(f'{name} knows no instruction of the suite "{suite.name}"')
+
+
+def by_hand(models: Collection[str | None]) -> str:
+    """What a title adds if some models are recorded programs, which stand for no real model."""
+    recorded = [model for model in models if model is not None and model.startswith("recorded:")]
+    if not recorded:
+        return ""
+    return f" ({'' if len(recorded) == len(models) else 'some '}programs written by hand)"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -26,6 +25,7 @@ from roboeval.evaluation.runs.rows import (
     read_checks,
     read_lines_of,
 )
+from roboeval.evaluation.runs.scope import Scope
 from roboeval.evaluation.runs.table import Price, TableBuilder, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
@@ -61,35 +61,6 @@ def load_results(
     known = load_suite(suite)
     table = read_results(*evaluation_of(Path(run), known, ablated=ablation), keep_failed=False).table
     return table if price is None else with_cost(table, Price(*price))
-
-
-@dataclass(frozen=True)
-class Scope:
-    """What there is to judge."""
-
-    completions: Mapping[str, int]  # by task, also of tasks that were not selected
-    tasks: frozenset[str] | None = None  # those selected; None for all
-    models: frozenset[str | None] = frozenset()  # of the selected; None: not recorded
-
-    @classmethod
-    def of(cls, completions: Iterable[Completion], tasks: frozenset[str] | None) -> Scope:
-        """Count completions, in one pass."""
-        counts: Counter[str] = Counter()
-        models: set[str | None] = set()
-        for completion in completions:
-            counts[completion.task] += 1
-            if tasks is None or completion.task in tasks:
-                models.add(completion.model)
-        return cls(counts, tasks, frozenset(models))
-
-    @property
-    def total(self) -> int:
-        """How many completions there are to judge."""
-        return sum(n for task, n in self.completions.items() if self.selects(task))
-
-    def selects(self, task: str) -> bool:
-        """Whether a task is to be judged."""
-        return self.tasks is None or task in self.tasks
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,53 @@
+"""Counts what the table of a run says, as a tally does while completions are judged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import polars as pl
+
+from roboeval.analysis.metrics import TaskScore, pass_at_k
+from roboeval.analysis.tally import Tally
+from roboeval.evaluation.runs.completions import KEY
+
+
+def completions_of(table: pl.DataFrame) -> pl.DataFrame:
+    """One row for each judged completion of a table that `load_results` gives."""
+    return table.filter(pl.col("world_number") == 0)
+
+
+def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
+    """How many completions of each prompt were judged (`n`) and passed (`c`), and its `pass@1`.
+
+    Args:
+        table: as `load_results` gives it.
+    """
+    counted = completions_of(table).group_by("task", "prompt", maintain_order=True)
+    return counted.agg(n=pl.len(), c=pl.col("passed").sum()).with_columns(
+        pl.struct("n", "c")
+        .map_elements(lambda one: pass_at_k(one["n"], one["c"], 1), return_dtype=pl.Float64)
+        .alias("pass@1")
+    )
+
+
+def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
+    """How often completions pass, by task and prompt (paper, section IV.C).
+
+    Args:
+        table: as `load_results` gives it.
+        order: of the tasks; others come behind these, as they stand in the table.
+    """
+    return tally_of(table).scores(order)
+
+
+def tally_of(table: pl.DataFrame) -> Tally:
+    """The counts of all completions in a table."""
+    tally = Tally()
+    completions = completions_of(table)
+    for task, prompt, n, c, _ in prompt_scores(table).iter_rows():
+        tally.judged[task, prompt], tally.passed[task, prompt] = n, c
+    failed = completions.drop_nulls("failure_class")
+    for name, kind, count in failed.group_by("failure_class", "failure_kind").len().iter_rows():
+        tally.failed[name, kind] = count
+    tally.first_failed = next(completions.filter(~pl.col("passed")).select(KEY).iter_rows(), None)
+    return tally

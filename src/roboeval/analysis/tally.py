@@ -1,0 +1,46 @@
+"""Counts completions while they are judged: how many of each prompt pass, and how the others fail."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from roboeval.analysis.metrics import PromptScore, TaskScore
+from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.rows import JudgedRow
+
+
+class Tally:
+    """The counts of an evaluation."""
+
+    def __init__(self) -> None:
+        self.judged: Counter[tuple[str, int]] = Counter()  # by task and prompt
+        self.passed: Counter[tuple[str, int]] = Counter()  # of these
+        self.failed: Counter[tuple[str, str]] = Counter()  # by class and kind of the failure
+        self.first_failed: Key | None = None
+
+    def add(self, row: JudgedRow) -> None:
+        """Count a completion."""
+        prompt = row.task, row.prompt
+        self.judged[prompt] += 1
+        if row.failure is None:
+            self.passed[prompt] += 1
+            return
+        self.failed[row.failure.failure_class, row.failure.kind] += 1
+        if self.first_failed is None:
+            self.first_failed = row.key
+
+    def scores(self, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
+        """How often completions pass, by task and prompt (paper, section IV.C).
+
+        Args:
+            order: of the tasks; others come behind these, as they were met.
+        """
+        prompts: dict[str, list[PromptScore]] = {task: [] for task in order}
+        for (task, prompt), n in self.judged.items():
+            prompts.setdefault(task, []).append(PromptScore(task, prompt, n, self.passed[task, prompt]))
+        return tuple(
+            TaskScore(task, tuple(sorted(scores, key=lambda score: score.prompt)))
+            for task, scores in prompts.items()
+            if scores
+        )
