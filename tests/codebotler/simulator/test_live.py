@@ -16,7 +16,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rules import ENDLESS, PAPER
-from codebotler.simulator.sandbox import PROGRAM
+from codebotler.simulator.sandbox import LIVE_SERVER, PROGRAM
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 
@@ -185,11 +185,10 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: 
         "            except BaseException: pass\n"
     )
     machine = Machine(does)
-    before = engine_processes()
     with pytest.raises(StoppedError):
         worker.run_live(stubborn, machine)
     assert machine.done == ["a"]
-    assert are_gone({child for pid in fork_servers() for child in children_of(pid)} - before)
+    assert are_gone(children_of(worker._fork_servers[LIVE_SERVER].pid))
     assert done(worker, "def task_program(): say('next')")[0] == ["next"]
 
 
