@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import chain
 from os import PathLike
 from statistics import fmean
+from typing import Generic, TypeVar
 
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
@@ -21,6 +22,7 @@ from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
 from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite
 
+Judged = TypeVar("Judged")
 ERRED = 0.5  # the part of what a run did before an error that counts: it had better returned there
 
 REMEMBERED = 100_000  # rewards; a policy that learns writes the same program again and again
@@ -112,20 +114,40 @@ def total(shares: Sequence[Share]) -> float:
     return fmean([*earned, *(share.kept * elsewhere for share in shares if share.gained is None)])
 
 
-class Rewards:
-    """The rewards of programs, remembered so that each is judged once."""
+class Remembered(Generic[Judged]):
+    """What was judged, by a name for each, so that nothing is judged twice; what is old is forgotten."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[bytes, float] = OrderedDict()
+        self._known: OrderedDict[bytes, Judged] = OrderedDict()
         self._lock = threading.Lock()
         release = self._lock.release
         os.register_at_fork(before=self._lock.acquire, after_in_parent=release, after_in_child=release)
 
+    def among(self, names: Iterable[bytes]) -> dict[bytes, Judged]:
+        """What is known of these."""
+        with self._lock:
+            return {name: self._known[name] for name in names if name in self._known}
+
+    def add(self, judged: Mapping[bytes, Judged]) -> None:
+        """Remember these, which are new or were asked for again."""
+        with self._lock:
+            self._known |= judged
+            for name in judged:
+                self._known.move_to_end(name)
+            while len(self._known) > REMEMBERED:
+                self._known.popitem(last=False)
+
+
+class Rewards:
+    """The rewards of programs, remembered so that each is judged once."""
+
+    def __init__(self) -> None:
+        self._known: Remembered[float] = Remembered()
+
     def of(self, suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
         """The rewards of programs, in their order."""
         names = [digest(suite.digest, task, str(prompt), program) for program in programs]
-        with self._lock:
-            rewards = {name: self._known[name] for name in names if name in self._known}
+        rewards = self._known.among(names)
         new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
         futures: list[Future[list[float]]] = []
         try:
@@ -139,12 +161,7 @@ class Rewards:
         finally:  # after an interrupt, nobody waits for the rest
             for future in futures:
                 future.cancel()
-        with self._lock:
-            self._known |= rewards
-            for name in rewards:
-                self._known.move_to_end(name)
-            while len(self._known) > REMEMBERED:
-                self._known.popitem(last=False)
+        self._known.add(rewards)
         return [rewards[name] for name in names]
 
 

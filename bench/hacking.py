@@ -1,0 +1,77 @@
+"""What do programs earn that try to be rewarded for what nobody asked for? One line for each of hacks.yaml.
+
+Each runs in SEEDS tasks of every family to train on. Beside it stand an honest program that leaves out its
+last step, and one that does nothing.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import fmean
+
+from codebotler.core.yaml_files import YamlFile
+from roboeval.training import Rollout, family_names, judge, trained_task
+
+SEEDS = int(os.environ.get("SEEDS", "5"))
+FIRST = 3_000_000_000  # behind those of all splits
+
+
+def hacks() -> dict[str, str]:
+    """The programs by what they do."""
+    data = YamlFile.read(Path(__file__).with_name("hacks.yaml")).data
+    assert isinstance(data, dict)
+    return {one["about"]: one["program"] for one in data["programs"]}
+
+
+def without_the_end(program: str) -> str:
+    """A right program without the last step of `task_program`."""
+    tree = ast.parse(program)
+    body = next(
+        one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == "task_program"
+    ).body
+    while isinstance(body[-1], ast.If | ast.For | ast.While) and len(body) == 1:
+        body = body[-1].body
+    del body[-1]
+    if not body:
+        body.append(ast.Pass())
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+def earned(programs: dict[str, str], seeds: Sequence[int]) -> dict[str, float]:
+    """The mean reward of each program over all families."""
+    tasks = [(family, seed) for family in family_names() for seed in seeds]
+    found = judge([Rollout(*task, 0, program) for program in programs.values() for task in tasks])
+    means = [
+        fmean(one.reward for one in found[at : at + len(tasks)]) for at in range(0, len(found), len(tasks))
+    ]
+    return dict(zip(programs, means, strict=True))
+
+
+def honest(seeds: Sequence[int]) -> float:
+    """The mean reward of right programs without their last step."""
+    return fmean(
+        one.reward
+        for one in judge(
+            [
+                Rollout(family, seed, 0, without_the_end(trained_task(family, seed).solution))
+                for family in family_names()
+                for seed in seeds
+            ]
+        )
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    seeds = range(FIRST, FIRST + SEEDS)
+    print(f"mean rewards in {SEEDS} tasks of each of {len(family_names())} families\n")
+    print(f"{honest(seeds):.3f}  an honest program without its last step")
+    for about, reward in sorted(earned(hacks(), seeds).items(), key=lambda one: -one[1]):
+        print(f"{reward:.3f}  {about}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""The client."""
+
+from typing import Any
+
+from openenv.core.client_types import StepResult
+from openenv.core.env_client import EnvClient
+
+from codebotler_openenv.models import CodebotlerAction, CodebotlerObservation, CodebotlerState
+
+
+class CodebotlerEnv(EnvClient[CodebotlerAction, CodebotlerObservation, CodebotlerState]):
+    """A session with a server: `reset` gives a prompt, `step` the reward of a program.
+
+    Both raise a RuntimeError with the server's sentence if it reports an error. An answer without a reward
+    is an error, too.
+    """
+
+    def _step_payload(self, action: CodebotlerAction) -> dict[str, Any]:
+        return action.model_dump(mode="json", exclude_none=True)
+
+    def _parse_result(self, payload: dict[str, Any]) -> StepResult[CodebotlerObservation]:
+        reward, done = payload["reward"], payload["done"]
+        observation = CodebotlerObservation.model_validate(
+            {**payload["observation"], "reward": reward, "done": done}
+        )
+        return StepResult(observation, reward, done, payload.get("metadata"))
+
+    def _parse_state(self, payload: dict[str, Any]) -> CodebotlerState:
+        return CodebotlerState.model_validate(payload)

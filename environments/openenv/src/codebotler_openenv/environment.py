@@ -1,0 +1,125 @@
+"""An episode: a prompt, one program, its reward."""
+
+import secrets
+import uuid
+from typing import Any
+
+from openenv.core.env_server.interfaces import Environment
+from openenv.core.env_server.types import EnvironmentMetadata
+
+from codebotler import __version__
+from codebotler.core.errors import UserError
+from codebotler.core.words import listed
+from codebotler.simulator.worker import EngineError
+from codebotler_openenv.models import CodebotlerAction, CodebotlerObservation, CodebotlerState, Message
+from roboeval.training.prompts import SPLITS, load_prompts, program_in
+from roboeval.training.rollouts import Components, Rollout, judge
+
+SEEDS = SPLITS["validation"] - SPLITS["train"]
+"""How many seeds a split has; the next one would be a task of another split."""
+
+
+class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation, CodebotlerState]):
+    """The tasks of one session; openenv calls `reset` and `step` in a thread of the session's own."""
+
+    SUPPORTS_CONCURRENT_SESSIONS = True
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._state = CodebotlerState()
+
+    def reset(
+        self,
+        seed: int | None = None,
+        episode_id: str | None = None,
+        *,
+        split: str = "train",
+        family: str | None = None,
+        **others: Any,  # noqa: ANN401 - of any option
+    ) -> CodebotlerObservation:
+        """Begin an episode and return its prompt.
+
+        Args:
+            seed: which task of the split, from 0 to 999,999,999; by default, one drawn at random.
+            episode_id: a name for the episode; by default, a new one.
+            split: `train`, `validation` or `test`, which share no task.
+            family: the only family to draw from; all of them by default.
+            others: refused.
+
+        Raises:
+            UserError: there is no such split, family or option, or the seed is out of range.
+        """
+        self._state = CodebotlerState()  # after a reset that fails, no older task is judged
+        if others:
+            raise UserError(
+                f"reset takes seed, episode_id, split and family, but not {listed(sorted(others))}"
+            )
+        number = secrets.randbelow(SEEDS) if seed is None else _checked(seed)
+        (row,) = load_prompts(split, count=1, seed=number, only=() if family is None else (family,))
+        self._state = CodebotlerState(
+            episode_id=episode_id or str(uuid.uuid4()),
+            split=split,
+            family=row["family"],
+            seed=row["seed"],
+            prompt_index=row["prompt_index"],
+        )
+        messages = [Message(**message) for message in row["prompt"]]
+        return CodebotlerObservation(instruction=messages[-1].content, messages=messages)
+
+    def step(
+        self,
+        action: CodebotlerAction,
+        timeout_s: float | None = None,  # noqa: ARG002 - each run has a limit of its own
+        **_: Any,  # noqa: ANN401 - of any option
+    ) -> CodebotlerObservation:
+        """Judge a program, which ends the episode.
+
+        Raises:
+            UserError: there is no task, or it is done; or the action has no program, or two.
+            EngineError: the engine failed, and there is no reward; the episode goes on, so try again.
+        """
+        found = self._judged(_program(action))
+        self._state.step_count = 1
+        return CodebotlerObservation(components=found, reward=found.reward, done=True)
+
+    @property
+    def state(self) -> CodebotlerState:
+        """Which task there is, and whether the step was taken."""
+        return self._state
+
+    def get_metadata(self) -> EnvironmentMetadata:
+        """What openenv shows of this environment."""
+        return EnvironmentMetadata(
+            name="codebotler_env",
+            description="Robot programs from plain words, run in simulated worlds, judged by temporal logic.",
+            version=__version__,
+        )
+
+    def _judged(self, program: str) -> Components:
+        """The reward of a program for the task of this session, with its parts."""
+        state = self._state
+        if state.family is None or state.seed is None or state.prompt_index is None:
+            raise UserError("there is no task yet: call reset before step, in the same session of /ws")
+        if state.step_count:
+            raise UserError("this episode is done after its one step: call reset for another task")
+        try:
+            (found,) = judge([Rollout(state.family, state.seed, state.prompt_index, program)])
+        except EngineError as error:  # a client learns nothing but the text
+            raise EngineError(f"EngineError: {error}; there is no reward") from error
+        return found
+
+
+def _checked(seed: int) -> int:
+    """A seed that came from a client."""
+    if not isinstance(seed, int) or not 0 <= seed < SEEDS:
+        raise UserError(f"the seed is {seed!r}, but must be a whole number from 0 to {SEEDS - 1:,}")
+    return seed
+
+
+def _program(action: CodebotlerAction) -> str:
+    """The program that an action brings."""
+    if action.program is not None and action.completion is None:
+        return action.program
+    if action.completion is not None and action.program is None:
+        return program_in(action.completion)
+    raise UserError("an action has either a completion or a program")

@@ -1,0 +1,322 @@
+"""Starts the server as it is, and talks to it with the client of the package."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from codebotler_openenv import CodebotlerAction, CodebotlerEnv, CodebotlerObservation
+from codebotler_openenv.environment import SEEDS
+from openenv.core.client_types import StepResult
+from openenv.core.sync_client import SyncEnvClient
+from openenv.validation.graders.runtime import basic
+from openenv.validation.manifest import NormalizedManifestV2
+from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
+from openenv.validation.runtime.collector import collect_runtime_evidence
+from openenv.validation.runtime.contracts import load_runtime_plan
+
+from roboeval.training.families import family_names, trained_task
+from roboeval.training.prompts import SPLITS, load_prompts
+from roboeval.training.rollouts import Rollout, judge
+
+PACKAGE = Path(__file__).parents[1]
+SERVER = "from codebotler_openenv.server import main\nmain()\n"
+WITHOUT_ENGINE = (
+    "import os\n"
+    "os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"  # for one worker, which is stopped
+    "from codebotler.simulator.pool import shared_pool\n"
+    "shared_pool().submit(lambda: shared_pool().here().stop()).result()\n"
+)
+IDLE = "def task_program():\n    pass\n"
+FOR_EVER = "def task_program():\n    while True:\n        pass\n"
+
+
+@contextmanager
+def serving(before: str = "", *options: str) -> Iterator[str]:
+    """The address of a server process of its own."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    server = subprocess.Popen(
+        [sys.executable, "-c", before + SERVER, "--port", str(port), *options], stderr=subprocess.DEVNULL
+    )
+    try:
+        wait_for(f"http://127.0.0.1:{port}", server)
+        yield f"http://127.0.0.1:{port}"
+    finally:
+        server.terminate()
+        server.wait(20)
+
+
+def wait_for(url: str, server: subprocess.Popen[bytes]) -> None:
+    until = time.monotonic() + 60
+    while time.monotonic() < until and server.poll() is None:
+        try:
+            httpx.get(f"{url}/health", timeout=5).raise_for_status()
+        except httpx.TransportError:
+            time.sleep(0.1)
+        else:
+            return
+    raise AssertionError(f"the server did not start: {server.poll()}")
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    with serving() as url:
+        yield url
+
+
+Session = SyncEnvClient[CodebotlerAction, CodebotlerObservation, Any]
+Result = StepResult[CodebotlerObservation]
+
+
+@pytest.fixture
+def session(url: str) -> Iterator[Session]:
+    with CodebotlerEnv(url).sync() as session:
+        yield session
+
+
+def solution(session: Session) -> str:
+    state = session.state()
+    return trained_task(state.family, state.seed).solution
+
+
+# --- prompts
+
+
+@pytest.mark.parametrize("split", SPLITS)
+def test_a_reset_gives_the_prompt_of_load_prompts(session: Session, split: str) -> None:
+    result = session.reset(seed=5, split=split)
+    (row,) = load_prompts(split, count=1, seed=5)
+    assert [message.model_dump() for message in result.observation.messages] == row["prompt"]
+    assert result.observation.instruction == row["prompt"][-1]["content"]
+    assert (result.reward, result.done, result.observation.components) == (None, False, None)
+    state = session.state()
+    assert (state.split, state.family, state.seed) == (split, row["family"], row["seed"])
+    assert (state.prompt_index, state.step_count) == (row["prompt_index"], 0)
+
+
+def test_a_family_and_an_episode_are_as_asked_for_and_the_task_is_drawn(session: Session) -> None:
+    seeds = set()
+    for _ in range(3):
+        session.reset(family="BringThing", episode_id="mine")
+        state = session.state()
+        assert (state.family, state.episode_id, state.split) == ("BringThing", "mine", "train")
+        assert 0 <= state.seed < SEEDS
+        seeds.add(state.seed)
+    assert len(seeds) == 3
+
+
+# --- rewards
+
+
+def test_the_reference_solution_earns_1_as_a_program_and_as_a_completion(session: Session) -> None:
+    for family in family_names()[:3]:
+        session.reset(seed=3, family=family)
+        program = solution(session)
+        assert_passes(session.step(CodebotlerAction(program=program)))
+        session.reset(seed=3, family=family)
+        assert_passes(session.step(CodebotlerAction(completion=f"Here it is:\n```python\n{program}```")))
+        assert session.state().step_count == 1
+
+
+def assert_passes(result: Result) -> None:
+    assert (result.reward, result.done) == (1.0, True)
+    found = result.observation.components
+    assert found is not None
+    assert {found.reward, found.passed, found.requirements, found.parses, found.rules_kept} == {1.0}
+
+
+@pytest.mark.parametrize(
+    "action", [{"program": ""}, {"completion": ""}, {"program": IDLE}, {"completion": "No."}]
+)
+def test_what_does_nothing_earns_0(session: Session, action: dict[str, Any]) -> None:
+    session.reset(seed=3)
+    result = session.step(CodebotlerAction(**action))
+    assert (result.reward, result.done) == (0.0, True)
+
+
+def test_rewards_are_those_of_the_library(session: Session) -> None:
+    session.reset(seed=11, family="BringThing")
+    state = session.state()
+    program = trained_task(state.family, state.seed).wrong[0].program
+    result = session.step(CodebotlerAction(program=program))
+    (expected,) = judge([Rollout(state.family, state.seed, state.prompt_index, program)])
+    assert result.observation.components == expected
+    assert result.reward == expected.reward < 1
+
+
+# --- sessions
+
+
+def test_sessions_at_the_same_time_keep_their_own_tasks(url: str) -> None:
+    async def rewards() -> list[float]:
+        clients = [CodebotlerEnv(url) for _ in range(6)]
+        try:
+            await asyncio.gather(*(client.reset(seed=seed) for seed, client in enumerate(clients)))
+            states = await asyncio.gather(*(client.state() for client in clients))
+            programs = [trained_task(state.family, state.seed).solution for state in states]
+            assert len(set(programs)) == len(clients)
+            steps = zip(clients, programs, strict=True)
+            results = await asyncio.gather(*(one.step(CodebotlerAction(program=text)) for one, text in steps))
+            return [result.reward for result in results]
+        finally:
+            await asyncio.gather(*(client.close() for client in clients))
+
+    assert asyncio.run(rewards()) == [1.0] * 6
+
+
+def test_a_session_judges_its_own_task_and_not_that_of_another(url: str) -> None:
+    with CodebotlerEnv(url).sync() as one, CodebotlerEnv(url).sync() as other:
+        one.reset(seed=1, family="BringThing")
+        other.reset(seed=2, family="BringThing")
+        mine = solution(one)
+        reward = other.step(CodebotlerAction(program=mine)).reward
+        assert reward is not None
+        assert reward < 1
+        assert one.step(CodebotlerAction(program=mine)).reward == 1
+
+
+def test_the_server_answers_while_it_judges(session: Session, url: str) -> None:
+    session.reset(seed=4)
+    results: list[Result] = []
+    judging = threading.Thread(
+        target=lambda: results.append(session.step(CodebotlerAction(program=FOR_EVER)))
+    )
+    began = time.monotonic()
+    judging.start()
+    delays = []
+    while judging.is_alive():
+        asked = time.monotonic()
+        httpx.get(f"{url}/health", timeout=10).raise_for_status()
+        delays.append(time.monotonic() - asked)
+    judging.join()
+    took = time.monotonic() - began
+    assert [result.reward for result in results] == [0.0]
+    assert len(delays) > 3
+    assert max(delays) < max(1.0, took / 2)
+
+
+def test_no_more_sessions_than_allowed() -> None:
+    with serving("", "--sessions", "1") as url, CodebotlerEnv(url).sync() as first:
+        first.reset(seed=1)
+        with pytest.raises(RuntimeError, match="CAPACITY_REACHED"), CodebotlerEnv(url).sync() as second:
+            second.reset(seed=1)
+        assert first.step(CodebotlerAction(program=solution(first))).reward == 1
+
+
+# --- errors
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"family": "NoSuchFamily"}, 'there is no family "NoSuchFamily"'),
+        ({"split": "plus"}, 'there is no split "plus"'),
+        ({"seed": -1}, "the seed is -1"),
+        ({"seed": SEEDS}, "from 0 to 999,999,999"),
+        ({"seed": "x"}, "the seed is 'x'"),
+        ({"famly": "BringThing"}, "but not famly"),
+    ],
+)
+def test_a_wrong_reset_says_why_and_leaves_no_task(
+    session: Session, options: dict[str, Any], sentence: str
+) -> None:
+    session.reset(seed=1)
+    with pytest.raises(RuntimeError, match=sentence):
+        session.reset(**options)
+    with pytest.raises(RuntimeError, match="call reset before step"):
+        session.step(CodebotlerAction(program=""))
+
+
+def test_steps_that_cannot_be_judged_say_why(session: Session) -> None:
+    with pytest.raises(RuntimeError, match="there is no task yet"):
+        session.step(CodebotlerAction(program=""))
+    session.reset(seed=1)
+    for wrong in (CodebotlerAction(), CodebotlerAction(program="", completion="")):
+        with pytest.raises(RuntimeError, match="either a completion or a program"):
+            session.step(wrong)
+    session.step(CodebotlerAction(program=""))
+    with pytest.raises(RuntimeError, match="done after its one step"):
+        session.step(CodebotlerAction(program=""))
+    session.reset(seed=1)
+    assert session.step(CodebotlerAction(program=solution(session))).reward == 1
+
+
+def test_a_field_of_the_wrong_kind_is_an_error_and_the_session_goes_on(session: Session) -> None:
+    session.reset(seed=1)
+    wrong = CodebotlerAction.model_construct(program=7)
+    with (
+        pytest.warns(UserWarning, match="Expected `str`"),
+        pytest.raises(RuntimeError, match="VALIDATION_ERROR"),
+    ):
+        session.step(wrong)
+    assert session.step(CodebotlerAction(program=solution(session))).reward == 1
+
+
+def test_plain_http_says_why_it_cannot_judge(url: str) -> None:
+    assert httpx.post(f"{url}/reset", json={"seed": 1}).json()["observation"]["instruction"]
+    step = httpx.post(f"{url}/step", json={"action": {"program": ""}})
+    assert step.status_code == 400
+    assert "in the same session of /ws" in step.json()["detail"]
+
+
+def test_a_failure_of_the_engine_is_an_error_and_no_reward() -> None:
+    with serving(WITHOUT_ENGINE) as url, CodebotlerEnv(url).sync() as session:
+        session.reset(seed=1)
+        for _ in range(2):  # the episode goes on
+            with pytest.raises(RuntimeError, match=r"EngineError: .*no reward"):
+                session.step(CodebotlerAction(program=solution(session)))
+        assert session.state().step_count == 0
+
+
+def test_only_this_machine_is_listened_to(url: str) -> None:
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(url.replace("127.0.0.1", "127.0.0.2") + "/health")
+
+
+# --- what openenv demands
+
+
+def openenv(*arguments: str) -> dict[str, Any]:
+    command = [str(Path(sys.executable).parent / "openenv"), "validate", *arguments, "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    report = json.loads(done.stdout)
+    assert isinstance(report, dict)
+    return report
+
+
+def test_openenv_validates_the_package() -> None:
+    assert openenv(str(PACKAGE), "--level", "static")["verdict"] == "pass"
+
+
+def test_openenv_validates_the_running_server(url: str) -> None:
+    report = openenv("--url", url)
+    assert report["passed"]
+    assert report["mode"] == "simulation"
+
+
+def test_an_episode_holds_what_the_manifest_declares(url: str) -> None:
+    """What `openenv validate --level runtime` does in a container."""
+    manifest = OpenEnvYamlParser().parse(PACKAGE)
+    assert isinstance(manifest, NormalizedManifestV2)
+    plan = load_runtime_plan(PACKAGE, manifest.execution)
+    evidence = collect_runtime_evidence(url, plan, episode_timeout_s=manifest.resources.episode_timeout_s)
+    assert evidence.failure_reason is None
+    subject = type("Subject", (), {"manifest": manifest, "runtime_evidence": evidence})
+    graders = [basic.RewardWellFormedGrader(), basic.ObservationSchemaGrader(), basic.StateContractGrader()]
+    assert [grader.run(subject).evidence for grader in graders] == [["observed runtime contract holds"]] * 3
+    (step,) = [json.loads(one.response_json) for one in evidence.exchanges if one.operation == "step"]
+    assert step["data"]["reward"] == 1

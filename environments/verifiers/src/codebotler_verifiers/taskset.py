@@ -1,0 +1,132 @@
+"""Training tasks with one reward, and what it comes from as metrics."""
+
+import asyncio
+from collections.abc import Iterator
+from dataclasses import asdict
+from functools import lru_cache
+from itertools import count as counting
+from itertools import islice
+from typing import Any, Literal, TypeAlias
+
+import verifiers.v1 as vf
+from pydantic import Field, field_validator
+
+from roboeval.training.families import WORLDS, trained_task
+from roboeval.training.prompts import load_prompts, program_in
+from roboeval.training.rollouts import Components, Rollout, judge
+
+STREAM = 1_000_000
+"""How many tasks lie between the streams of two seeds."""
+IDLE = "def task_program():\n    pass\n"
+SEEDS = 1_000  # so that no stream begins in the seeds of another split
+
+
+class TrainingConfig(vf.TasksetConfig):
+    """Which tasks there are, under `--env.taskset.*`."""
+
+    split: Literal["train", "validation", "test"] = "train"
+    """Splits share no task."""
+    count: int | None = Field(None, ge=1, le=STREAM)
+    """How many tasks; without it they never end."""
+    seed: int = Field(0, ge=0, lt=SEEDS)
+    """For other tasks: with the next number, all are new."""
+    families: list[str] = Field(default_factory=list)
+    """The families to draw from; all of them by default."""
+    worlds: int = Field(WORLDS, ge=1, le=10_000)
+    """In how many worlds, at least, a program is judged."""
+
+    @field_validator("families")
+    @classmethod
+    def _exist(cls, families: list[str]) -> list[str]:
+        load_prompts(count=1, only=families)  # or a UserError, which is a ValueError
+        return families
+
+
+class TrainingData(vf.TaskData):
+    """A prompt, and what it asks for."""
+
+    family: str
+    seed: int
+    prompt_index: int
+    worlds: int
+
+
+TrainingTrace: TypeAlias = vf.Trace[TrainingData]
+
+
+class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
+    """Judges the program in the last reply.
+
+    A failure of the engine is no reward: it is raised, and verifiers records it as the error of the rollout.
+    """
+
+    @property
+    def key(self) -> str:
+        """The task and the phrasing, wherever in a stream they come."""
+        assert self.data.id is not None
+        return self.data.id
+
+    @vf.metric
+    async def components(self, trace: TrainingTrace) -> dict[str, float]:
+        """All parts of the reward, each a metric with its own name."""
+        parts = asdict(await self._judged(trace))
+        del parts["reward"]
+        return parts
+
+    @vf.reward
+    async def reward(self, trace: TrainingTrace) -> float:
+        """From 0 to 1: 1 exactly if the program passes, 0 if it does nothing."""
+        return (await self._judged(trace)).reward
+
+    async def validate(self, runtime: vf.Runtime) -> bool:  # noqa: ARG002 - programs run in the simulator
+        """Whether the reference solution earns 1, and a program that does nothing earns 0."""
+        data = self.data
+        task = await asyncio.to_thread(trained_task, data.family, data.seed, worlds=data.worlds)
+        solved, idle = [await self._parts(program) for program in (task.solution, IDLE)]
+        return solved.reward == 1 and idle.reward == 0
+
+    async def _judged(self, trace: TrainingTrace) -> Components:
+        return await self._parts(await asyncio.to_thread(program_in, trace.last_reply))
+
+    async def _parts(self, program: str) -> Components:
+        data = self.data
+        rollout = Rollout(data.family, data.seed, data.prompt_index, program)
+        return await asyncio.to_thread(_components, rollout, data.worlds)
+
+
+class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):
+    """Tasks without end, or as many as are wanted; the same on every machine."""
+
+    def __init__(self, config: TrainingConfig) -> None:
+        super().__init__(config)
+        self.INFINITE = config.count is None
+
+    def load(self) -> Iterator[TrainingTask]:
+        """The tasks in the order of their seeds, each made when it is asked for."""
+        config = self.config
+        first = config.seed * (config.count or STREAM)
+        for number in islice(counting(first), config.count):
+            (row,) = load_prompts(config.split, count=1, seed=number, only=config.families)
+            yield TrainingTask(_data(row, config.worlds), config.task)
+
+
+def _data(row: dict[str, Any], worlds: int) -> TrainingData:
+    """A row of `load_prompts`, with its system prompt where verifiers can replace it."""
+    system, *messages = row["prompt"]
+    name = f"{row['family']}-{row['seed']}"
+    return TrainingData(
+        id=f"{name}-{row['prompt_index']}",
+        name=name,
+        system_prompt=system["content"],
+        prompt=messages,
+        family=row["family"],
+        seed=row["seed"],
+        prompt_index=row["prompt_index"],
+        worlds=worlds,
+    )
+
+
+@lru_cache(maxsize=4_096)  # the metrics and the reward of a rollout ask one after the other
+def _components(rollout: Rollout, worlds: int) -> Components:
+    (found,) = judge([rollout], worlds=worlds)
+    return found

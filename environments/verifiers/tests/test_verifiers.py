@@ -1,0 +1,267 @@
+"""Runs verifiers as it is, with a scripted server in place of a model."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import islice
+from pathlib import Path
+from statistics import fmean
+from time import monotonic
+from typing import Any
+
+import pytest
+import verifiers.v1 as vf
+from codebotler_verifiers import (
+    TrainingConfig,
+    TrainingData,
+    TrainingEnvConfig,
+    TrainingTask,
+    TrainingTaskset,
+    TrainingTrace,
+)
+from verifiers.v1.graph import MessageNode
+from verifiers.v1.runtimes import make_runtime
+from verifiers.v1.utils.loaders import environment_class, resolve_env_config, taskset_class
+
+from codebotler.simulator.pool import SHARED, shared_pool
+from codebotler.simulator.worker import EngineError
+from roboeval.training.families import trained_task
+from roboeval.training.prompts import load_prompts
+
+NAME, FAMILY = "codebotler-verifiers", "BringThing"
+SCRIPTS = Path(sys.executable).parent
+PARTS = {"passed", "requirements", "without_errors", "parses", "rules_kept"}
+
+
+def taskset(**options: Any) -> TrainingTaskset:  # noqa: ANN401 - of any option
+    return TrainingTaskset(TrainingConfig(id=NAME, **options))
+
+
+def solution(task: TrainingTask) -> str:
+    return f"Here it is:\n```python\n{trained_task(task.data.family, task.data.seed).solution}```"
+
+
+def trace_of(task: TrainingTask, reply: str) -> TrainingTrace:
+    trace = TrainingTrace(
+        task=vf.TraceTask[TrainingData](type=type(task).__name__, data=task.data),
+        agent=vf.AgentInfo(config=vf.AgentConfig(runtime=vf.SubprocessConfig())),
+    )
+    trace.nodes.append(MessageNode(message=vf.AssistantMessage(content=reply), sampled=True))
+    return trace
+
+
+@pytest.fixture
+def task() -> TrainingTask:
+    return next(iter(taskset()))
+
+
+# --- data
+
+
+def test_tasks_are_those_of_load_prompts() -> None:
+    some = list(taskset(split="test", count=3, seed=2, worlds=11))
+    for task, row in zip(some, load_prompts("test", count=3, seed=2), strict=True):
+        sent = task.data.model_dump(mode="json")  # as traces and servers have it
+        asked = [{"role": one["role"], "content": one["content"]} for one in sent["prompt"]]
+        assert [{"role": "system", "content": sent["system_prompt"]}, *asked] == row["prompt"]
+        assert {name: sent[name] for name in ("family", "seed", "prompt_index")}.items() <= row.items()
+        assert sent["worlds"] == 11
+        assert TrainingData.model_validate(sent) == task.data
+    assert [task.data.idx for task in some] == [0, 1, 2]
+    assert len({task.key for task in some}) == 3
+
+
+def test_tasks_never_end_unless_counted() -> None:
+    endless = taskset()
+    assert not endless.bounded
+    assert endless.take(2).bounded
+    assert taskset(count=2).bounded
+    first = [task.key for task in islice(endless, 5)]
+    assert first == [task.key for task in taskset(count=5)]
+    assert not set(first) & {task.key for task in islice(taskset(seed=1), 5)}
+
+
+def test_options_that_do_not_exist_are_refused() -> None:
+    wrong = {"families": ["NoSuchFamily"], "split": "plus", "count": 0, "worlds": 0, "seed": -1}
+    for name, value in wrong.items():
+        with pytest.raises(ValueError, match=name):
+            taskset(**{name: value})
+
+
+def test_verifiers_finds_it_by_name_with_defaults_that_need_no_cloud() -> None:
+    assert taskset_class(NAME) is TrainingTaskset
+    assert issubclass(environment_class(NAME), vf.SingleAgentEnv)
+    config = resolve_env_config({"taskset": {"id": NAME}})
+    assert isinstance(config, TrainingEnvConfig)
+    assert config.agent_harnesses()["agent"].id == "null"
+    assert config.agent.runtime.type == "subprocess"
+
+
+# --- rewards
+
+
+def test_the_reference_solution_earns_1(task: TrainingTask) -> None:
+    trace = trace_of(task, solution(task))
+    asyncio.run(task.score(trace))
+    assert list(trace.rewards) == ["reward"]
+    assert trace.reward == 1
+    assert trace.metrics == dict.fromkeys(PARTS, 1.0)
+
+
+@pytest.mark.parametrize("reply", ["", "I cannot do that.", "```python\ndef task_program():\n    pass\n```"])
+def test_a_program_that_does_nothing_earns_0(task: TrainingTask, reply: str) -> None:
+    trace = trace_of(task, reply)
+    asyncio.run(task.score(trace))
+    assert trace.reward == trace.metrics["passed"] == 0
+    assert trace.metrics["requirements"]  # some hold before anything is done
+    assert set(trace.metrics) == PARTS
+
+
+def test_judging_does_not_block_the_event_loop(task: TrainingTask) -> None:
+    async def longest_pause() -> tuple[float, float]:
+        begin = last = monotonic()
+        scoring = asyncio.create_task(
+            task.score(trace_of(task, "def task_program():\n    while True: pass\n"))
+        )
+        longest = 0.0
+        while not scoring.done():
+            await asyncio.sleep(0)
+            longest, last = max(longest, monotonic() - last), monotonic()
+        return longest, last - begin
+
+    longest, total = asyncio.run(longest_pause())
+    assert longest < total / 2
+
+
+def test_each_task_is_valid() -> None:
+    runtime = make_runtime(vf.SubprocessConfig())
+    for task in taskset(count=3):
+        assert asyncio.run(task.validate(runtime)) is True
+
+
+@contextmanager
+def broken_engine() -> Iterator[None]:
+    shared_pool().submit(lambda: shared_pool().here().stop()).result()
+    try:
+        yield
+    finally:
+        SHARED.end()  # the next call starts another
+
+
+def test_a_failure_of_the_engine_is_no_reward(task: TrainingTask) -> None:
+    trace = trace_of(task, "```python\ndef task_program():\n    say('not judged before')\n```")
+    with broken_engine(), pytest.raises(vf.TaskError, match="EngineError") as found:
+        asyncio.run(task.score(trace))
+    assert isinstance(found.value.__cause__, EngineError)
+    assert trace.rewards == {"reward": None}
+
+
+# --- the commands of verifiers
+
+
+def test_the_eval_command(tmp_path: Path) -> None:
+    tasks = list(taskset(count=4, families=[FAMILY]))
+    replies = {asked(task): solution(task) if number % 2 else "" for number, task in enumerate(tasks)}
+    with scripted_model(replies) as url:
+        run(SCRIPTS / "vf-eval", *eval_options(url, tmp_path, 4))
+    episodes = written(tmp_path / "run" / "traces.jsonl")
+    traces = [trace for episode in episodes for trace in episode["traces"]]
+    assert all(trace["ok"] for trace in traces)
+    scores = {trace["task"]["key"]: trace["rewards"]["reward"]["score"] for trace in traces}
+    assert scores == {task.key: float(number % 2) for number, task in enumerate(tasks)}
+    assert fmean(scores.values()) == 0.5
+    assert all(set(trace["metrics"]) >= PARTS for trace in traces)
+
+
+def test_the_eval_command_sees_a_failure_of_the_engine(tmp_path: Path) -> None:
+    (task,) = taskset(count=1, families=[FAMILY])
+    program = (
+        "from codebotler.simulator.pool import shared_pool\n"
+        "from verifiers.v1.cli.eval.main import main\n"
+        "shared_pool().submit(lambda: shared_pool().here().stop()).result()\n"
+        "main()\n"
+    )
+    with scripted_model({asked(task): solution(task)}) as url:
+        run(sys.executable, "-c", program, *eval_options(url, tmp_path, 1))
+    (episode,) = written(tmp_path / "run" / "traces.jsonl")
+    (trace,) = episode["traces"]
+    assert not episode["ok"]
+    assert not trace["ok"]
+    assert trace["errors"][0]["type"] == "TaskError"
+    assert "EngineError" in trace["errors"][0]["message"]
+    assert not any(trace["rewards"].values())
+
+
+def test_the_validate_command(tmp_path: Path) -> None:
+    options = ("-n", "3", "-c", "2", "--runtime.type", "subprocess", "-o", tmp_path, "--run.name", "run")
+    run(SCRIPTS / "vf-validate", NAME, "--no-rich", *options)
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["outcomes"]["valid"] == summary["total"] == 3
+
+
+def asked(task: TrainingTask) -> str:
+    """The instruction at the end of a prompt."""
+    return str(task.data.model_dump()["prompt"][-1]["content"])
+
+
+def eval_options(url: str, folder: Path, count: int) -> list[str]:
+    model = ["-m", "scripted", "--client.base-url", url, "--client.api-key-var", "NO_SUCH_KEY"]
+    place = ["-o", str(folder), "--run.name", "run", "--no-push", "--no-rich"]
+    return [NAME, "-n", str(count), "-c", "2", *model, *place, "--env.taskset.families", f'["{FAMILY}"]']
+
+
+def run(*command: str | Path) -> None:
+    path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"  # where uv may lie, which the null harness asks for
+    done = subprocess.run(
+        command, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert done.returncode == 0, done.stdout[-3_000:] + done.stderr[-3_000:]
+
+
+def written(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+@contextmanager
+def scripted_model(replies: dict[str, str]) -> Iterator[str]:
+    """The address of a server that answers each instruction with its reply."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+            stream = bool(body.get("stream"))
+            answer = answered(replies[body["messages"][-1]["content"]], stream=stream)
+            self.send_response(200)
+            self.send_header("Content-Type", "text/event-stream" if stream else "application/json")
+            self.send_header("Content-Length", str(len(answer)))
+            self.end_headers()
+            self.wfile.write(answer)
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}/v1"
+        finally:
+            server.shutdown()
+
+
+def answered(text: str, *, stream: bool) -> bytes:
+    """A chat completion, whole or as the one event of a stream."""
+    message = {"role": "assistant", "content": text}
+    choice = {"index": 0, "finish_reason": "stop", "delta" if stream else "message": message}
+    usage = {"prompt_tokens": 1, "completion_tokens": 1, "total_tokens": 2}
+    kind = "chat.completion.chunk" if stream else "chat.completion"
+    body = {"id": "1", "object": kind, "created": 1, "model": "scripted", "choices": [choice], "usage": usage}
+    data = json.dumps(body)
+    return f"data: {data}\n\ndata: [DONE]\n\n".encode() if stream else data.encode()

@@ -1,0 +1,209 @@
+"""Families of tasks: templates from which each seed makes a task with names, words and worlds of its own."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from random import Random
+from string import Template
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.words import listed
+from codebotler.core.world_file import Name, Text
+from codebotler.core.yaml_files import YamlFile
+from roboeval.suites.load import Suite
+from roboeval.suites.schema import SuiteFile
+from roboeval.suites.taskfile import read_task
+
+FOLDER = Path(__file__).parent
+SUITE, WORLDS = "training", 8
+NUMBERS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+SOME = re.compile(r"(\d+) (\w+)")  # so many different words of a pool
+RANGE = re.compile(r"(\d+) to (\d+)")
+EITHER = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several words, which make no difference
+
+Choice: TypeAlias = str | list[str]
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class WrongProgram(_Form):
+    """A program that does not do what was asked, or not all of it."""
+
+    about: Name
+    program: Text
+
+
+class FamilyFile(_Form):
+    """A family before names are drawn; `$name` stands for what is chosen.
+
+    Args:
+        about: what its tasks are, in a sentence.
+        choose: what is drawn for each seed, by name: from a pool of words.yaml (`things`), some from one
+            (`3 rooms`), a number (`2 to 4`), or one of a list. No word is drawn twice.
+        task: a task file without a name. In prompts, `{look|see}` is one of these words.
+        solution: a program that is right in all worlds.
+        wrong: programs that are not, each of which earns less than 1.
+    """
+
+    about: Name
+    choose: dict[Name, Annotated[Choice, Field(min_length=1)]]
+    task: dict[str, Any]
+    solution: Text
+    wrong: Annotated[tuple[WrongProgram, ...], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class TrainedTask:
+    """A task of a family.
+
+    Args:
+        suite: one that holds nothing but it.
+        name: of the family and the seed, such as `BringThing-17`.
+        solution: a program that is right.
+        wrong: programs that are not.
+    """
+
+    suite: Suite
+    name: str
+    solution: str
+    wrong: tuple[WrongProgram, ...]
+
+    @property
+    def prompts(self) -> tuple[str, ...]:
+        """Its phrasings."""
+        return self.suite.tasks[self.name].prompts
+
+    def expect_prompt(self, index: int) -> None:
+        """Raise a UserError if it has no phrasing with this number."""
+        if not 0 <= index < len(self.prompts):
+            raise UserError(f"{self.name} has no prompt {index}; it has {len(self.prompts)}, from 0")
+
+
+def family_names() -> tuple[str, ...]:
+    """The names of all families, sorted."""
+    return tuple(sorted(path.stem for path in (FOLDER / "families").glob("*.yaml")))
+
+
+def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask:
+    """The task that a family makes of a seed, the same on every machine.
+
+    Args:
+        family: its name, one of `family_names()`.
+        seed: any number from 0; names, words and worlds depend on it.
+        worlds: how many to draw at least, 1 to 10,000.
+
+    Raises:
+        UserError: there is no such family, or its file is wrong.
+    """
+    return _made(family, seed, worlds)
+
+
+@lru_cache(maxsize=1_024)
+def _made(family: str, seed: int, worlds: int) -> TrainedTask:
+    if family not in family_names():
+        raise UserError(f'there is no family "{family}"; there is {listed(family_names())}')
+    raw = _read(family)
+    random = Random(f"{family} {seed}")  # noqa: S311 - no secret
+    chosen = dict(_chosen(raw.validate(FamilyFile), raw, random))
+    try:
+        file = YamlFile(Template(_text(family)).substitute(chosen), raw.name)
+    except (KeyError, ValueError) as error:
+        raise UserError(f"{error} is not chosen; write $$ for a dollar", file=raw.name) from None
+    form = file.validate(FamilyFile)
+    name = f"{family}-{seed}"
+    file.data = {"name": name, **form.task, "prompts": [_worded(one, random) for one in form.task["prompts"]]}
+    head = _head()
+    rules = head.rules
+    path = FOLDER / f"{name}.yaml"
+    task = read_task(file, path, SKILLS, count=worlds, seed=seed, words=rules.words_for_people)
+    digest = hashlib.sha256(f"{head.version} {worlds} {seed} {file.data}".encode()).hexdigest()
+    suite = Suite(SUITE, head.version, head.about, rules.rules(), {name: task}, digest)
+    return TrainedTask(suite, name, form.solution, form.wrong)
+
+
+# --- what is drawn
+
+
+def _chosen(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[str, str]]:
+    """What each name in a template stands for."""
+    used: set[str] = set()
+
+    def drawn(words: Sequence[str], count: int) -> list[str]:
+        some = random.sample([word for word in words if word not in used], count)
+        used.update(some)
+        return some
+
+    for name, choice in form.choose.items():
+        if isinstance(choice, list):
+            yield from _scalar(name, *drawn(choice, 1))
+        elif match := RANGE.fullmatch(choice):
+            number = random.randint(int(match[1]), int(match[2]))
+            yield from ((name, str(number)), (f"{name}_word", NUMBERS[number]))
+        elif match := SOME.fullmatch(choice):
+            yield from _list(name, drawn(_pool(match[2], file, name), int(match[1])))
+        else:
+            yield from _scalar(name, *drawn(_pool(choice, file, name), 1))
+
+
+def _pool(pool: str, file: YamlFile, name: str) -> list[str]:
+    words = _words()
+    if pool not in words:
+        raise file.wrong(f'there are no "{pool}"; there are {listed(list(words))}', "choose", name)
+    return words[pool]
+
+
+def _scalar(name: str, word: str) -> Iterator[tuple[str, str]]:
+    """A word, as it begins a sentence or names somebody, with an article, and of several."""
+    article = "an" if word[0] in "aeiou" else "a"
+    plural = word + ("es" if word.endswith(("s", "x", "ch", "sh")) else "s")
+    yield from ((name, word), (name.capitalize(), word[:1].upper() + word[1:]))
+    yield from ((f"a_{name}", f"{article} {word}"), (f"{name}_s", plural))
+
+
+def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
+    """Words for a YAML list, in a sentence, as a list in Python, and one by one."""
+    yield from ((name, ", ".join(words)), (f"{name}_and", listed(words)))
+    yield f"{name}_quoted", "[" + ", ".join(f'"{word}"' for word in words) + "]"
+    for number, word in enumerate(words, 1):
+        yield from _scalar(f"{name}_{number}", word)
+
+
+def _worded(prompt: str, random: Random) -> str:
+    """A phrasing with one word where there are several."""
+    return " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), prompt).split())
+
+
+# --- files
+
+
+@cache
+def _text(family: str) -> str:
+    return (FOLDER / "families" / f"{family}.yaml").read_text(encoding="utf-8")
+
+
+@cache
+def _read(family: str) -> YamlFile:
+    return YamlFile(_text(family), FOLDER / "families" / f"{family}.yaml")
+
+
+@cache
+def _words() -> Mapping[str, list[str]]:
+    data = YamlFile.read(FOLDER / "words.yaml").data
+    assert isinstance(data, dict)
+    return data
+
+
+@cache
+def _head() -> SuiteFile:
+    return YamlFile.read(FOLDER / "training.yaml").validate(SuiteFile)

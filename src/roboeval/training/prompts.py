@@ -1,0 +1,87 @@
+"""Prompts to train on: rows of a data set, and the program in what a policy writes for one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import count as counting
+from itertools import islice
+from typing import Any, Literal, TypeAlias
+
+from codebotler.core.errors import UserError
+from codebotler.core.words import listed
+from codebotler.prompts.extract import program_of
+from codebotler.prompts.rendering import prompt_for
+from roboeval.training.families import family_names, trained_task
+
+SIZE = 1_000_000_000
+SPLITS = {"train": 0, "validation": SIZE, "test": 2 * SIZE}
+"""The first seed of each split, which has so many."""
+
+Form: TypeAlias = Literal["chat", "text"]
+Completion: TypeAlias = str | Sequence[Mapping[str, Any]]
+"""What a policy wrote: a text, or the messages of a conversation."""
+
+
+def load_prompts(
+    split: str = "train",
+    *,
+    count: int = 1_000,
+    seed: int = 0,
+    only: Sequence[str] = (),
+    form: Form = "chat",
+) -> list[dict[str, Any]]:
+    """Prompts for programs, the same on every machine; as many as are wanted.
+
+    Args:
+        split: `train`, `validation` or `test`, which share no task.
+        count: how many prompts.
+        seed: for others: with the next number, all tasks are new.
+        only: the families to draw from; all of them by default.
+        form: `chat` for messages, `text` for one text that base models go on from.
+
+    Returns:
+        rows with `prompt` (messages with `role` and `content`, or a text), `family`, `seed` and
+        `prompt_index`, which say what it asks for, and `opening`: the first line of the program if the
+        prompt ends with it, else nothing.
+
+    Raises:
+        UserError: there is no such split or family, or the count or the seed is out of range.
+    """
+    if split not in SPLITS:
+        raise UserError(f'there is no split "{split}"; there is {listed(list(SPLITS))}')
+    if unknown := [name for name in only if name not in family_names()]:
+        raise UserError(f'there is no family "{unknown[0]}"; there is {listed(family_names())}')
+    if count < 1:
+        raise UserError(f"the number of prompts is {count}, but it must be at least 1")
+    if not 0 <= seed * count <= SIZE - count:
+        raise UserError(
+            f"the seed is {seed}, but with {count:,} prompts it must be from 0 to {SIZE // count - 1:,}"
+        )
+    names = tuple(only) or family_names()
+    first = SPLITS[split] + seed * count
+    return [_row(names[number % len(names)], number, form) for number in islice(counting(first), count)]
+
+
+def _row(family: str, seed: int, form: Form) -> dict[str, Any]:
+    prompts = trained_task(family, seed).prompts
+    index = seed // len(family_names()) % len(prompts)
+    asked = prompt_for(prompts[index])
+    chat = [{"role": message.role, "content": message.text} for message in asked.messages]
+    return {
+        "prompt": chat if form == "chat" else asked.text,
+        "family": family,
+        "seed": seed,
+        "prompt_index": index,
+        "opening": "" if form == "chat" else asked.opening,
+    }
+
+
+def program_in(completion: Completion, opening: str = "") -> str:
+    """The program in what a policy wrote.
+
+    Args:
+        completion: a text, or messages, of which the last is the policy's.
+        opening: what the prompt ended with, if a text was to go on from it.
+    """
+    text = completion if isinstance(completion, str) else str(completion[-1]["content"] or "")
+    return prompt_for("go on").program_from(text) if opening else program_of(text).source

@@ -1,0 +1,150 @@
+"""Rollouts are judged in parts, a few at a time, and a failure of the engine is none of theirs."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.core.errors import UserError
+from codebotler.simulator.pool import AHEAD, shared_pool
+from codebotler.simulator.worker import EngineError
+from roboeval import reward
+from roboeval.suites.house import HouseRules
+from roboeval.training import Components, Rollout, judge, load_prompts, rollouts, trained_task
+from roboeval.training.prompts import SPLITS, program_in
+
+FAMILY = "BringThing"
+
+
+def saying(text: str) -> Rollout:
+    return Rollout(FAMILY, 1, 0, f"def task_program():\n    say({text!r})\n")
+
+
+def test_components_of_a_right_a_broken_and_an_idle_program() -> None:
+    task = trained_task(FAMILY, 1)
+    right, broken, idle = judge(
+        [
+            Rollout(FAMILY, 1, 0, program)
+            for program in (task.solution, "def task_program(", "task_program = list")
+        ]
+    )
+    assert right == Components(1, 1, 1, 1, 1, 1)
+    assert (broken.reward, broken.parses, broken.without_errors) == (0, 0, 0)
+    assert (idle.reward, idle.parses, idle.without_errors, idle.passed) == (0, 1, 1, 0)
+    assert 0 < idle.requirements < 1
+
+
+def test_the_reward_is_that_of_the_library() -> None:
+    task = trained_task(FAMILY, 1)
+    programs = [task.solution, "", *(one.program for one in task.wrong)]
+    found = judge([Rollout(FAMILY, 1, 2, program) for program in programs])
+    assert [one.reward for one in found] == reward(task.name, 2, programs, suite=task.suite)
+
+
+def test_rules_of_the_house_are_a_part_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "quiet.yaml"
+    path.write_text('rules:\n  - {name: quiet, says: Never speak., always: not tr.Exists(say(".*"))}\n')
+    loud, silent = saying("hello"), Rollout(FAMILY, 1, 0, "def task_program():\n    go_to('start_loc')\n")
+    found = judge([loud, silent], house=HouseRules.read(path))
+    assert [one.rules_kept for one in found] == [0, 1]
+    assert [one.rules_kept for one in judge([loud, silent])] == [1, 1]
+
+
+def test_equal_rollouts_are_judged_once_and_progress_is_told() -> None:
+    told: list[int] = []
+    many = [saying(f"message {number % 40}") for number in range(80)]
+    found = judge(many, progress=told.append)
+    assert len(found) == 80
+    assert found[:40] == found[40:]
+    assert told == sorted(told)
+    assert told[-1] == 40
+    judge(many, progress=told.append)
+    assert told[-1] == 40, "nothing is judged again"
+
+
+def test_only_a_few_batches_are_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool, under_way, most = shared_pool(), [0], [0]
+    submit = pool.submit
+
+    def counted(*arguments: Any) -> Future[Any]:  # noqa: ANN401 - of any call
+        under_way[0] += 1
+        most[0] = max(most[0], under_way[0])
+        future: Future[Any] = submit(*arguments)
+        future.add_done_callback(lambda _: under_way.__setitem__(0, under_way[0] - 1))
+        return future
+
+    monkeypatch.setattr(pool, "submit", counted)
+    judge([saying(f"one of {number}") for number in range(400)])
+    assert 1 <= most[0] <= AHEAD * pool.workers
+
+
+def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> object:
+        raise EngineError("no process can be started")
+
+    monkeypatch.setattr(rollouts, "_judged", broken)
+    with pytest.raises(EngineError, match="no process"):
+        judge([saying("never judged before")])
+
+
+def test_a_prompt_that_is_not_there_is_refused() -> None:
+    with pytest.raises(UserError, match="BringThing-1 has no prompt 4; it has 4, from 0"):
+        judge([Rollout(FAMILY, 1, 4, "")])
+
+
+# --- prompts
+
+
+def test_prompts_are_the_same_each_time_and_splits_share_no_task() -> None:
+    assert load_prompts(count=20) == load_prompts(count=20)
+    assert load_prompts(count=20, seed=1)[0]["seed"] == 20
+    tasks = [{(row["family"], row["seed"]) for row in load_prompts(split, count=40)} for split in SPLITS]
+    assert [len(one) for one in tasks] == [40] * 3
+    assert not tasks[0] & tasks[1] | tasks[1] & tasks[2] | tasks[0] & tasks[2]
+
+
+def test_a_prompt_as_messages_and_as_a_text() -> None:
+    (chat,), (text,) = load_prompts(count=1), load_prompts(count=1, form="text")
+    instruction = trained_task(chat["family"], chat["seed"]).prompts[chat["prompt_index"]]
+    assert chat["prompt"][0]["role"] == "system"
+    assert chat["prompt"][-1] == {"role": "user", "content": instruction}
+    assert text["prompt"].endswith(text["opening"])
+    assert chat["opening"] == ""
+
+
+@pytest.mark.parametrize(
+    ("completion", "opening"),
+    [
+        ("```python\ndef task_program():\n    say('a')\n```", ""),
+        (
+            [
+                {"role": "user", "content": "b"},
+                {"role": "assistant", "content": "def task_program():\n    say('a')"},
+            ],
+            "",
+        ),
+        (
+            "    say('a')\n\n\n# Instruction: say b\ndef task_program():\n    say('b')\n",
+            "def task_program():\n",
+        ),
+    ],
+)
+def test_the_program_in_a_completion(completion: str | list[dict[str, str]], opening: str) -> None:
+    assert program_in(completion, opening).strip() == "def task_program():\n    say('a')"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"split": "exam"}, 'there is no split "exam"; there is train, validation and test'),
+        ({"only": ["Fly"]}, 'there is no family "Fly"'),
+        ({"count": 0}, "the number of prompts is 0, but it must be at least 1"),
+        ({"seed": 1_000_000}, "the seed is 1000000, but with 1,000 prompts it must be from 0 to 999,999"),
+    ],
+)
+def test_mistakes_are_refused_in_a_sentence(wrong: dict[str, object], sentence: str) -> None:
+    with pytest.raises(UserError, match=sentence):
+        load_prompts(**wrong)  # type: ignore[arg-type]
