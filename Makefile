@@ -12,6 +12,7 @@
 #     test-transformers, -pyrobosim, -inspect, -ray
 #                          models and detectors on this machine, the robot in pyrobosim, the benchmark in Inspect and on
 #                          a Ray cluster, in one environment with all extras, EXTRAS_VENV
+#   make test-environments   environments/ for trainers: their tests, a short training run, and equal rewards
 #
 # `make faults` tries 60 deliberate faults, which the tests must notice. `make messages` writes every sentence that
 # an error says in a test into build/messages.md, once, and which ones no test has seen. `make fuzz` runs
@@ -24,6 +25,7 @@ PACKAGE ?= .
 VENV ?= .venv
 EXTRAS ?= [all]
 EXTRAS_VENV ?= .venv-extras
+ENVIRONMENTS = trl verifiers openenv
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -42,7 +44,7 @@ APART = tests/browser tests/guide tests/ros1 tests/suites tests/codebotler/model
 	tests/codebotler/perception/test_zeroshot.py tests/codebotler/robots/test_pyrobosim.py \
 	tests/roboeval/evaluation/test_inspect.py tests/roboeval/evaluation/test_ray.py
 
-.PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-browser pictures test-transformers \
+.PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-browser pictures test-transformers test-environments \
 	test-pyrobosim test-inspect test-ray test-faulty-server messages faults fuzz lint bench clean
 
 demo: $(VENV)/installed
@@ -103,6 +105,18 @@ test-inspect: $(EXTRAS_VENV)/tested
 
 test-ray: $(EXTRAS_VENV)/tested
 	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/roboeval/evaluation/test_ray.py
+
+# Each in an environment of its own, since two of them want other versions of the same libraries.
+test-environments: $(VENV)/tested $(addprefix test-environment-,$(ENVIRONMENTS))
+	$(BIN)/python environments/equal.py $(foreach name,$(ENVIRONMENTS),$(name)=.venv-$(name)/bin/python)
+
+test-environment-%: $(SOURCES)
+	@echo "making an environment with $* in .venv-$*, which takes some minutes"
+	@$(PYTHON) -m venv --clear .venv-$*
+	@.venv-$*/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@.venv-$*/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints-extras.txt \
+		"$(PACKAGE)" ./environments/$* --group environments/$*/pyproject.toml:test | { $(DOTS); }
+	cd environments/$* && ../../.venv-$*/bin/python -m pytest
 
 test-faulty-server: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m

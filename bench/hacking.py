@@ -13,7 +13,8 @@ from pathlib import Path
 from statistics import fmean
 
 from codebotler.core.yaml_files import YamlFile
-from roboeval.training import Rollout, family_names, judge, trained_task
+from roboeval.training.families import family_names, trained_task
+from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = int(os.environ.get("SEEDS", "5"))
 FIRST = 3_000_000_000  # behind those of all splits

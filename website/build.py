@@ -41,6 +41,9 @@ MODULES = {
         "roboeval.suites.load",
         "roboeval.evaluation.runs.completions",
         "roboeval.analysis.metrics",
+        "roboeval.training.families",
+        "roboeval.training.prompts",
+        "roboeval.training.rollouts",
     ),
 }
 """The packages, whose names are public, and the modules that are documented; see docs/library.md."""

@@ -41,6 +41,10 @@ NOT_RUN = {
     "roboeval-plus.md": ["takes minutes"],
     "robots.md": ["needs pyrobosim, with which `make test-pyrobosim` tests the robot"],
     "ros.md": ["needs root, and a Debian or Ubuntu"],
+    "training.md": [
+        *("needs a model behind it", "needs a model behind it", "needs a model behind it"),
+        "needs a package of its own",
+    ],
     "tutorial.md": ["makes an environment of its own"],
 }
 """Why blocks are not run, page by page: no other reason, and no further block."""

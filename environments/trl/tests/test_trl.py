@@ -15,7 +15,8 @@ import trl  # type: ignore[import-untyped]
 from codebotler_trl import load_prompts, parses, passed, reward, without_errors
 
 from codebotler.simulator.worker import EngineError
-from roboeval.training import rollouts, trained_task
+from roboeval.training import rollouts
+from roboeval.training.families import trained_task
 
 FAMILY = "BringThing"
 END = "<end>"

@@ -11,7 +11,8 @@ from codebotler.core.errors import UserError
 from hacking import earned, hacks, honest
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
-from roboeval.training import Rollout, family_names, judge, trained_task
+from roboeval.training.families import family_names, trained_task
+from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = (0, 1, 1_000_000_000)
 IDLE = ("", "def task_program():\n    pass\n")

@@ -13,8 +13,10 @@ from codebotler.simulator.pool import AHEAD, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
 from roboeval.suites.house import HouseRules
-from roboeval.training import Components, Rollout, judge, load_prompts, rollouts, trained_task
-from roboeval.training.prompts import SPLITS, program_in
+from roboeval.training import rollouts
+from roboeval.training.families import trained_task
+from roboeval.training.prompts import SPLITS, load_prompts, program_in
+from roboeval.training.rollouts import Components, Rollout, judge
 
 FAMILY = "BringThing"
 
