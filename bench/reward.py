@@ -2,23 +2,60 @@
 
 Beside it stands what one call of `evaluate` does with the same programs, as what could be reached. Both are
 printed for the suites `paper` and `plus`; under `plus`, which has more worlds, a quarter as many programs.
+Then ROLLOUTS rollouts of the families to train on are judged at once, with 1 to 8 workers in turns.
 """
 
 import sys
 import time
+from collections import defaultdict
 from itertools import cycle, islice
+from statistics import median
+from typing import Any
 
+from codebotler.simulator.pool import SHARED, WorkerPool, cores
 from roboeval import Completion, evaluate, load_suite, recorded_completions, reward
+from roboeval.training.families import trained_task
+from roboeval.training.prompts import load_prompts
+from roboeval.training.rollouts import Rollout, judge
 
 COUNT = int(sys.argv[1]) if len(sys.argv) > 1 else 2_000
 BATCH = 64
 WORKERS = 2
+ROLLOUTS, TURNS = 1_024, 3
 
 
 def main() -> None:
     """Print both for both suites."""
     for name, count in (("paper", COUNT), ("plus", COUNT // 4)):
         measure(name, count)
+    measure_families()
+
+
+def measure_families() -> None:
+    """Print how many rollouts a minute are judged by how many workers, as ratios to one."""
+    took: dict[int, list[float]] = defaultdict(list)
+    for turn in range(TURNS):
+        rows = load_prompts("test", count=ROLLOUTS, seed=turn)
+        for workers in (1, 2, 4, 8):
+            SHARED.end()
+            SHARED.pool = WorkerPool(workers).__enter__()
+            rollouts = [rollout(row, f"{turn} {workers}") for row in rows]
+            judge(rollouts[:1])
+            began = time.monotonic()
+            judge(rollouts, progress=lambda count: print(f"\r{count:,} of {ROLLOUTS:,}", end="", flush=True))
+            took[workers].append(time.monotonic() - began)
+    print(f"\r{ROLLOUTS:,} rollouts of the families at once, on {cores()} cores:")
+    for workers, seconds in took.items():
+        rate, ratio = 60 * ROLLOUTS / median(seconds), median(map(float.__truediv__, took[1], seconds))
+        print(f"  {workers} workers: {rate:,.0f} programs a minute, {ratio:.2f} times as many as with one")
+
+
+def rollout(row: dict[str, Any], name: str) -> Rollout:
+    """A right or a wrong program, which no other measure has."""
+    task = trained_task(row["family"], row["seed"])
+    programs = [task.solution, *(one.program for one in task.wrong)]
+    program = f"{programs[row['seed'] % len(programs)]}\n# {name}\n"
+    return Rollout(row["family"], row["seed"], row["prompt_index"], program)
 
 
 def measure(name: str, count: int) -> None:

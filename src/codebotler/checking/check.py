@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from contextlib import nullcontext
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from typing import Protocol
@@ -27,7 +27,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.pool import WorkerPool, shared_pool
+from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
@@ -63,8 +63,8 @@ def check(
         seed: of the worlds: the same ones on every machine.
         strict: whether to draw also what the program takes for granted.
         skills: what the program may call.
-        workers: how many runs go on at the same time, in a pool that is started for this check.
-        pool: what runs the programs; by default the pool of this process, which starts with the first check.
+        workers: how many runs go on at the same time, in a pool that is started for this check alone.
+        pool: what runs the programs; without it and `workers`, the pool of this process, which stays.
         room_map: the rooms and the start, in place of those two, where more is known of them.
         house_rules: what a program must keep to in every world.
 
@@ -77,7 +77,7 @@ def check(
     settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules))
     if room_map is None and (rooms, start) != (None, None):
         room_map = _room_map(program, rooms, start, skills)
-    with nullcontext(pool or shared_pool()) if workers is None else WorkerPool(workers) as opened:
+    with _opened(pool, workers) as opened:
 
         def share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
             return run_samples(opened.here(), program, room_map, samplers, settings)
@@ -88,10 +88,26 @@ def check(
             meanwhile()
             return [sample for future in futures for sample in future.result()]
 
-        if samples > AT_ONCE:
+        if samples > AT_ONCE and not opened.is_here:
             known = room_map or _room_map(program, None, None, skills)
             return _checked(program, known, settings, run, AT_ONCE * opened.workers)
-        return opened.submit(lambda: check_on(opened.here(), program, room_map, settings)).result()
+        return opened.call(lambda: check_on(opened.here(), program, room_map, settings))
+
+
+@contextmanager
+def _opened(pool: WorkerPool | None, workers: int | None) -> Iterator[WorkerPool]:
+    """A given pool, a new one with so many workers, or that of this process, which an interrupt ends."""
+    if pool is not None:
+        yield pool
+    elif workers is not None:
+        with WorkerPool(workers) as opened:
+            yield opened
+    else:
+        try:
+            yield shared_pool()
+        except KeyboardInterrupt:  # or the program would run on, and hold up the end of this process
+            SHARED.end()
+            raise
 
 
 def check_on(

@@ -88,6 +88,11 @@ class ForkServer:
         """Its process id."""
         return self._process.pid
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether it is there no more."""
+        return self._process.poll() is not None
+
     def kill(self) -> None:
         """End it and with it a run that is still going on."""
         self._process.kill()
@@ -165,6 +170,11 @@ class BatchServer(ForkServer):
     def fork(self) -> IsolatedProcess:
         """A fresh child, which may be ready already."""
         child, self._next = self._next, None
+        if (
+            child is not None and self.has_ended
+        ):  # and the child with it: its number may be another process's now
+            child.hang_up()
+            child = None
         return child or super().fork()
 
     def fork_ahead(self) -> None:

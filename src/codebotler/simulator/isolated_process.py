@@ -128,7 +128,9 @@ def compiled(file: str, name: str) -> bytes:
     if sys.flags.optimize:
         return compiled_source(Path(file).read_text(encoding="utf-8"), name)
     code = SourceFileLoader(name, file).get_code(name)
-    assert code is not None
+    if code is None or all(column is None for _, _, column, _ in code.co_positions()):
+        # It was written by an interpreter that leaves columns out, so that it is shorter.
+        return compiled_source(Path(file).read_text(encoding="utf-8"), name)
     return dumped(code, name)
 
 

@@ -51,8 +51,10 @@ class WorkerPool:
         if sys.platform == "win32":
             raise EngineError(ON_WINDOWS)
         self.workers = workers
-        self._threads = ThreadPoolExecutor(workers, thread_name_prefix="worker")
         self._local = threading.local()
+        self._threads = ThreadPoolExecutor(
+            workers, thread_name_prefix="worker", initializer=lambda: setattr(self._local, "is_ours", True)
+        )
         self._takes_turns = one_process_per_run  # a thread and a child, at each skill call
         self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
         self._workers: list[Worker] = []
@@ -130,6 +132,15 @@ class WorkerPool:
     ) -> Future[Value]:
         """Call a function in one of the threads, where `here` is its worker; from any thread."""
         return self._threads.submit(function, *args, **kwargs)
+
+    @property
+    def is_here(self) -> bool:
+        """Whether this is one of the threads, which must not wait for another one."""
+        return getattr(self._local, "is_ours", False)
+
+    def call(self, function: Callable[[], Value]) -> Value:
+        """Call a function in one of the threads, this one if it is one of them, and wait for its result."""
+        return function() if self.is_here else self.submit(function).result()
 
     def forget(self) -> None:
         """Close the descriptors in a forked process, to which neither the workers nor the threads belong."""

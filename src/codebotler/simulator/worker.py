@@ -113,6 +113,8 @@ class Worker:
     def forget(self) -> None:
         """Close the descriptors in a forked process, whose children these are not."""
         self._preparer.forget()
+        if self._child is not None:
+            self._child.hang_up()
         while self._fork_servers:
             self._fork_servers.popitem()[1].forget()
 
@@ -122,7 +124,10 @@ class Worker:
 
     def begin_to_prepare(self, source: str, skills: SkillTable, rules: Rules) -> None:
         """Compile a program while the caller makes ready the robots with which it will run next."""
-        self._preparer.ask_ahead(source, lowercase=rules.literals == "lowercase", skills=tuple(skills))
+        try:
+            self._preparer.ask_ahead(source, lowercase=rules.literals == "lowercase", skills=tuple(skills))
+        except (LostProcessError, OSError):  # whoever runs it tries again, with a new preparer
+            self._preparer.close()
 
     # --- several tame programs in a child
 
@@ -204,12 +209,14 @@ class Worker:
         child, self._child = self._child, None
         if child is None:
             return
-        with suppress(LostProcessError):  # its server has ended, and it with that
+        server = self._fork_servers.get(BATCH_SERVER)
+        if not isinstance(server, BatchServer) or server.has_ended:  # and the child with it
+            child.hang_up()
+            return
+        with suppress(LostProcessError):  # the same, a moment later
             child.kill()
         child.hang_up()
-        server = self._fork_servers.get(BATCH_SERVER)
-        if isinstance(server, BatchServer):
-            server.fork_ahead()
+        server.fork_ahead()
 
     # --- a child for each run
 

@@ -1,0 +1,129 @@
+"""The child that is forked ahead, the program that is prepared ahead, and what becomes of them in trouble."""
+
+import os
+import signal
+from collections.abc import Iterator
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from types import CodeType
+
+import pytest
+
+from codebotler.checking.check import check, check_on
+from codebotler.simulator import isolated_process
+from codebotler.simulator.fork_server import BatchServer
+from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
+from codebotler.simulator.preparer import Preparer
+from codebotler.simulator.sandbox import BATCH_SERVER
+from codebotler.simulator.worker import Worker
+from processes import are_gone
+
+PROGRAM = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+
+
+@pytest.fixture
+def own_worker() -> Iterator[Worker]:
+    worker = Worker()
+    yield worker
+    worker.close()
+
+
+def server_of(worker: Worker) -> BatchServer:
+    server = worker._fork_servers[BATCH_SERVER]
+    assert isinstance(server, BatchServer)
+    return server
+
+
+def test_all_worlds_of_a_check_are_run_by_the_child_that_was_there(own_worker: Worker) -> None:
+    ready = server_of(own_worker)._next
+    assert ready is not None
+    check_on(own_worker, "def task_program():\n    if is_in_room('mug'): pick('mug')\n")
+    after = server_of(own_worker)._next
+    assert after is not None
+    assert after.pid == ready.pid + 1, "one fork, for the next check"
+    assert are_gone({ready.pid})
+
+
+def test_no_child_of_a_dead_server_is_signalled_since_its_number_may_be_anothers(
+    own_worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server = server_of(own_worker)
+    assert server._next is not None
+    ready = server._next.pid
+    os.kill(server.pid, signal.SIGKILL)
+    assert are_gone({server.pid, ready})
+    told: list[int] = []
+    kill = os.kill
+
+    def noted(pid: int, number: int) -> None:
+        told.append(pid)
+        kill(pid, number)
+
+    monkeypatch.setattr(os, "kill", noted)
+    for _ in range(2):  # the first one without a batch
+        assert check_on(own_worker, PROGRAM).problems == ()
+    assert ready not in told
+    assert server_of(own_worker) is not server
+
+
+def test_a_program_that_cannot_be_prepared_ahead_is_prepared_when_it_runs(
+    own_worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: object, **__: object) -> None:
+        raise TimeoutError
+
+    monkeypatch.setattr(Preparer, "ask_ahead", failing)
+    assert check_on(own_worker, PROGRAM).problems == ()
+    assert [one.kind for one in check_on(own_worker, PROGRAM + "    say(x)\n").problems] == ["NameError"]
+
+
+def test_what_was_prepared_ahead_and_never_run_is_no_other_programs(own_worker: Worker) -> None:
+    for text in (
+        "def task_program(",
+        PROGRAM,
+        "def task_program(:",
+        PROGRAM.replace("hello", "bye"),
+        PROGRAM,
+    ):
+        found = check_on(own_worker, text)
+        said = {
+            event.text for sample in found.samples for event in sample.outcome.trace if event.kind == "say"
+        }
+        assert said == ({"bye"} if "bye" in text else {"hello"} if "hello" in text else set())
+
+
+def test_a_check_in_a_thread_of_the_pool_waits_for_no_other_thread() -> None:
+    with WorkerPool(1) as pool:
+        assert pool.submit(check, PROGRAM, pool=pool).result(30).problems == ()
+        assert pool.submit(check, PROGRAM, pool=pool, samples=20).result(30).problems == ()
+
+
+def test_an_interrupt_ends_the_pool_of_the_process_and_the_next_check_has_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = shared_pool()
+    with monkeypatch.context() as patch:
+        patch.setattr(WorkerPool, "call", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            check(PROGRAM)
+    assert SHARED.pool is None
+    assert check(PROGRAM).problems == ()
+    assert shared_pool() is not before
+
+
+def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "module.py"
+    file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
+    wanted = isolated_process.compiled_source(file.read_text(encoding="utf-8"), "module")
+    assert isolated_process.compiled.__wrapped__(str(file), "module") == wanted
+    get_code = SourceFileLoader.get_code
+
+    def without_columns(self: SourceFileLoader, name: str) -> CodeType | None:
+        code = get_code(self, name)
+        return code and code.replace(co_linetable=b"")
+
+    monkeypatch.setattr(SourceFileLoader, "get_code", without_columns)
+    assert isolated_process.compiled.__wrapped__(str(file), "module") == wanted
