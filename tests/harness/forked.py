@@ -169,6 +169,7 @@ def serve(line: socket.socket) -> list[str] | None:
             line.close()
             become(request, descriptors)
             return list(request["words"])
+        ended.pop(pid, None)  # numbers of processes come round again in a long run of tests
         for number in descriptors:
             os.close(number)
         line.send(json.dumps(pid).encode())
