@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from datetime import date
 from difflib import get_close_matches
 from pathlib import Path
@@ -94,6 +95,18 @@ class YamlFile:
             *around, last = path  # a number may be a key, which is kept as it is spelt
             path = (*around, str(last)) if isinstance(last, int) else tuple(around)
         return self._lines[path]
+
+    def part(self, key: str, data: object) -> YamlFile:
+        """What stands under a key, as a file of its own that says the same lines.
+
+        Args:
+            key: of the whole.
+            data: what is there, perhaps with other texts.
+        """
+        found = copy(self)
+        found.data, lines = data, self._lines.items()
+        found._lines = {place[1:]: line for place, line in lines if place[:1] == (key,)}  # noqa: SLF001 - its own
+        return found
 
     def wrong(self, sentence: str, *place: str | int) -> UserError:
         """The error for a place in this file."""

@@ -53,6 +53,13 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
     return _test_holds(formula, trace)
 
 
+def visible(trace: Trace) -> tuple[object, ...]:
+    """All that formulas can tell of a trace, which is all but times: those where it is equal are judged alike."""
+    return tuple(
+        (e.kind, e.text, e.options, e.answer, e.found, e.place, e.holding, e.to, e.more) for e in trace
+    )
+
+
 def _test_holds(test: formulas.Test, trace: Trace) -> bool:
     span = scoped(test.scopes, trace)
     match test:

@@ -24,6 +24,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status, Trace, outcome_data
 from codebotler.core.world import World
 from codebotler.rtl import Inconclusive, holds
+from codebotler.rtl.semantics import visible
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.rules import PAPER
@@ -42,28 +43,24 @@ MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 128  # results, and events of all r
 
 
 class Remembered(Generic[Value]):
-    """Results for runs in scenarios, by the identity of both.
-
-    Many programs do the same in the same world, and then the engine gives them the very same outcome.
-    """
+    """Results for runs: many programs do the same in the same world, and in worlds that are alike."""
 
     def __init__(self) -> None:
-        # With the value, the objects whose ids are its key, so that nothing else gets these ids.
-        self._known: dict[tuple[int, ...], tuple[Value, object, object]] = {}
+        # With the value, what has the ids that its key may hold, so that nothing else gets these ids.
+        self._known: dict[tuple[object, ...], tuple[Value, object]] = {}
 
     def of(
-        self, outcomes: Sequence[Outcome], scenarios: Sequence[Scenario], found: Callable[[], Value]
+        self, key: tuple[object, ...], has_ids: object, runs: Iterable[Outcome], found: Callable[[], Value]
     ) -> Value:
-        """The result for the runs in the scenarios, found if it is not known."""
-        key = (*map(id, outcomes), *map(id, scenarios))
+        """The result for runs, found if none is known by a key."""
         known = self._known.get(key)  # another thread may clear it at any moment
         if known is not None:
             return known[0]
         value = found()
         if len(self._known) >= MOST_REMEMBERED:
             self._known.clear()
-        if sum(len(outcome.trace) for outcome in outcomes) <= LONGEST_REMEMBERED:
-            self._known[key] = value, tuple(outcomes), tuple(scenarios)
+        if sum(len(outcome.trace) for outcome in runs) <= LONGEST_REMEMBERED:
+            self._known[key] = value, has_ids
         return value
 
 
@@ -95,7 +92,8 @@ def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
     def found() -> tuple[bool, ...]:
         return tuple([is_met(one, outcome.trace) for one in scenario.require])
 
-    return MET.of([outcome], [scenario], found)
+    formulas = [id(one.formula) for one in scenario.require]
+    return MET.of((visible(outcome.trace), *formulas), scenario, [outcome], found)
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:
@@ -209,7 +207,8 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
             return judgements_for(verdicts, len(task.prompts))
 
     try:
-        return JUDGED.of(outcomes, scenarios, found)
+        key = (*map(id, outcomes), *map(id, scenarios))
+        return JUDGED.of(key, (outcomes, scenarios), outcomes, found)
     except TimeLimitExceeded:
         return None
 

@@ -15,6 +15,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError
+from codebotler.core.files import read_text
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import listed
 from codebotler.core.world_file import Name, Text
@@ -91,15 +92,33 @@ class TrainedTask:
 
 
 def family_names() -> tuple[str, ...]:
-    """The names of all families, sorted."""
+    """The names of all families that are here, sorted."""
     return tuple(sorted(path.stem for path in (FOLDER / "families").glob("*.yaml")))
+
+
+def family_file(family: str) -> Path:
+    """The file of a family.
+
+    Args:
+        family: one of `family_names()`, or a file of your own, which ends in `.yaml`.
+
+    Raises:
+        UserError: there is no such family.
+    """
+    if family.endswith(".yaml") and Path(family).is_file():
+        return Path(family)
+    if family not in family_names():
+        raise UserError(
+            f'there is no family "{family}"; there is {listed(family_names())}, or a .yaml file of your own'
+        )
+    return FOLDER / "families" / f"{family}.yaml"
 
 
 def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask:
     """The task that a family makes of a seed, the same on every machine.
 
     Args:
-        family: its name, one of `family_names()`.
+        family: one of `family_names()`, or a file of your own, which ends in `.yaml`; it is read once.
         seed: any number from 0; names, words and worlds depend on it.
         worlds: how many to draw at least, 1 to 10,000.
 
@@ -111,23 +130,28 @@ def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask
 
 @lru_cache(maxsize=1_024)
 def _made(family: str, seed: int, worlds: int) -> TrainedTask:
-    if family not in family_names():
-        raise UserError(f'there is no family "{family}"; there is {listed(family_names())}')
-    raw = _read(family)
-    random = Random(f"{family} {seed}")  # noqa: S311 - no secret
+    path = family_file(family)
+    text, raw = _read(path)
+    random = Random(f"{path.stem} {seed}")  # noqa: S311 - no secret
     chosen = dict(_chosen(raw.validate(FamilyFile), raw, random))
     try:
-        file = YamlFile(Template(_text(family)).substitute(chosen), raw.name)
+        file = YamlFile(Template(text).substitute(chosen), raw.name)
     except (KeyError, ValueError) as error:
         raise UserError(f"{error} is not chosen; write $$ for a dollar", file=raw.name) from None
     form = file.validate(FamilyFile)
-    name = f"{family}-{seed}"
-    file.data = {"name": name, **form.task, "prompts": [_worded(one, random) for one in form.task["prompts"]]}
+    name = f"{path.stem}-{seed}"
+    task_file = file.part("task", {"name": name, **_worded(form.task, random)})
     head = _head()
     rules = head.rules
-    path = FOLDER / f"{name}.yaml"
-    task = read_task(file, path, SKILLS, count=worlds, seed=seed, words=rules.words_for_people)
-    digest = hashlib.sha256(f"{head.version} {worlds} {seed} {file.data}".encode()).hexdigest()
+    task = read_task(
+        task_file,
+        path.with_name(f"{name}.yaml"),
+        SKILLS,
+        count=worlds,
+        seed=seed,
+        words=rules.words_for_people,
+    )
+    digest = hashlib.sha256(f"{head.version} {worlds} {seed} {task_file.data}".encode()).hexdigest()
     suite = Suite(SUITE, head.version, head.about, rules.rules(), {name: task}, digest)
     return TrainedTask(suite, name, form.solution, form.wrong)
 
@@ -179,22 +203,25 @@ def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
         yield from _scalar(f"{name}_{number}", word)
 
 
-def _worded(prompt: str, random: Random) -> str:
-    """A phrasing with one word where there are several."""
-    return " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), prompt).split())
+def _worded(task: dict[str, Any], random: Random) -> dict[str, Any]:
+    """A task in whose phrasings is one word where there were several."""
+
+    def one_word(prompt: str) -> str:
+        return " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), prompt).split())
+
+    prompts = task.get("prompts")
+    if not isinstance(prompts, list):  # which is told when the task is read
+        return task
+    return {**task, "prompts": [one_word(one) if isinstance(one, str) else one for one in prompts]}
 
 
 # --- files
 
 
 @cache
-def _text(family: str) -> str:
-    return (FOLDER / "families" / f"{family}.yaml").read_text(encoding="utf-8")
-
-
-@cache
-def _read(family: str) -> YamlFile:
-    return YamlFile(_text(family), FOLDER / "families" / f"{family}.yaml")
+def _read(path: Path) -> tuple[str, YamlFile]:
+    text = read_text(path)
+    return text, YamlFile(text, path)
 
 
 @cache

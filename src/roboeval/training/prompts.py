@@ -11,7 +11,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import listed
 from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import prompt_for
-from roboeval.training.families import family_names, trained_task
+from roboeval.training.families import family_file, family_names, trained_task
 
 SIZE = 1_000_000_000
 SPLITS = {"train": 0, "validation": SIZE, "test": 2 * SIZE}
@@ -36,7 +36,7 @@ def load_prompts(
         split: `train`, `validation` or `test`, which share no task.
         count: how many prompts.
         seed: for others: with the next number, all tasks are new.
-        only: the families to draw from; all of them by default.
+        only: the families to draw from, also files of your own; all that are here by default.
         form: `chat` for messages, `text` for one text that base models go on from.
 
     Returns:
@@ -49,8 +49,8 @@ def load_prompts(
     """
     if split not in SPLITS:
         raise UserError(f'there is no split "{split}"; there is {listed(list(SPLITS))}')
-    if unknown := [name for name in only if name not in family_names()]:
-        raise UserError(f'there is no family "{unknown[0]}"; there is {listed(family_names())}')
+    for name in only:
+        family_file(name)
     if count < 1:
         raise UserError(f"the number of prompts is {count}, but it must be at least 1")
     if not 0 <= seed * count <= SIZE - count:

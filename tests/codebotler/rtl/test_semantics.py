@@ -3,6 +3,7 @@
 import pickle
 import re
 from collections.abc import Callable
+from dataclasses import fields, replace
 from typing import SupportsIndex, TypeAlias, overload
 
 import pytest
@@ -36,7 +37,7 @@ from codebotler.rtl import (
     holds,
     parse,
 )
-from codebotler.rtl.semantics import scoped
+from codebotler.rtl.semantics import scoped, visible
 
 Placed = list[tuple[int, Event]]
 """A copied part of a trace, each event with its position in the whole."""
@@ -280,6 +281,24 @@ def test_a_trace_is_judged_by_what_is_compared_only(
     formula, trace = data.draw(formulas), data.draw(traces)
     padded = tuple(event for one in trace for event in (Event("wave", "a"), one))
     assert holds(formula, padded) == holds(formula, trace)
+
+
+def test_all_of_an_event_but_its_time_is_visible() -> None:
+    event = Event("say", "a")
+    other = Event("ask", "b", (Option("1"),), "c", True, "d", 2.0, "e", "f", ("g",))
+    for name in (one.name for one in fields(Event)):
+        changed = replace(event, **{name: getattr(other, name)})
+        assert (visible((changed,)) == visible((event,))) == (name == "time"), name
+
+
+@given(st.data())
+def test_a_formula_holds_of_all_traces_in_which_the_same_is_visible(
+    formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    formula, trace = data.draw(formulas), data.draw(traces)
+    later = tuple(replace(event, time=9.0 + at) for at, event in enumerate(trace))
+    assert visible(later) == visible(trace)
+    assert holds(formula, later) == holds(formula, trace)
 
 
 AnySlice: TypeAlias = "slice[SupportsIndex | None, SupportsIndex | None, SupportsIndex | None]"

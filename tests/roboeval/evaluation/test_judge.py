@@ -14,7 +14,7 @@ from codebotler.rtl import holds
 from codebotler.rtl.formulas import Formula
 from codebotler.simulator.worker import EVENTS
 from roboeval.evaluation.failures import Verdict, failure
-from roboeval.evaluation.judge import LONGEST_REMEMBERED, evaluate, judge
+from roboeval.evaluation.judge import LONGEST_REMEMBERED, Remembered, evaluate, judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -248,8 +248,9 @@ HI = (Event("goto", "kitchen"), Event("say", "hi"))
 
 @pytest.fixture
 def tested(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
-    """The traces on which a formula was tested."""
+    """The traces on which a formula was tested, of which none is remembered."""
     traces: list[Trace] = []
+    monkeypatch.setattr("roboeval.evaluation.judge.MET", Remembered())
 
     def counted(formula: Formula, trace: Trace) -> bool:
         traces.append(trace)
@@ -259,11 +260,16 @@ def tested(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
     return traces
 
 
-def test_what_a_run_has_met_is_found_once_in_each_world(suite: Suite, tested: list[Trace]) -> None:
+def test_what_a_run_has_met_is_found_once_for_what_a_world_requires(
+    suite: Suite, tested: list[Trace]
+) -> None:
     one, other = suite.tasks["T"].scenarios
-    run = Outcome(Status.FINISHED, HI)
-    for _ in range(3):
+    for time in range(3):
+        run = Outcome(Status.FINISHED, tuple(replace(event, time=time) for event in HI))
         assert [judge(run, one).satisfied, judge(run, other).satisfied] == [True, True]
+    assert len(tested) == len(one.require) + len(other.require)
+    alike = replace(one, world=replace(one.world, about="another"))
+    assert judge(Outcome(Status.FINISHED, HI), alike).satisfied
     assert len(tested) == len(one.require) + len(other.require)
     assert not judge(Outcome(Status.FINISHED, HI[:1]), one).satisfied
 
@@ -274,7 +280,7 @@ def test_long_runs_are_not_remembered_and_others_forgotten(
     monkeypatch.setattr("roboeval.evaluation.judge.MOST_REMEMBERED", 2)
     scenario = suite.tasks["T"].scenarios[1]
     long = Outcome(Status.FINISHED, HI * LONGEST_REMEMBERED)
-    runs = [Outcome(Status.FINISHED, HI) for _ in range(3)]
+    runs = [Outcome(Status.FINISHED, (*HI, Event("say", text))) for text in "abc"]
     for run, times in ((long, 2), (runs[0], 1), (runs[1], 1), (runs[2], 1), (runs[0], 1)):
         tested.clear()
         assert [judge(run, scenario).satisfied for _ in range(2)] == [True, True]

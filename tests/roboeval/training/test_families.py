@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +13,7 @@ from hacking import earned, hacks, honest
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
 from roboeval.training.families import family_names, trained_task
+from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = (0, 1, 1_000_000_000)
@@ -52,6 +54,58 @@ def test_a_seed_always_makes_the_same_task_and_another_one_another(family: str) 
 def test_worlds_are_as_many_as_asked_for() -> None:
     task = trained_task("BringThing", 3, worlds=40)
     assert len(task.suite.tasks[task.name].scenarios) >= 40
+
+
+OWN = """
+about: Go to a room.
+choose: {room: rooms, spare: rooms}
+task:
+  summary: Go to the $room.
+  abilities: [navigation]
+  prompts: [Go to the $room., Please go to the $room.]
+  worlds: {robot: [start_loc, $spare], rooms: [$room, $spare, start_loc]}
+  checks: {goes: {category: Location, rtl: 'tr.Exists(goto("$room"))'}}
+  require: [goes]
+solution: |
+  def task_program():
+      go_to("$room")
+wrong:
+  - about: goes elsewhere
+    program: |
+      def task_program():
+          go_to("$spare")
+"""
+
+
+def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "Visit.yaml"
+    file.write_text(OWN)
+    (row, other) = load_prompts("test", count=2, only=[str(file)])
+    assert row["prompt"] != other["prompt"]
+    task = trained_task(row["family"], row["seed"])
+    assert task.name == f"Visit-{row['seed']}"
+    programs = [task.solution, task.wrong[0].program, ""]
+    found = judge([Rollout(row["family"], row["seed"], row["prompt_index"], each) for each in programs])
+    assert [one.reward for one in found] == [1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ("spare: rooms", "spare: planets", r', line 3: there are no "planets"; there are rooms, people'),
+        ("tr.Exists(goto", "tr.Exist(goto", r", line 9: .*Exist"),
+        ('go_to("$room")', 'go_to("$rom")', r": 'rom' is not chosen; write \$\$ for a dollar"),
+        ("  prompts: [Go to the $room., Please go to the $room.]\n", "", r", line 4: .*prompts"),
+        ("summary: Go", "sumary: Go", r", line 5: .*sumary"),
+    ],
+)
+def test_a_mistake_in_a_family_of_ones_own_is_told_with_its_line(
+    tmp_path: Path, right: str, wrong: str, told: str
+) -> None:
+    file = tmp_path / "Visit.yaml"
+    file.write_text(OWN.replace(right, wrong))
+    with pytest.raises(UserError, match=rf"Visit\.yaml{told}"):
+        trained_task(str(file), 1)
 
 
 # --- nothing that is measured with is learned

@@ -12,6 +12,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import listed
 from codebotler.simulator.worker import EngineError
 from codebotler_openenv.models import CodebotlerAction, CodebotlerObservation, CodebotlerState, Message
+from roboeval.training.families import family_names
 from roboeval.training.prompts import SPLITS, load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
@@ -54,6 +55,8 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
             raise UserError(
                 f"reset takes seed, episode_id, split and family, but not {listed(sorted(others))}"
             )
+        if family is not None and family not in family_names():  # nor a file, which is for who runs this
+            raise UserError(f'there is no family "{family}"; there is {listed(family_names())}')
         number = secrets.randbelow(SEEDS) if seed is None else _checked(seed)
         (row,) = load_prompts(split, count=1, seed=number, only=() if family is None else (family,))
         self._state = CodebotlerState(
