@@ -12,7 +12,8 @@
 #     test-transformers, -pyrobosim, -inspect, -ray
 #                          models and detectors on this machine, the robot in pyrobosim, the benchmark in Inspect and on
 #                          a Ray cluster, in one environment with all extras, EXTRAS_VENV
-#   make test-environments   environments/ for trainers: their tests, a short training run, and equal rewards
+#     test-environments    environments/ for trainers, each in an environment of its own in ENVIRONMENTS_IN: their
+#                          tests, a short training run, and equal rewards
 #
 # `make faults` tries 60 deliberate faults, which the tests must notice. `make messages` writes every sentence that
 # an error says in a test into build/messages.md, once, and which ones no test has seen. `make fuzz` runs
@@ -26,6 +27,8 @@ VENV ?= .venv
 EXTRAS ?= [all]
 EXTRAS_VENV ?= .venv-extras
 ENVIRONMENTS = trl verifiers openenv
+ENVIRONMENTS_IN ?= .
+environment = $(abspath $(ENVIRONMENTS_IN))/.venv-$(1)/bin/python
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -68,7 +71,7 @@ test: $(VENV)/tested
 	$(if $(TESTS),,$(BIN)/python -m pytest tests/guide/test_pages.py -k own-skills)
 
 test-all: test test-slow test-suites test-guide test-ros1 test-browser test-faulty-server test-transformers test-pyrobosim \
-	test-inspect test-ray
+	test-inspect test-ray test-environments
 
 test-slow: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m slow $(addprefix --ignore ,$(APART))
@@ -108,15 +111,15 @@ test-ray: $(EXTRAS_VENV)/tested
 
 # Each in an environment of its own, since two of them want other versions of the same libraries.
 test-environments: $(VENV)/tested $(addprefix test-environment-,$(ENVIRONMENTS))
-	$(BIN)/python environments/equal.py $(foreach name,$(ENVIRONMENTS),$(name)=.venv-$(name)/bin/python)
+	$(BIN)/python environments/equal.py $(foreach name,$(ENVIRONMENTS),$(name)=$(call environment,$(name)))
 
 test-environment-%: $(SOURCES)
-	@echo "making an environment with $* in .venv-$*, which takes some minutes"
-	@$(PYTHON) -m venv --clear .venv-$*
-	@.venv-$*/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@.venv-$*/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints-extras.txt \
+	@echo "making an environment with $* in $(ENVIRONMENTS_IN)/.venv-$*, which takes a minute"
+	@$(PYTHON) -m venv --clear $(ENVIRONMENTS_IN)/.venv-$*
+	@$(call environment,$*) -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(call environment,$*) -m pip --disable-pip-version-check install --no-compile --constraint constraints-extras.txt \
 		"$(PACKAGE)" ./environments/$* --group environments/$*/pyproject.toml:test | { $(DOTS); }
-	cd environments/$* && ../../.venv-$*/bin/python -m pytest
+	cd environments/$* && $(call environment,$*) -m mypy && $(call environment,$*) -m pytest
 
 test-faulty-server: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m

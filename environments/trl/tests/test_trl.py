@@ -8,10 +8,10 @@ from statistics import fmean
 from typing import Any
 
 import pytest
-import tokenizers  # type: ignore[import-untyped]
+import tokenizers
 import torch
-import transformers  # type: ignore[import-untyped]
-import trl  # type: ignore[import-untyped]
+import transformers
+import trl
 from codebotler_trl import load_prompts, parses, passed, reward, without_errors
 
 from codebotler.simulator.worker import EngineError

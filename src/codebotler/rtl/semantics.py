@@ -54,7 +54,7 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
 
 
 def visible(trace: Trace) -> tuple[object, ...]:
-    """All that formulas can tell of a trace, which is all but times: those where it is equal are judged alike."""
+    """All that formulas can tell of a trace: all but times. Where it is equal, traces are judged alike."""
     return tuple(
         (e.kind, e.text, e.options, e.answer, e.found, e.place, e.holding, e.to, e.more) for e in trace
     )

@@ -285,7 +285,9 @@ def test_a_trace_is_judged_by_what_is_compared_only(
 
 def test_all_of_an_event_but_its_time_is_visible() -> None:
     event = Event("say", "a")
-    other = Event("ask", "b", (Option("1"),), "c", True, "d", 2.0, "e", "f", ("g",))
+    other = Event(
+        "ask", "b", (Option("1"),), "c", found=True, place="d", time=2.0, holding="e", to="f", more=("g",)
+    )
     for name in (one.name for one in fields(Event)):
         changed = replace(event, **{name: getattr(other, name)})
         assert (visible((changed,)) == visible((event,))) == (name == "time"), name
