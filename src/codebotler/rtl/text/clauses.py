@@ -83,13 +83,21 @@ _IN_VAIN_THERE = re.compile(
     re.IGNORECASE,
 )
 
+# "2 people said yes to the question: do you like it?" asks nothing.
+_QUOTED = re.compile(
+    r"(\bto(?:(?: the question)?: ?| the question | (?=[\"'\u2018\u201c]))[\"'\u2018\u201c]?"
+    r"(?:is|are|was|were|did|does|do|will|would|can|could|has|have|had|should|who|what|which|when|where|why|how)\b"
+    r"[^?!;\n.]{0,120})\?",
+    re.IGNORECASE,
+)
+
 
 def sentences(text: str) -> list[str]:
     """The sentences of a text, questions with their question marks; `4 p.m.` and `1.5` end none.
 
-    Who asks and answers, as in `Butter? No`, says one sentence.
+    Who asks and answers, as in `Butter? No`, says one sentence; a question that is answered asks nothing.
     """
-    text = _ANSWERED.sub(r"\1: \2", _HALF_DAY.sub(r"\1m", text))
+    text = _QUOTED.sub(r"\1", _ANSWERED.sub(r"\1: \2", _HALF_DAY.sub(r"\1m", text)))
     return [part for part in _END.split(text) if part.strip().strip("?")]
 
 

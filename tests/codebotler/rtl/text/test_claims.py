@@ -131,6 +131,21 @@ def test_of_several_things_each_has_its_own_number(
         assert Number(0, thing, others).given(text) == {counts[at]}, text
 
 
+@pytest.mark.parametrize(
+    ("text", "numbers"),
+    [
+        ('2 people said yes to the question "Do you want a plant?"', {2}),
+        ("2 people said yes to: Do you want a plant?", {2}),
+        ("There were 2 'yes' answers to the question do you want a plant?", {2}),
+        ("2 people said yes to 'Do you want 3 plants?'", {2}),
+        ("Do 2 people want to have a plant?", set()),
+        ("Did 2 people say yes?", set()),
+    ],
+)
+def test_a_question_that_is_quoted_asks_nothing(text: str, numbers: set[int]) -> None:
+    assert Number(0, "people|yes", ()).given(text) == numbers
+
+
 TIMES = [
     ("12:00", [(0, 720)]),
     ("12 pm", [(720,)]),
