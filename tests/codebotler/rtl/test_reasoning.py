@@ -7,10 +7,11 @@ from typing import get_args
 import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
 
 from codebotler.core.trace import Event, Trace
 from codebotler.rtl import And, Formula, Not, Regex, Without, Words, holds, parse
-from codebotler.rtl.formulas import ScopeName
+from codebotler.rtl.formulas import EventPattern, ScopeName
 from codebotler.rtl.reasoning import (
     Reasoner,
     Undecided,
@@ -22,14 +23,27 @@ from codebotler.rtl.reasoning import (
     samples,
     satisfying_trace,
 )
+from codebotler.rtl.reasoning.alphabet import aspects_of
 from codebotler.rtl.reasoning.automaton import Automaton
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
+from codebotler.rtl.semantics import is_match
 
 SPEAKS, GOES, STAYS = map(
     parse, ('tr.Exists(say("hello"))', 'tr.Exists(goto("kitchen"))', 'not tr.Exists(goto("kitchen"))')
 )
 GREETS_THERE = parse('tr.ActAtFirst("kitchen", say("hello"))')
 TOO_LARGE = parse('tr.Count(say("a"), 5000)')
+
+
+@given(st.data())
+def test_an_element_matches_where_each_of_its_aspects_does(
+    elements: SearchStrategy[EventPattern], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    element, trace = data.draw(elements), data.draw(traces)
+    for event in trace:
+        by_aspects = all(is_match(one, event, 0) for one in aspects_of(element))
+        assert is_match(element, event, 0) is by_aspects
+
 
 # --- the questions
 

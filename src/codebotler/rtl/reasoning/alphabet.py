@@ -9,6 +9,9 @@ from typing import Any, overload
 from codebotler.core.trace import Event, Option
 from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
+from codebotler.rtl.semantics import is_match
+
+ANYTHING = Regex("")
 
 
 def elements(formula: Formula) -> Iterator[EventPattern]:
@@ -31,30 +34,83 @@ def alphabet(
     rooms: Sequence[str] | None = None,
     moves: Sequence[str] | None = None,
 ) -> list[Event]:
-    """Events that match elements in all combinations for which strings were found.
+    """Events that match elements in all combinations for which strings were found, one for each of these.
 
     Args:
         wanted: the elements.
-        rooms: where events happen; by default in rooms of any names.
-        moves: the requests to move; by default any texts.
+        rooms: where events happen; by default in rooms of any names. If there are some, each has events.
+        moves: the requests to move; by default any texts. If there are some, each has events.
     """
     kinds: dict[str, list[EventPattern]] = {}
     for element in dict.fromkeys(wanted):
         kinds.setdefault(element.kind, []).append(element)
     places = _places([element for alike in kinds.values() for element in alike], rooms)
     held = _texts([element.holding for alike in kinds.values() for element in alike], nothing="")
-    return [
-        Event(kind, text, options, answer, found, place, holding=holding, to=to, more=more)
-        for kind, alike in kinds.items()
-        for text in (moves if kind == "goto" and moves is not None else _requests(alike))
-        for more in _more(alike)
-        for options in _options(alike)
-        for answer in _texts([element.answer for element in alike])
-        for found in ([None] if all(e.found is None for e in alike) else [True, False])
-        for place in (places if kind != "goto" or any(e.place for e in alike) else [""])
-        for holding in (held if any(e.holding for e in alike) else [""])
-        for to in _texts([element.to for element in alike])[any(e.to for e in alike) :]  # each has somebody
+    events: list[Event] = []
+    for kind, alike in kinds.items():
+        moves_by = moves if kind == "goto" else None
+        aspects = [
+            [
+                Event(kind, text, options, more=more)
+                for text in (_requests(alike) if moves_by is None else moves_by)
+                for more in _more(alike)
+                for options in _options(alike)
+            ],
+            [
+                Event(kind, "", answer=answer, found=found)
+                for answer in _texts([element.answer for element in alike])
+                for found in ([None] if all(e.found is None for e in alike) else [True, False])
+            ],
+            [
+                Event(kind, "", place=place)
+                for place in (places if kind != "goto" or any(e.place for e in alike) else [""])
+            ],
+            [
+                Event(kind, "", holding=holding, to=to)
+                for holding in (held if any(e.holding for e in alike) else [""])
+                for to in _texts([e.to for e in alike])[any(e.to for e in alike) :]  # each has somebody
+            ],
+        ]
+        events += _distinct_events(alike, aspects, by_room=rooms is not None, by_text=moves_by is not None)
+    return events
+
+
+def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
+    """The elements that say of one aspect each what an element says: it matches where all of these do."""
+    kind = element.kind
+    return (
+        EventPattern(kind, element.text, element.options, element.mention, more=element.more),
+        EventPattern(kind, ANYTHING, answer=element.answer, found=element.found),
+        EventPattern(kind, ANYTHING, place=element.place),
+        EventPattern(kind, ANYTHING, holding=element.holding, to=element.to),
+    )
+
+
+def _distinct_events(
+    alike: Sequence[EventPattern], aspects: Sequence[Sequence[Event]], *, by_room: bool, by_text: bool
+) -> Iterable[Event]:
+    """Of all events that can be made of some aspects, the first for each set of elements that it matches.
+
+    There can be hundreds of thousands, so that each is told by the elements that match its aspects, as bits.
+    """
+    patterns = zip(*map(aspects_of, alike), strict=True)
+    matched = [
+        [(event, sum(is_match(one, event, 0) << bit for bit, one in enumerate(ones))) for event in given]
+        for ones, given in zip(patterns, aspects, strict=True)
     ]
+    distinct: dict[tuple[int, str, str], Event] = {}
+    for (said, of_said), (heard, of_heard), (there, of_there), (held, of_held) in product(*matched):
+        key = (
+            of_said & of_heard & of_there & of_held,
+            (by_room and there.place) or "",
+            (by_text and said.text) or "",
+        )
+        if key not in distinct:
+            distinct[key] = Event(
+                said.kind, said.text, said.options, heard.answer, heard.found, there.place,
+                holding=held.holding, to=held.to, more=said.more,
+            )  # fmt: skip
+    return distinct.values()
 
 
 def _distinct(texts: Iterable[Text | None]) -> tuple[Text, ...]:

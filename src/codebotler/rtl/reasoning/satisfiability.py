@@ -44,7 +44,7 @@ class Reasoner:
         if moves is not None and all(event.kind != "goto" for event in events):
             events += [Event("goto", move) for move in moves]
         distinct: dict[tuple[object, ...], tuple[list[bool], Event]] = {}
-        for event in events:  # of tens of thousands, only hundreds differ in what they match
+        for event in events:
             row = [matches(element, (event,), 0) for element in wanted]
             where = () if moves is None else (event.place, event.text if event.kind == "goto" else "")
             distinct.setdefault((*row, *where), (row, event))
