@@ -7,9 +7,8 @@ from typing import get_args
 import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
-from hypothesis.strategies import DataObject, SearchStrategy
 
-from codebotler.core.trace import Event, Trace
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import And, Formula, Not, Regex, Without, Words, holds, parse
 from codebotler.rtl.formulas import EventPattern, ScopeName
 from codebotler.rtl.reasoning import (
@@ -35,14 +34,36 @@ GREETS_THERE = parse('tr.ActAtFirst("kitchen", say("hello"))')
 TOO_LARGE = parse('tr.Count(say("a"), 5000)')
 
 
-@given(st.data())
-def test_an_element_matches_where_each_of_its_aspects_does(
-    elements: SearchStrategy[EventPattern], traces: SearchStrategy[Trace], data: DataObject
-) -> None:
-    element, trace = data.draw(elements), data.draw(traces)
-    for event in trace:
-        by_aspects = all(is_match(one, event, 0) for one in aspects_of(element))
-        assert is_match(element, event, 0) is by_aspects
+A, B = Regex("a"), Regex("b")
+
+
+@pytest.mark.parametrize(
+    "element",
+    [
+        EventPattern("ask", A),
+        EventPattern("ask", A, B),
+        EventPattern("ask", A, mention=True),
+        EventPattern("ask", A, place="a"),
+        EventPattern("ask", A, answer=A),
+        EventPattern("ask", A, found=True),
+        EventPattern("ask", A, holding=A),
+        EventPattern("ask", A, to=A),
+        EventPattern("ask", A, more=(A, B)),
+        EventPattern("ask", A, A, place="b", answer=B, found=False, holding=B, to=B, more=(B,)),
+    ],
+    ids=str,
+)
+def test_an_element_matches_where_each_of_its_aspects_does(element: EventPattern) -> None:
+    options, more = [(), (Option("a"),), (Option("b"), Option("a"))], [(), ("a", "b"), ("b",)]
+    found: set[bool] = set()
+    for text, offered, answer, is_found, place, holding, to, further in product(
+        "ab", options, (None, "a", "b"), (None, True, False), "ab", ("", "a", "b"), (None, "a", "b"), more
+    ):
+        event = Event("ask", text, offered, answer, is_found, place, 0.0, holding, to, further)
+        matches = is_match(element, event, 0)
+        found.add(matches)
+        assert matches is all(is_match(one, event, 0) for one in aspects_of(element)), event
+    assert found == {True, False}
 
 
 # --- the questions
