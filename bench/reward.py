@@ -2,18 +2,26 @@
 
 Beside it stands what one call of `evaluate` does with the same programs, as what could be reached. Both are
 printed for the suites `paper` and `plus`; under `plus`, which has more worlds, a quarter as many programs.
-Then ROLLOUTS rollouts of the families to train on are judged at once, with 1 to 8 workers in turns.
+They are those that models wrote, where CODEBOTLER_CORPUS names the corpus, and the recorded ones. Of these one
+in ten was written to use all of Python, and has a process for each run. Then ROLLOUTS rollouts of the families
+to train on are judged at once, with 1 to 8 workers in turns.
 """
 
+import os
 import sys
 import time
 from collections import defaultdict
+from collections.abc import Sequence
 from itertools import cycle, islice
+from pathlib import Path
 from statistics import median
 from typing import Any
 
 from codebotler.simulator.pool import SHARED, WorkerPool, cores
+from completions import models
 from roboeval import Completion, evaluate, load_suite, recorded_completions, reward
+from roboeval.evaluation.runs.completions import read_completions
+from roboeval.suites.load import Suite
 from roboeval.training.families import trained_task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
@@ -25,9 +33,18 @@ ROLLOUTS, TURNS = 1_024, 3
 
 
 def main() -> None:
-    """Print both for both suites."""
+    """Print all of it."""
     for name, count in (("paper", COUNT), ("plus", COUNT // 4)):
-        measure(name, count)
+        suite = load_suite(name)
+        if os.environ.get("CODEBOTLER_CORPUS"):
+            by_models = [one for file in models(Path()).values() for one in read_completions(file)]
+            measure("what models wrote", suite, by_models[::5], count)
+        recorded = [
+            completion
+            for model in ("recorded:careful", "recorded:hasty")
+            for completion in recorded_completions(model, suite)
+        ]
+        measure("recorded programs", suite, recorded, count)
     measure_families()
 
 
@@ -58,17 +75,11 @@ def rollout(row: dict[str, Any], name: str) -> Rollout:
     return Rollout(row["family"], row["seed"], row["prompt_index"], program)
 
 
-def measure(name: str, count: int) -> None:
-    """Print both for one suite."""
-    suite = load_suite(name)
-    recorded = [
-        completion
-        for model in ("recorded:careful", "recorded:hasty")
-        for completion in recorded_completions(model, suite)
-    ]
+def measure(what: str, suite: Suite, given: Sequence[Completion], count: int) -> None:
+    """Print both for some completions, as often as makes that many programs."""
     written: dict[str, list[str]] = {}
-    for number, completion in enumerate(islice(cycle(recorded), count)):
-        written.setdefault(completion.task, []).append(f"{completion.program}\n# {number}\n")
+    for number, completion in enumerate(islice(cycle(given), count)):
+        written.setdefault(completion.task, []).append(f"{completion.program}\n# {number} of {what}\n")
     first = time.monotonic()
     reward("LunchTime", 0, ["", "def task_program():\n    pass\n"], suite=suite)
     began = time.monotonic()
@@ -76,7 +87,7 @@ def measure(name: str, count: int) -> None:
         for start in range(0, len(programs), BATCH):
             reward(task, 0, programs[start : start + BATCH], suite=suite)
     took = time.monotonic() - began
-    print(f"{name}: {count:,} distinct programs in {took:.1f} s: {60 * count / took:,.0f} programs a minute")
+    print(f"{suite.name}, {what}, {count:,} distinct ones: {60 * count / took:,.0f} programs a minute")
     print(f"the first call, which starts the engine: {began - first:.2f} s")
     began = time.monotonic()
     for task, programs in written.items():
