@@ -2,9 +2,9 @@
 
 Beside it stands what one call of `evaluate` does with the same programs, as what could be reached. Both are
 printed for the suites `paper` and `plus`; under `plus`, which has more worlds, a quarter as many programs.
-They are those that models wrote, where CODEBOTLER_CORPUS names the corpus, and the recorded ones. Of these one
-in ten was written to use all of Python, and has a process for each run. Then ROLLOUTS rollouts of the families
-to train on are judged at once, with 1 to 8 workers in turns.
+They are those that models wrote, where CODEBOTLER_CORPUS names the corpus, and the recorded ones, of which
+one in ten was written to use all of Python, and has a process for each run. Then ROLLOUTS rollouts of the
+families to train on are judged at once, with 1 to 8 workers in turns.
 """
 
 import os
