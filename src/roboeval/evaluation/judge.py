@@ -208,7 +208,7 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
 
     try:
         key = (*map(id, outcomes), *map(id, scenarios))
-        return JUDGED.of(key, (outcomes, scenarios), outcomes, found)
+        return JUDGED.of(key, (tuple(outcomes), scenarios), outcomes, found)
     except TimeLimitExceeded:
         return None
 
