@@ -26,7 +26,7 @@ from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
 from openenv.validation.runtime.collector import collect_runtime_evidence
 from openenv.validation.runtime.contracts import load_runtime_plan
 
-from roboeval.training.families import family_names, trained_task
+from roboeval.training.families import family_file, family_names, trained_task
 from roboeval.training.prompts import SPLITS, load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
@@ -223,6 +223,7 @@ def test_no_more_sessions_than_allowed() -> None:
     ("options", "sentence"),
     [
         ({"family": "NoSuchFamily"}, 'there is no family "NoSuchFamily"'),
+        ({"family": str(family_file("BringThing"))}, "there is no family"),  # no file is read for a client
         ({"split": "plus"}, 'there is no split "plus"'),
         ({"seed": -1}, "the seed is -1"),
         ({"seed": SEEDS}, "from 0 to 999,999,999"),

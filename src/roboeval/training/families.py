@@ -16,22 +16,24 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
+from codebotler.core.program import Flaw, parsed
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import listed
 from codebotler.core.world_file import Name, Text
 from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.load import Suite
-from roboeval.suites.schema import SuiteFile
+from roboeval.suites.schema import MOST_WORLDS, SuiteFile
 from roboeval.suites.taskfile import read_task
 
 FOLDER = Path(__file__).parent
 SUITE, WORLDS = "training", 8
 NUMBERS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 SOME = re.compile(r"(\d+) (\w+)")  # so many different words of a pool
+MARKS = frozenset("${}|")
 RANGE = re.compile(r"(\d+) to (\d+)")
 EITHER = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several words, which make no difference
 
-Choice: TypeAlias = str | list[str]
+Choice: TypeAlias = Name | Annotated[list[Name], Field(min_length=1)]
 
 
 class _Form(BaseModel):
@@ -58,7 +60,7 @@ class FamilyFile(_Form):
     """
 
     about: Name
-    choose: dict[Name, Annotated[Choice, Field(min_length=1)]]
+    choose: dict[Name, Choice]
     task: dict[str, Any]
     solution: Text
     wrong: Annotated[tuple[WrongProgram, ...], Field(min_length=1)]
@@ -123,8 +125,12 @@ def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask
         worlds: how many to draw at least, 1 to 10,000.
 
     Raises:
-        UserError: there is no such family, or its file is wrong.
+        UserError: there is no such family, its file is wrong, or a number is out of range.
     """
+    if not 1 <= worlds <= MOST_WORLDS:
+        raise UserError(f"the number of worlds is {worlds}, but it must be from 1 to {MOST_WORLDS:,}")
+    if type(seed) is not int or seed < 0:
+        raise UserError(f"the seed is {seed!r}, but it must be a whole number from 0")
     return _made(family, seed, worlds)
 
 
@@ -134,13 +140,11 @@ def _made(family: str, seed: int, worlds: int) -> TrainedTask:
     text, raw = _read(path)
     random = Random(f"{path.stem} {seed}")  # noqa: S311 - no secret
     chosen = dict(_chosen(raw.validate(FamilyFile), raw, random))
-    try:
-        file = YamlFile(Template(text).substitute(chosen), raw.name)
-    except (KeyError, ValueError) as error:
-        raise UserError(f"{error} is not chosen; write $$ for a dollar", file=raw.name) from None
+    file = YamlFile(_filled(text, chosen, path), path)
     form = file.validate(FamilyFile)
+    _expect_python(form, file)
     name = f"{path.stem}-{seed}"
-    task_file = file.part("task", {"name": name, **_worded(form.task, random)})
+    task_file = file.part("task", {"name": name, **_worded(form.task, file, random)})
     head = _head()
     rules = head.rules
     task = read_task(
@@ -164,7 +168,14 @@ def _chosen(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
     used: set[str] = set()
 
     def drawn(words: Sequence[str], count: int) -> list[str]:
-        some = random.sample([word for word in words if word not in used], count)
+        left = [word for word in dict.fromkeys(words) if word not in used]
+        if len(left) < count:
+            raise file.wrong(f"{count} words are to be chosen, but only {len(left)} are left", "choose", name)
+        some = random.sample(left, count)
+        if any(MARKS.intersection(word) for word in some):
+            raise file.wrong(
+                "a word holds one of $, {, } and |, which stand for what is chosen", "choose", name
+            )
         used.update(some)
         return some
 
@@ -172,7 +183,10 @@ def _chosen(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
         if isinstance(choice, list):
             yield from _scalar(name, *drawn(choice, 1))
         elif match := RANGE.fullmatch(choice):
-            number = random.randint(int(match[1]), int(match[2]))
+            least, most = int(match[1]), int(match[2])
+            if not least <= most < len(NUMBERS):
+                raise file.wrong("write the smaller number first, and none above 10", "choose", name)
+            number = random.randint(least, most)
             yield from ((name, str(number)), (f"{name}_word", NUMBERS[number]))
         elif match := SOME.fullmatch(choice):
             yield from _list(name, drawn(_pool(match[2], file, name), int(match[1])))
@@ -203,16 +217,41 @@ def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
         yield from _scalar(f"{name}_{number}", word)
 
 
-def _worded(task: dict[str, Any], random: Random) -> dict[str, Any]:
+def _filled(text: str, chosen: Mapping[str, str], path: Path) -> str:
+    """A file with what is chosen in place of its names."""
+    for match in Template.pattern.finditer(text):
+        name = match["named"] or match["braced"]
+        if match["escaped"] is None and name not in chosen:
+            what = "a dollar stands alone" if name is None else f'"${name}" is not chosen'
+            line = text.count("\n", 0, match.start()) + 1
+            raise UserError(f"{what}; write $$ for a dollar", file=path, line=line)
+    return Template(text).substitute(chosen)
+
+
+def _expect_python(form: FamilyFile, file: YamlFile) -> None:
+    """Raise a UserError if one of the programs does not parse."""
+    wrong = [(one.program, ("wrong", number, "program")) for number, one in enumerate(form.wrong)]
+    for program, place in ((form.solution, ("solution",)), *wrong):
+        if isinstance(flaw := parsed(program), Flaw):
+            raise file.wrong(f"this program is no Python: {flaw.message}", *place)
+
+
+def _worded(task: dict[str, Any], file: YamlFile, random: Random) -> dict[str, Any]:
     """A task in whose phrasings is one word where there were several."""
 
-    def one_word(prompt: str) -> str:
-        return " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), prompt).split())
+    def one_word(number: int, prompt: str) -> str:
+        text = " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), prompt).split())
+        if "{" in text or "}" in text:
+            raise file.wrong(
+                "write several words, of which one is taken, as {go|drive}", "task", "prompts", number
+            )
+        return text
 
     prompts = task.get("prompts")
     if not isinstance(prompts, list):  # which is told when the task is read
         return task
-    return {**task, "prompts": [one_word(one) if isinstance(one, str) else one for one in prompts]}
+    texts = [one_word(*one) if isinstance(one[1], str) else one[1] for one in enumerate(prompts)]
+    return {**task, "prompts": texts}
 
 
 # --- files

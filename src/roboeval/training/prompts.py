@@ -7,7 +7,7 @@ from itertools import count as counting
 from itertools import islice
 from typing import Any, Literal, TypeAlias
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, expect_list
 from codebotler.core.words import listed
 from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import prompt_for
@@ -49,6 +49,7 @@ def load_prompts(
     """
     if split not in SPLITS:
         raise UserError(f'there is no split "{split}"; there is {listed(list(SPLITS))}')
+    expect_list(only, "the families")
     for name in only:
         family_file(name)
     if count < 1:
@@ -59,12 +60,15 @@ def load_prompts(
         )
     names = tuple(only) or family_names()
     first = SPLITS[split] + seed * count
-    return [_row(names[number % len(names)], number, form) for number in islice(counting(first), count)]
+    return [_row(names, number, form) for number in islice(counting(first), count)]
 
 
-def _row(family: str, seed: int, form: Form) -> dict[str, Any]:
+def _row(families: Sequence[str], seed: int, form: Form) -> dict[str, Any]:
+    """The row of a seed: in turn of each family, and of each of its phrasings."""
+    turn, number = divmod(seed, len(families))
+    family = families[number]
     prompts = trained_task(family, seed).prompts
-    index = seed // len(family_names()) % len(prompts)
+    index = turn % len(prompts)
     asked = prompt_for(prompts[index])
     chat = [{"role": message.role, "content": message.text} for message in asked.messages]
     return {
@@ -82,6 +86,19 @@ def program_in(completion: Completion, opening: str = "") -> str:
     Args:
         completion: a text, or messages, of which the last is the policy's.
         opening: what the prompt ended with, if a text was to go on from it.
+
+    Raises:
+        UserError: there is no message, or one without content.
     """
-    text = completion if isinstance(completion, str) else str(completion[-1]["content"] or "")
+    text = completion if isinstance(completion, str) else _said(completion)
     return prompt_for("go on").program_from(text) if opening else program_of(text).source
+
+
+def _said(messages: Sequence[Mapping[str, Any]]) -> str:
+    """The text of the last message, which may come in parts."""
+    if not messages or "content" not in messages[-1]:
+        raise UserError("a completion has no message with content")
+    content = messages[-1]["content"]
+    if isinstance(content, str) or content is None:
+        return content or ""
+    return "".join(part.get("text") or "" for part in content)

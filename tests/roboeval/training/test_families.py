@@ -94,7 +94,15 @@ def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
     [
         ("spare: rooms", "spare: planets", r', line 3: there are no "planets"; there are rooms, people'),
         ("tr.Exists(goto", "tr.Exist(goto", r", line 9: .*Exist"),
-        ('go_to("$room")', 'go_to("$rom")', r": 'rom' is not chosen; write \$\$ for a dollar"),
+        ('go_to("$room")', 'go_to("$rom")', r', line 13: "\$rom" is not chosen; write \$\$ for a dollar'),
+        ("Go to the $room., Please", "Go for $ 5., Please", r", line 7: a dollar stands alone; write \$\$"),
+        ("spare: rooms", "spare: 25 rooms", ", line 3: 25 words are to be chosen, but only"),
+        ("spare: rooms", "spare: 4 to 2", ", line 3: write the smaller number first, and none above 10"),
+        ("spare: rooms", "spare: 2 to 12", ", line 3: write the smaller number first, and none above 10"),
+        ("spare: rooms", "spare: ['']", ", line 3: "),
+        ("spare: rooms", "spare: [$room]", ", line 3: a word holds one of"),
+        ("[Go to the $room.,", "['{Go|Drive to the $room.',", ", line 7: write several words, of which"),
+        ('go_to("$room")', 'go_to("$room"', ", line 11: this program is no Python: "),
         ("  prompts: [Go to the $room., Please go to the $room.]\n", "", r", line 4: .*prompts"),
         ("summary: Go", "sumary: Go", r", line 5: .*sumary"),
     ],
@@ -155,6 +163,18 @@ def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step() -> N
 
 
 # --- mistakes
+
+
+@pytest.mark.parametrize("worlds", [0, -3, 20_000])
+def test_worlds_are_from_1_to_10000(worlds: int) -> None:
+    with pytest.raises(UserError, match=f"worlds is {worlds}, but it must be from 1 to 10,000"):
+        trained_task("BringThing", 1, worlds=worlds)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "x"])
+def test_seeds_are_whole_numbers_from_0(seed: int) -> None:
+    with pytest.raises(UserError, match=r"the seed is .* whole number from 0"):
+        trained_task("BringThing", seed)
 
 
 def test_an_unknown_family_is_refused() -> None:

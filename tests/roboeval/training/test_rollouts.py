@@ -108,6 +108,12 @@ def test_prompts_are_the_same_each_time_and_splits_share_no_task() -> None:
     assert not tasks[0] & tasks[1] | tasks[1] & tasks[2] | tasks[0] & tasks[2]
 
 
+def test_phrasings_take_turns_in_any_choice_of_families() -> None:
+    rows = load_prompts(count=8, only=["BringThing"])
+    assert [row["prompt_index"] for row in rows] == [0, 1, 2, 3] * 2
+    assert {row["prompt_index"] for row in load_prompts(count=17 * 4)} == {0, 1, 2, 3}
+
+
 def test_a_prompt_as_messages_and_as_a_text() -> None:
     (chat,), (text,) = load_prompts(count=1), load_prompts(count=1, form="text")
     instruction = trained_task(chat["family"], chat["seed"]).prompts[chat["prompt_index"]]
@@ -128,14 +134,21 @@ def test_a_prompt_as_messages_and_as_a_text() -> None:
             ],
             "",
         ),
+        ([{"content": [{"type": "text", "text": "def task_program():\n    say('a')"}]}], ""),
         (
             "    say('a')\n\n\n# Instruction: say b\ndef task_program():\n    say('b')\n",
             "def task_program():\n",
         ),
     ],
 )
-def test_the_program_in_a_completion(completion: str | list[dict[str, str]], opening: str) -> None:
+def test_the_program_in_a_completion(completion: str | list[dict[str, Any]], opening: str) -> None:
     assert program_in(completion, opening).strip() == "def task_program():\n    say('a')"
+
+
+@pytest.mark.parametrize("completion", [[], [{"role": "assistant"}]])
+def test_a_completion_without_content_is_refused(completion: list[dict[str, Any]]) -> None:
+    with pytest.raises(UserError, match="a completion has no message with content"):
+        program_in(completion)
 
 
 @pytest.mark.parametrize(
@@ -143,6 +156,7 @@ def test_the_program_in_a_completion(completion: str | list[dict[str, str]], ope
     [
         ({"split": "exam"}, 'there is no split "exam"; there is train, validation and test'),
         ({"only": ["Fly"]}, 'there is no family "Fly"'),
+        ({"only": "BringThing"}, "the families .* list"),
         ({"count": 0}, "the number of prompts is 0, but it must be at least 1"),
         ({"seed": 1_000_000}, "the seed is 1000000, but with 1,000 prompts it must be from 0 to 999,999"),
     ],

@@ -15,7 +15,7 @@ from roboeval.training.prompts import Completion, Form, program_in
 from roboeval.training.prompts import load_prompts as rows_of
 from roboeval.training.rollouts import Components, Rollout, judge
 
-__all__ = ["load_prompts", "parses", "passed", "reward", "without_errors"]
+__all__ = ["load_prompts", "parses", "passed", "requirements", "reward", "without_errors"]
 
 
 def load_prompts(
@@ -45,6 +45,11 @@ def reward(completions: Sequence[Completion], **columns: Any) -> list[float]:  #
 def passed(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - the same
     """Whether each program passes: 1 or 0."""
     return [one.passed for one in _judged(completions, columns)]
+
+
+def requirements(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - the same
+    """The share of the requirements that hold, of which some hold if nothing is done."""
+    return [one.requirements for one in _judged(completions, columns)]
 
 
 def without_errors(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - the same
