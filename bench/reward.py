@@ -64,7 +64,9 @@ def measure_families() -> None:
     print(f"\r{ROLLOUTS:,} rollouts of the families at once, on {cores()} cores:")
     for workers, seconds in took.items():
         rate, ratio = 60 * ROLLOUTS / median(seconds), median(map(float.__truediv__, took[1], seconds))
-        print(f"  {workers} workers: {rate:,.0f} programs a minute, {ratio:.2f} times as many as with one")
+        print(
+            f"  {workers} workers: {rate:,.0f} programs a minute, {per_core(rate)}, {ratio:.2f} times one's"
+        )
 
 
 def rollout(row: dict[str, Any], name: str) -> Rollout:
@@ -73,6 +75,11 @@ def rollout(row: dict[str, Any], name: str) -> Rollout:
     programs = [task.solution, *(one.program for one in task.wrong)]
     program = f"{programs[row['seed'] % len(programs)]}\n# {name}\n"
     return Rollout(row["family"], row["seed"], row["prompt_index"], program)
+
+
+def per_core(rate: float) -> str:
+    """How many that are for each core."""
+    return f"{rate / cores():,.0f} for each of {cores()} cores"
 
 
 def measure(what: str, suite: Suite, given: Sequence[Completion], count: int) -> None:
@@ -87,7 +94,8 @@ def measure(what: str, suite: Suite, given: Sequence[Completion], count: int) ->
         for start in range(0, len(programs), BATCH):
             reward(task, 0, programs[start : start + BATCH], suite=suite)
     took = time.monotonic() - began
-    print(f"{suite.name}, {what}, {count:,} distinct ones: {60 * count / took:,.0f} programs a minute")
+    rate = 60 * count / took
+    print(f"{suite.name}, {what}, {count:,} distinct ones: {rate:,.0f} programs a minute, {per_core(rate)}")
     print(f"the first call, which starts the engine: {began - first:.2f} s")
     began = time.monotonic()
     for task, programs in written.items():
