@@ -11,7 +11,8 @@ import pytest
 
 from codebotler.checking.check import check, check_on
 from codebotler.simulator import isolated_process
-from codebotler.simulator.fork_server import BatchServer
+from codebotler.simulator.fork_server import BatchServer, ForkServer
+from codebotler.simulator.isolated_process import IsolatedProcess
 from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
 from codebotler.simulator.preparer import Preparer
 from codebotler.simulator.sandbox import BATCH_SERVER
@@ -34,13 +35,24 @@ def server_of(worker: Worker) -> BatchServer:
     return server
 
 
-def test_all_worlds_of_a_check_are_run_by_the_child_that_was_there(own_worker: Worker) -> None:
+def test_all_worlds_of_a_check_are_run_by_the_child_that_was_there(
+    own_worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ready = server_of(own_worker)._next
     assert ready is not None
+    forked: list[int] = []
+    fork = ForkServer.fork
+
+    def noted(server: ForkServer) -> IsolatedProcess:
+        child = fork(server)
+        forked.append(child.pid)
+        return child
+
+    monkeypatch.setattr(ForkServer, "fork", noted)
     check_on(own_worker, "def task_program():\n    if is_in_room('mug'): pick('mug')\n")
     after = server_of(own_worker)._next
     assert after is not None
-    assert after.pid == ready.pid + 1, "one fork, for the next check"
+    assert forked == [after.pid], "one fork, for the next check"
     assert are_gone({ready.pid})
 
 
