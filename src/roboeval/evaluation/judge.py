@@ -42,7 +42,7 @@ BUDGET = 60  # seconds of processor time that judging one program may take, in a
 MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 128  # results, and events of all runs of one
 
 
-class Remembered(Generic[Value]):
+class ResultCache(Generic[Value]):
     """Results for runs: many programs do the same in the same world, and in worlds that are alike."""
 
     def __init__(self) -> None:
@@ -64,8 +64,8 @@ class Remembered(Generic[Value]):
         return value
 
 
-MET: Remembered[tuple[bool, ...]] = Remembered()
-JUDGED: Remembered[tuple[bytes, ...]] = Remembered()
+MET: ResultCache[tuple[bool, ...]] = ResultCache()
+JUDGED: ResultCache[tuple[bytes, ...]] = ResultCache()
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:

@@ -14,7 +14,7 @@ from codebotler.rtl import holds
 from codebotler.rtl.formulas import Formula
 from codebotler.simulator.worker import EVENTS
 from roboeval.evaluation.failures import Verdict, failure
-from roboeval.evaluation.judge import LONGEST_REMEMBERED, Remembered, evaluate, judge
+from roboeval.evaluation.judge import LONGEST_REMEMBERED, ResultCache, evaluate, judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -250,7 +250,7 @@ HI = (Event("goto", "kitchen"), Event("say", "hi"))
 def tested(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
     """The traces on which a formula was tested, of which none is remembered."""
     traces: list[Trace] = []
-    monkeypatch.setattr("roboeval.evaluation.judge.MET", Remembered())
+    monkeypatch.setattr("roboeval.evaluation.judge.MET", ResultCache())
 
     def counted(formula: Formula, trace: Trace) -> bool:
         traces.append(trace)
