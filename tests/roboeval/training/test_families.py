@@ -103,6 +103,7 @@ def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
         ("spare: rooms", "spare: [$room]", ", line 3: a word holds one of"),
         ("[Go to the $room.,", "['{Go|Drive to the $room.',", ", line 7: write several words, of which"),
         ('go_to("$room")', 'go_to("$room"', ", line 11: this program is no Python: "),
+        ('go_to("$spare")', 'go_to("$spare"', ", line 16: this program is no Python: "),
         ("  prompts: [Go to the $room., Please go to the $room.]\n", "", r", line 4: .*prompts"),
         ("summary: Go", "sumary: Go", r", line 5: .*sumary"),
     ],
