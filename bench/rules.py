@@ -4,7 +4,8 @@ The rules are those of rules.yaml, of eight kinds. The programs are those that m
 CODEBOTLER_CORPUS names the corpus), the recorded and the reference programs, and MUTANTS of these, about
 2,000 by default. They run in all worlds of their tasks without rules, with each rule that concerns them (a
 mutant with every fourth of these), and with all rules at once. Without the corpus, mutants are left out. What
-breaks a rule is found by `holds`, on each prefix of the run without rules. PART=10 takes every tenth program.
+breaks a rule is found by `holds`, on each prefix of the run without rules. Further worlds help to tell whether
+a program breaks one at all: the same rooms, with what is in them in `plus`. PART=10 takes every tenth program.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.mutation.mutants import drawn, mutants, originals
 from roboeval.mutation.operator import Context
-from roboeval.suites.load import Suite, load_suite
+from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import solutions
 
 WORKERS = int(os.environ.get("WORKERS", "2"))
@@ -148,6 +149,24 @@ def tests_of(formula: Formula) -> Iterator[Test]:
 # --- what is true
 
 
+def further_worlds(task: Task, plus: Suite) -> list[World]:
+    """The rooms of a task with what is in them in the suite `plus`; none if it has other rooms there."""
+    rooms = rooms_of(task.scenarios[0].world)
+    drawn = [{room.name: room for room in one.world.rooms} for one in plus.tasks[task.name].scenarios]
+    start = task.scenarios[0].world.robot
+    return [World(tuple(there[name] for name in rooms), start) for there in drawn if set(rooms) <= set(there)]
+
+
+def rooms_of(world: World) -> list[str]:
+    """The names of its rooms."""
+    return [room.name for room in world.rooms]
+
+
+def all_seen(outcomes: Sequence[Outcome], worlds: Sequence[World]) -> list[Trace]:
+    """What a program does in each world, as rules are about it."""
+    return [seen(one.trace, rooms_of(world)) for one, world in zip(outcomes, worlds, strict=True)]
+
+
 def seen(trace: Trace, rooms: Sequence[str]) -> Trace:
     """A trace as rules are about it: a drive has the room that it reached, and knows which it may mean."""
     return tuple(driven(event, rooms) if event.kind == "goto" else event for event in trace)
@@ -202,11 +221,13 @@ class Truth:
     Args:
         outcomes: how it ends in each world of its task.
         traces: what it does there, as rules are about it.
-        passed: whether it is right in all of them.
+        further: what it does in further worlds that its task may have.
+        passed: whether it is right in all of its task.
     """
 
     outcomes: Sequence[Outcome]
     traces: Sequence[Trace]
+    further: Sequence[Trace]
     passed: bool
 
 
@@ -255,6 +276,7 @@ class Effect:
         source: the program.
         house: the name of the rules.
         broken: in how many worlds it breaks them.
+        breaks: whether it breaks them in some world, a further one or not.
         foreseeable: in how many of these that is certain before the event that does so.
         executed: in how many worlds a foreseeable violation is executed in spite of the rules.
         unseen: in how many worlds an unforeseeable one does not end the run.
@@ -269,6 +291,7 @@ class Effect:
     source: Source
     house: str
     broken: int = 0
+    breaks: bool = False
     foreseeable: int = 0
     executed: int = 0
     unseen: int = 0
@@ -285,7 +308,9 @@ class Measuring:
 
     def __init__(self) -> None:
         self.suite, self.houses, self.worker = load_suite(), houses(), Worker()
+        plus = load_suite("plus")
         self.numbers = {house.name: number for number, house in enumerate(self.houses)}
+        self.further = {name: further_worlds(task, plus) for name, task in self.suite.tasks.items()}
         self.breaking = lru_cache(MOST_REMEMBERED)(self._breaking)  # many programs do the same
 
     def effects(self, sources: Sequence[Source], mutants: frozenset[Source]) -> list[Effect]:
@@ -293,7 +318,7 @@ class Measuring:
         truths = [self.truth(source) for source in sources]
         found: list[Effect] = []
         for source, truth in zip(sources, truths, strict=True):
-            events = set(chain.from_iterable(truth.traces))
+            events = set(chain.from_iterable([*truth.traces, *truth.further]))
             concerned = [one for one in self.houses if one.concerns(events) and one.kind != ALL]
             if source in mutants:
                 concerned = concerned[digest(*source)[0] % SOME_OF :: SOME_OF]
@@ -313,17 +338,13 @@ class Measuring:
         each = ((self.breaking(n, key, trace), self.houses[n].rules[0]) for n in numbers)
         return min(((at, rule) for at, rule in each if at is not None), key=lambda one: one[0], default=None)
 
-    def robots(self, task: str) -> list[partial[SimulatedRobot]]:
-        """What makes the robots of the worlds of a task."""
-        return [
-            partial(SimulatedRobot, one.world, self.suite.rules) for one in self.suite.tasks[task].scenarios
-        ]
+    def robots(self, worlds: Sequence[World]) -> list[partial[SimulatedRobot]]:
+        """What makes the robots of some worlds."""
+        return [partial(SimulatedRobot, world, self.suite.rules) for world in worlds]
 
-    def seen(self, task: str, outcomes: Sequence[Outcome]) -> list[Trace]:
-        """What a program does in each world of a task, as rules are about it."""
-        scenarios = self.suite.tasks[task].scenarios
-        rooms = [[room.name for room in scenario.world.rooms] for scenario in scenarios]
-        return [seen(one.trace, here) for one, here in zip(outcomes, rooms, strict=True)]
+    def worlds(self, task: str) -> list[World]:
+        """The worlds of a task."""
+        return [scenario.world for scenario in self.suite.tasks[task].scenarios]
 
     def passed(self, task: str, outcomes: Sequence[Outcome]) -> bool:
         """Whether a program is right in all worlds."""
@@ -334,13 +355,16 @@ class Measuring:
     def truth(self, source: Source) -> Truth:
         """What a program does without rules."""
         task, program = source
-        (outcomes,) = self.worker.run_all([(program, self.robots(task))])
-        return Truth(outcomes, self.seen(task, outcomes), self.passed(task, outcomes))
+        worlds = [*self.worlds(task), *self.further[task]]
+        (outcomes,) = self.worker.run_all([(program, self.robots(worlds))])
+        traces = all_seen(outcomes, worlds)
+        own = len(self.worlds(task))
+        return Truth(outcomes[:own], traces[:own], traces[own:], self.passed(task, outcomes[:own]))
 
     def guarded(self, source: Source, truth: Truth, concerned: Sequence[House]) -> list[Effect]:
         """What a program does with rules, in all worlds of its task."""
         task, program = source
-        makers = self.robots(task)
+        makers = self.robots(self.worlds(task))
         guards: dict[tuple[int, int], WatchedGuard] = {}
 
         def new_robot(number: int, world: int) -> SimulatedRobot:
@@ -357,9 +381,11 @@ class Measuring:
         for number, house in enumerate(concerned):
             ended = outcomes[number * len(makers) : (number + 1) * len(makers)]
             effect = Effect(source, house.name, passed=(truth.passed, self.passed(task, ended)))
-            for world, trace in enumerate(self.seen(task, ended)):
+            for world, trace in enumerate(all_seen(ended, self.worlds(task))):
                 run = GuardedRun(ended[world], trace, guards[number, world].refused)
                 self.compare(effect, house, truth, world, run)
+            further = (self.first_break(house, trace) for trace in truth.further)
+            effect.breaks = effect.broken > 0 or any(at is not None for at in further)
             found.append(effect)
         return found
 
@@ -384,22 +410,18 @@ class Measuring:
         stopped_at = end - 1 if run.refused is None else end
         if run.trace == free[:end] and without is not None and without[0] == stopped_at:
             return
-        rooms = [room.name for room in self.worlds(effect)[world].rooms]
+        rooms = rooms_of(self.worlds(effect.source[0])[world])
         follows = truth.outcomes[world].trace[end : end + 1]
         if run.trace == free[:end] and run.refused is not None and would_fail(run.refused, follows, rooms):
             effect.failing += 1
         else:
             effect.altered += 1
 
-    def worlds(self, effect: Effect) -> list[World]:
-        """The worlds of a program's task."""
-        return [scenario.world for scenario in self.suite.tasks[effect.source[0]].scenarios]
-
     # --- the check before
 
     def check(self, effects: Sequence[Effect], house: House) -> None:
         """Check programs by rules, in sampled worlds."""
-        plans = [RoomMap.of(self.worlds(effect)[0]) for effect in effects]
+        plans = [RoomMap.of(self.worlds(effect.source[0])[0]) for effect in effects]
         works = [(effect.source[1], plan) for effect, plan in zip(effects, plans, strict=True)]
         settings = CheckSettings(house_rules=house.rules)
         for effect, plan, found in zip(effects, plans, checks_on(self.worker, works, settings), strict=True):
@@ -538,8 +560,8 @@ def share(some: Sequence[bool]) -> str:
 
 def row(name: str, effects: Sequence[Effect]) -> str:
     """What rules of a kind do."""
-    broken = [effect for effect in effects if effect.broken]
-    kept = [effect for effect in effects if not effect.broken]
+    broken = [effect for effect in effects if effect.breaks]
+    kept = [effect for effect in effects if not effect.breaks]
     sums = [
         len(effects),
         len(broken),
@@ -556,8 +578,9 @@ HEAD = (
     f"{'altered':>8}{'failing':>8}{'right, keep':>15}{'right, break':>15}"
 )
 LEGEND = """
-programs: that a rule concerns, once for each rule; break: those that break it in some world
-runs: that break a rule where nothing stops them; certain: of which the event that does so was certain to
+programs: that a rule concerns, once for each rule; break: those that break it in some world, or a further one
+runs: that break a rule in the worlds of their task, where nothing stops them
+certain: of which the event that does so was certain to
 done: certain violations in spite of rules; unseen: others that do not end the run
 altered: runs kept from what would have broken nothing; failing: kept from what would have failed
 right: programs that do their task, without > with rules, of those that keep the rule and those that break it
@@ -577,24 +600,24 @@ def report(effects: Sequence[Effect], kinds: dict[str, str]) -> list[tuple[str, 
     print(LEGEND)
     print(f"{'kind':12}{'break it: rejected before':>28}{'by a rule':>28}{'break none: by a rule':>28}")
     for kind, some in groups.items():
-        broken, kept = [one for one in some if one.broken], [one for one in some if not one.broken]
+        broken, kept = [one for one in some if one.breaks], [one for one in some if not one.breaks]
         said = (
             [one.rejected for one in broken],
             *([one.reason is not None for one in s] for s in (broken, kept)),
         )
         print(f"{kind:12}" + "".join(f"{share(each):>28}" for each in said))
     report_rules(single)
-    missed = [one for one in single if one.broken and not one.rejected]
-    blamed = [one for one in single if not one.broken and one.reason is not None]
+    missed = [one for one in single if one.breaks and not one.rejected]
+    blamed = [one for one in single if not one.breaks and one.reason is not None]
     report_examples("break a rule, and are not rejected", missed)
     report_examples("break none, and are rejected", blamed)
-    caught = [not one.executed and not one.unseen for one in missed]
-    print(f"  missed by the check, and caught by the guard: {share(caught)}")
+    caught = [not one.executed and not one.unseen for one in missed if one.broken]
+    print(f"  missed by the check, and caught by the guard in worlds of their task: {share(caught)}")
     true = [one.is_true for one in effects if one.reason is not None]
     print(f"  rejected by a rule, and broken in that sampled world: {share(true)}")
     right = [one for one in effects if not one.broken]
-    rejected = statistics.fmean(one.rejected for one in single if one.broken)
-    lost = statistics.fmean(one.reason is not None for one in single if not one.broken)
+    rejected = statistics.fmean(one.rejected for one in single if one.breaks)
+    lost = statistics.fmean(one.reason is not None for one in single if not one.breaks)
     return [
         ("certain violations with rules: 0", not any(one.executed for one in effects)),
         ("others end the run at once", not any(one.unseen for one in effects)),
@@ -616,7 +639,7 @@ def report_rules(effects: Sequence[Effect]) -> None:
     """Print how many of the programs that a rule concerns break it."""
     print("\nrules, and the programs that break them, of those that they concern")
     for name in dict.fromkeys(house.name for house in houses()[:-1]):
-        broken = [one.broken > 0 for one in effects if one.house == name]
+        broken = [one.breaks for one in effects if one.house == name]
         print(f"  {name:32}{share(broken)}")
 
 

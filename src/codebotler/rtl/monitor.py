@@ -31,11 +31,11 @@ class Monitor:
 
     def __init__(self, formula: formulas.Formula, events: Iterable[Event] | None = None) -> None:
         self.formula = formula
-        self._machine = _Machine.of(formula)
-        self._state: Any = self._machine.start
-        self.holds = self._machine.accepts(self._state)
+        self._machine = machine = _Machine.of(formula)
+        self._state: Any = machine.start
+        self.holds = machine.accepts(self._state)
         self._seen = 0
-        letters = None if events is None else [self._machine.letter(self._mask(event)) for event in events]
+        letters = None if events is None else [machine.letter(machine.mask(event, 0)) for event in events]
         self._future = None if letters is None else _Future.of(formula, letters)
 
     @property
@@ -50,7 +50,7 @@ class Monitor:
             Inconclusive: an option is no text; the event does not count.
             ValueError: the event is not one of `events`; it does not count.
         """
-        mask = self._mask(event)
+        mask = self._machine.mask(event, self._seen)
         if self._future is not None:
             self._future.step(self._machine.letter(mask))
         self._state, self.holds = self._machine.step(self._state, mask)
@@ -59,10 +59,8 @@ class Monitor:
 
     def would_hold(self, event: Event) -> bool:
         """Whether the formula would hold if this came next; Inconclusive if an option of it is no text."""
-        return self._machine.step(self._state, self._mask(event))[1]
-
-    def _mask(self, event: Event) -> int:
-        return self._machine.mask(event, self._seen)
+        machine = self._machine
+        return machine.step(self._state, machine.mask(event, self._seen))[1]
 
 
 class _Machine:
