@@ -4,8 +4,8 @@ The rules are those of rules.yaml, of eight kinds. The programs are those that m
 CODEBOTLER_CORPUS names the corpus), the recorded and the reference programs, and MUTANTS of these, about
 2,000 by default. They run in all worlds of their tasks without rules, with each rule that concerns them (a
 mutant with every fourth of these), and with all rules at once. Without the corpus, mutants are left out. What
-breaks a rule is found by `holds`, on each prefix of the run without rules. Further worlds help to tell whether
-a program breaks one at all: the same rooms, with what is in them in `plus`. PART=10 takes every tenth program.
+breaks a rule is found by `holds`, on each prefix of the run without rules. Further worlds help to tell if a
+program breaks one at all: the same rooms, with what is in them in `plus`. PART=10 takes every tenth program.
 """
 
 from __future__ import annotations
