@@ -25,7 +25,7 @@ UNDECIDED = (
     'make a rule of each part that is joined by "and"'
 )
 DETECTED = (
-    "it depends on what a look finds or a person answers, so it can only be noticed: "
+    "it can be broken by what a look finds or a person answers, which can only be noticed: "
     "the mission stops right after that"
 )
 OTHER = "something else"  # an answer that rules do not name
@@ -61,18 +61,31 @@ def _review(rule: Rule, world: World | None) -> Review:
         return Review(rule, None, None, (*warnings, UNDECIDED))
     if breaks is None:
         warnings.append(NEVER_BROKEN)
-    elif rule.when == "always" and _is_by_result(rule, breaks):
+    elif rule.when == "always" and any(_is_by_result(rule, one) for one in _breaks(rule, breaks, world)):
         warnings.append(DETECTED)
     if keeps is None:
         warnings.append(ALWAYS_BROKEN if rule.when == "always" else IMPOSSIBLE)
     return Review(rule, keeps, breaks, tuple(warnings))
 
 
+def _breaks(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
+    """Traces that break a rule: a shortest one, and such that end with a result of which it speaks."""
+    yield shortest
+    for element in dict.fromkeys(elements(rule.formula)):
+        if element.found is not None or element.answer is not None:
+            trace = _trace([Not(rule.formula), Last(element)], [], world)
+            if trace is not None:
+                yield trace
+
+
 def _is_by_result(rule: Rule, breaks: Trace) -> bool:
-    """Whether the last step would not break a rule if it turned out otherwise."""
+    """Whether the last step is what breaks a rule, and would not if it turned out otherwise."""
     guard = RuleGuard([rule])
-    for event in breaks[:-1]:
-        guard.happened(event)
+    try:
+        for event in breaks[:-1]:
+            guard.happened(event)
+    except RuleViolationError:
+        return False
     last = breaks[-1]
     if last.answer is not None:  # a question always has another option
         last = replace(last, options=(*last.options, Option(last.answer), Option(OTHER)))

@@ -51,32 +51,47 @@ def _rule(one: Review) -> Iterator[RenderableType]:
     for title, style, trace in (("keeps it", "green", one.keeps), ("breaks it", "red", one.breaks)):
         if trace is not None:
             yield Text(f"  {title}", style)
-            yield Padding(_steps(trace), (0, 0, 0, 4))
+            yield Padding(steps_view(trace), (0, 0, 0, 4))
     for warning in one.warnings:
         yield Text(f"  note: {warning}", "yellow")
 
 
-def _steps(trace: Trace) -> RenderableType:
+def steps_view(trace: Trace) -> RenderableType:
+    """The steps of an example, numbered."""
     table = grid("right", "left")
     if not trace:
         table.add_row(Text(), Text("the robot does nothing", "dim"))
+    here = ""
     for number, event in enumerate(trace, 1):
-        table.add_row(Text(str(number), "dim"), Text(step_sentence(event)))
+        table.add_row(Text(str(number), "dim"), Text(step_sentence(event, here)))
+        here = event.text if is_drive(event) else event.place
     return table
 
 
-def step_sentence(event: Event) -> str:
-    """A step of an example, with all that a rule may speak of; any text will do where it is made up."""
-    row, verb = by_event(event.kind), verb_of(event.kind)
-    is_drive = row is not None and row.recording is not None and row.recording.is_drive
-    made_up = "another room" if is_drive else "something"
+def is_drive(event: Event) -> bool:
+    """Whether an event takes the robot to another room."""
+    row = by_event(event.kind)
+    return row is not None and row.recording is not None and row.recording.is_drive
+
+
+def step_sentence(event: Event, here: str = "") -> str:
+    """A step of an example, with all that a rule may speak of; any text will do where it is made up.
+
+    Args:
+        event: the step.
+        here: the room that the steps before it tell; a drive from another one says so.
+    """
+    verb, drives = verb_of(event.kind), is_drive(event)
+    made_up = "another room" if drives else "something"
     quote = "" if verb.object else '"'
     given = [made_up if t in MADE_UP else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
     told = [done_with(event.kind, verb.third, given, "")]
     offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
     told += [f"offering {listed(offered)}"] if offered else []
     told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []
-    told += [f"in {visible(event.place)}"] if event.place not in MADE_UP and not is_drive else []
+    where = "from" if drives else "in"
+    is_told = event.place in MADE_UP or (drives and event.place == here)
+    told += [] if is_told else [f"{where} {visible(event.place)}"]
     held = "something" if event.holding in MADE_UP else f'"{visible(event.holding)}"'
     told += [f"holding {held}"] if event.holding else []
     if event.found is not None:

@@ -162,11 +162,16 @@ def with_options_of(called: Callable[..., object]) -> Callable[[Command], Comman
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
     """Read a suite by name or folder, files of further skills, and the rules of a house."""
+    from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from roboeval.suites.house import HouseRules
     from roboeval.suites.load import load_suite
 
     read = load_suite(suite, skills=skills_from(*(skills or ())))
+    if rules is not None and read.house is not None:
+        raise UserError(
+            f'the suite "{read.name}" has house rules of its own, which would not count; leave out --rules'
+        )
     return read if rules is None else read.with_house_rules(HouseRules.read(rules, read.skills))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from rich.console import Console
 
 from codebotler.checking.rule_review import (
     ALWAYS_BROKEN,
@@ -11,8 +12,8 @@ from codebotler.checking.rule_review import (
     NEVER_BROKEN,
     reviewed,
 )
-from codebotler.cli.rules import step_sentence
-from codebotler.core.trace import Event, Option
+from codebotler.cli.rules import step_sentence, steps_view
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Monitor, holds, parse
 from codebotler.simulator.rule_guard import Rule
@@ -106,6 +107,7 @@ def test_examples_of_a_world_are_of_its_rooms() -> None:
         ('tr.Exists(goto("hall")) and not tr.Exists(goto("hall"))', "finally", IMPOSSIBLE),
         ('not tr.Exists(missed("glass"))', "always", DETECTED),
         ('not tr.Exists(answered("yes"))', "always", DETECTED),
+        ('not tr.Exists(found("mug")) or not tr.Exists(goto("kitchen"))', "always", DETECTED),
     ],
 )
 def test_an_odd_rule_is_told(text: str, when: str, warning: str) -> None:
@@ -117,6 +119,27 @@ def test_an_odd_rule_is_told(text: str, when: str, warning: str) -> None:
 def test_what_is_prevented_is_not_said_to_be_noticed_only(text: str) -> None:
     (review,) = reviewed(rules(text))
     assert review.warnings == ()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'not tr.Exists(at("kitchen", holding("glass", goto(without("kitchen")))))',
+        'not tr.Last(goto("lab 2")) or tr.Exists(at("lab 1", goto(".*")))',
+    ],
+)
+def test_examples_tell_from_where_a_drive_starts_if_that_decides(text: str) -> None:
+    (review,) = reviewed(rules(text))
+    assert review.keeps
+    assert review.breaks
+    assert steps(review.keeps) != steps(review.breaks)
+
+
+def steps(trace: Trace) -> str:
+    shown = Console(width=200)
+    with shown.capture() as captured:
+        shown.print(steps_view(trace))
+    return captured.get()
 
 
 def test_a_name_that_the_world_lacks_is_told() -> None:

@@ -87,3 +87,10 @@ def test_rules_are_read_before_anything_is_judged(folder: Path) -> None:
     (folder / "My Rules.yaml").write_text(RULES)
     told = refused("evaluate", "recorded:careful", "--rules", "My Rules.yaml", cwd=folder)
     assert "small letters" in told.sentence
+
+
+def test_a_suite_with_rules_of_its_own_takes_no_others(folder: Path) -> None:
+    hasty = ("evaluate", "recorded:hasty", "--suite", "rules", "--out", "run")
+    told = refused(*hasty, "--rules", "house.yaml", cwd=folder)
+    assert "has house rules of its own, which would not count; leave out --rules" in str(told)
+    assert not (folder / "run").exists()
