@@ -14,7 +14,7 @@ from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, room_told
+from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, aliases, names_of
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -142,10 +142,11 @@ class LiveRobot:
 
     def _judge(self, guard: RuleGuard, event: Event) -> None:
         """Refuse what a rule forbids, in whichever room it would happen; the robot is not told."""
-        seen = self._seen_from(event)
-        rooms = [event.text, *(self._meant(event.text) if event.kind == "goto" else ())]
+        rooms = self._meant(event.text) if event.kind == "goto" else []
+        possible = [(event.text,), *(names_of(room, event.text) for room in rooms if room != event.text)]
+        places = self._room_names(event.place)
         try:
-            guard.judge(*(replace(seen, text=room) for room in rooms))
+            guard.judge(*(aliases(event, names, places) for names in possible))
         except RuleViolationError as broken:
             self._end_by(broken)
             raise
@@ -155,7 +156,8 @@ class LiveRobot:
         if self._guard is None:
             return
         try:
-            self._guard.happened(self._seen_from(event))
+            names = self._room_names(event.text) if event.kind == "goto" else (event.text,)
+            self._guard.happened(*aliases(event, names, self._room_names(event.place)))
         except RuleViolationError as broken:
             self._end_by(broken)
             raise
@@ -179,15 +181,10 @@ class LiveRobot:
     def _meant(self, request: str) -> list[str]:
         return [] if self._room_map is None else self._room_map.rooms_meant(request)
 
-    def _room(self, request: str) -> str:
-        """The room to which a request leads, as rules see it: by its name if that is known."""
+    def _room_names(self, request: str) -> Sequence[str]:
+        """The names of the room to which a request leads, as rules see it."""
         known = None if self._room_map is None or not request else self._room_map.room(request)
-        return room_told(known, request) if known else request
-
-    def _seen_from(self, event: Event) -> Event:
-        """An event as rules see it: rooms by the names that the robot knows them by."""
-        text = self._room(event.text) if event.kind == "goto" else event.text
-        return replace(event, text=text, place=self._room(event.place))
+        return names_of(known, request) if known else (request,)
 
     def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, logged."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -35,7 +35,7 @@ class Monitor:
         self._state: Any = machine.start
         self.holds = machine.accepts(self._state)
         self._seen = 0
-        letters = None if events is None else [machine.letter(machine.mask(event, 0)) for event in events]
+        letters = None if events is None else [machine.letter(machine.mask((event,), 0)) for event in events]
         self._future = None if letters is None else _Future.of(formula, letters)
 
     @property
@@ -43,24 +43,30 @@ class Monitor:
         """Whether no events can change that; None if `events` are not given, or it would take too long."""
         return None if self._future is None else self._future.is_final
 
-    def feed(self, event: Event) -> bool:
+    def feed(self, event: Event, *aliases: Event) -> bool:
         """Take the next event, and return whether the formula holds now.
+
+        Args:
+            event: what has happened.
+            aliases: the same by other names, such as those of a room; it matches as what any of them does.
 
         Raises:
             Inconclusive: an option is no text; the event does not count.
             ValueError: the event is not one of `events`; it does not count.
         """
-        mask = self._machine.mask(event, self._seen)
+        mask = self._machine.mask((event, *aliases), self._seen)
         if self._future is not None:
             self._future.step(self._machine.letter(mask))
-        self._state, self.holds = self._machine.step(self._state, mask)
+        known = self._machine.steps.get((self._state, mask))
+        self._state, self.holds = known or self._machine.step(self._state, mask)
         self._seen += 1
         return self.holds
 
-    def would_hold(self, event: Event) -> bool:
+    def would_hold(self, event: Event, *aliases: Event) -> bool:
         """Whether the formula would hold if this came next; Inconclusive if an option of it is no text."""
         machine = self._machine
-        return machine.step(self._state, machine.mask(event, self._seen))[1]
+        mask = machine.mask((event, *aliases), self._seen)
+        return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
 
 
 class _Machine:
@@ -76,7 +82,7 @@ class _Machine:
             self._by_kind.setdefault(element.kind, []).append((1 << bit, element))
         self._machine = machine_of(formula)
         self.start, self.accepts = self._machine.start, self._machine.accepts
-        self._steps: dict[tuple[Any, int], tuple[Any, bool]] = {}
+        self.steps: dict[tuple[Any, int], tuple[Any, bool]] = {}
 
     @classmethod
     @lru_cache(maxsize=256)
@@ -84,12 +90,16 @@ class _Machine:
         """That of a formula."""
         return cls(formula)
 
-    def mask(self, event: Event, at: int) -> int:
-        """The letter of an event."""
+    def mask(self, aliases: Sequence[Event], at: int) -> int:
+        """The letter of an event, by all its names."""
+        wanted = self._by_kind.get(aliases[0].kind)
+        if wanted is None:  # which is so for most rules and events
+            return 0
         found = 0
-        for bit, element in self._by_kind.get(event.kind, ()):
-            if is_match(element, event, at):
-                found |= bit
+        for bit, element in wanted:
+            for event in aliases:
+                if is_match(element, event, at):
+                    found |= bit
         return found
 
     def letter(self, mask: int) -> Letter:
@@ -98,13 +108,11 @@ class _Machine:
 
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
         """The state after a letter, and whether the formula holds there."""
-        known = self._steps.get((state, mask))
-        if known is None:
-            after = self._machine.step(state, self.letter(mask))
-            known = after, self._machine.accepts(after)
-            if len(self._steps) < MOST_STEPS:
-                self._steps[state, mask] = known
-        return known
+        after = self._machine.step(state, self.letter(mask))
+        found = after, self._machine.accepts(after)
+        if len(self.steps) < MOST_STEPS:
+            self.steps[state, mask] = found
+        return found
 
 
 class _Future:

@@ -15,6 +15,8 @@ from codebotler.rtl.wording import event_words
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 
 Verdict: TypeAlias = Literal["forbids", "cannot judge", "is broken by"]
+Aliases: TypeAlias = tuple[Event, ...]
+"""One event, by each of the names that its rooms and things go by."""
 
 
 @dataclass(frozen=True)
@@ -88,46 +90,56 @@ class RuleGuard:
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
         """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
         row, before = robot.skills[skill], len(robot.events)
-        place = room_told(robot.room, self._came)
-        attempt = attempted(row, arguments, place=place, time=robot.now, holding=robot.held or "")
+        places = names_of(robot.room, self._came)
+        attempt = attempted(row, arguments, place=robot.room, time=robot.now, holding=robot.held or "")
         if attempt is None:
             return robot.execute(skill, arguments)
         is_drive = row.recording is not None and row.recording.is_drive
-        self.judge(*_attempts(robot, attempt, arguments, is_drive=is_drive))
+        possible = _possible_names(robot, attempt, arguments, is_drive=is_drive)
+        self.judge(*(aliases(attempt, names, places) for names in possible))
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
             for event in robot.events[before:]:
-                self.happened(_seen(event, event.text, place))
+                self.happened(*aliases(event, (event.text,), places))
             raise
         if is_drive:
             self._came = attempt.text
         for event in robot.events[before:]:
-            reached = room_told(robot.room, self._came) if is_drive else event.text
-            self.happened(_seen(event, reached, place))
+            what = robot.room if is_drive else event.text
+            names = names_of(what, attempt.text) if event.kind == attempt.kind else (what,)
+            self.happened(*aliases(event, names, places))
         return result
 
-    def judge(self, *attempts: Event) -> None:
+    def judge(self, *attempts: Aliases) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
         caught: RuleViolationError | None = None
         for rule, monitor, depends in self._always:
             for attempt in attempts:
-                events = _results(rule, attempt) if attempt.kind in depends else (attempt,)
-                if not any([_would_hold(monitor, event) for event in events]):  # noqa: C419 - quicker
+                if attempt[0].kind in depends:
+                    can_hold = any(_would_hold(monitor, event) for event in _results(rule, attempt))
+                else:
+                    can_hold = _would_hold(monitor, attempt)
+                if not can_hold:
                     unclear = _is_unclear(monitor, attempt)
-                    broken = RuleViolationError(rule, attempt, "cannot judge" if unclear else "forbids")
+                    broken = RuleViolationError(rule, attempt[0], "cannot judge" if unclear else "forbids")
                     if broken.ends_run:
                         raise broken
                     caught = caught or broken  # another rule may end the run
         if caught is not None:
             raise caught
 
-    def happened(self, event: Event) -> None:
-        """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
+    def happened(self, event: Event, *others: Event) -> None:
+        """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee.
+
+        Args:
+            event: what has happened.
+            others: the same by other names.
+        """
         late: RuleViolationError | None = None
         for rule, monitor, _ in (*self._always, *self._finally):
             try:
-                holds = monitor.feed(event)
+                holds = monitor.feed(event, *others)
             except Inconclusive:
                 self._unjudged.add(rule.name)
                 holds = False
@@ -144,28 +156,29 @@ class RuleGuard:
         return None
 
 
-def _attempts(
+def _possible_names(
     robot: SimulatedRobot, attempt: Event, arguments: Sequence[Argument], *, is_drive: bool
-) -> Iterator[Event]:
-    """An attempt, and the same with the other rooms or things that it may mean, outer spaces or not."""
-    yield attempt
-    names: list[str] = []
+) -> Iterator[Sequence[str]]:
+    """The words of a request, and the names of each room or thing that it may mean, outer spaces or not."""
+    yield (attempt.text,)
+    meant: list[str] = []
     for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
-        names += robot.meant_rooms(request) if is_drive else _moved(robot, attempt.kind, request)
-    for name in dict.fromkeys(names):
+        meant += robot.meant_rooms(request) if is_drive else _moved(robot, attempt.kind, request)
+    for name in dict.fromkeys(meant):
         if name != attempt.text:
-            yield replace(attempt, text=name)
+            yield names_of(name, attempt.text)
 
 
-def _seen(event: Event, text: str, place: str) -> Event:
-    """An event as rules see it."""
-    is_so = event.text == text and event.place == place
-    return event if is_so else replace(event, text=text, place=place)
+def names_of(name: str, request: str) -> Sequence[str]:
+    """The names of a room or thing: its own, and the words that asked for it where its own is a regex."""
+    return (name,) if not request or name.casefold() in request.casefold() else (name, request)
 
 
-def room_told(room: str, request: str) -> str:
-    """A room as rules see it: by its name, and by the words of the drive to it where the name is a regex."""
-    return room if not request or room.casefold() in request.casefold() else f"{room}\n{request}"
+def aliases(event: Event, names: Sequence[str], places: Sequence[str]) -> Aliases:
+    """An event by each of the names of what it is about, and of the room where it happens."""
+    if len(names) == len(places) == 1 and event.text == names[0] and event.place == places[0]:
+        return (event,)
+    return tuple(replace(event, text=name, place=place) for name in names for place in places)
 
 
 def _moved(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
@@ -178,18 +191,18 @@ def _moved(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
     return [thing.label for thing in here if thing.is_meant_by(request, robot.rules.matching)][:1]
 
 
-def _is_unclear(monitor: Monitor, event: Event) -> bool:
+def _is_unclear(monitor: Monitor, event: Aliases) -> bool:
     """Whether an event cannot be judged, since it has options that are no text."""
     try:
-        monitor.would_hold(event)
+        monitor.would_hold(*event)
     except Inconclusive:
         return True
     return False
 
 
-def _would_hold(monitor: Monitor, event: Event) -> bool:
+def _would_hold(monitor: Monitor, event: Aliases) -> bool:
     try:
-        return monitor.would_hold(event)
+        return monitor.would_hold(*event)
     except Inconclusive:
         return False
 
@@ -208,11 +221,12 @@ def _results_of(rule: Rule) -> tuple[frozenset[str], frozenset[str]]:
     return found, frozenset(one.kind for one in wanted if one.answer is not None)
 
 
-def _results(rule: Rule, attempt: Event) -> Sequence[Event]:
+def _results(rule: Rule, attempt: Aliases) -> Sequence[Aliases]:
     """An event as it may turn out, as far as a rule tells that apart."""
     found, answered = _results_of(rule)
-    if attempt.kind in found:
-        return [replace(attempt, found=True), replace(attempt, found=False)]
-    if attempt.kind in answered and attempt.options:
-        return [replace(attempt, answer=option.text) for option in attempt.options]
+    kind, options = attempt[0].kind, attempt[0].options
+    if kind in found:
+        return [tuple(replace(one, found=is_found) for one in attempt) for is_found in (True, False)]
+    if kind in answered and options:
+        return [tuple(replace(one, answer=option.text) for one in attempt) for option in options]
     return (attempt,)

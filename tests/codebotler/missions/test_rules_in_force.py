@@ -170,8 +170,18 @@ def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: 
     assert (mission.state, robot.done) == (State.DONE, ["acme inc"])
 
 
-def test_a_room_whose_name_is_a_regex_counts_by_the_words_of_the_request_too(tmp_path: Path) -> None:
-    rule = Rule("lab", "Take nothing in lab 3.", parse('not tr.Exists(at("lab 3", pick(".*")))'))
+@pytest.mark.parametrize(
+    "formula",
+    [
+        'not tr.Exists(at("lab 3", pick(".*")))',
+        'not tr.Exists(at("^lab 3$", pick(".*")))',
+        'not tr.OnlyAfterLast(goto("^lab 3$")).Exists(pick(".*"))',
+    ],
+)
+def test_a_room_whose_name_is_a_regex_counts_by_the_words_of_the_request_too(
+    tmp_path: Path, formula: str
+) -> None:
+    rule = Rule("lab", "Take nothing in lab 3.", parse(formula))
     program = "def task_program():\n    go_to('lab {}')\n    pick('knife')\n"
     for number, state in ((3, State.STOPPED), (4, State.DONE)):
         mission, _ = ran(tmp_path / str(number), answering(), program.format(number), [rule], REGEXES)

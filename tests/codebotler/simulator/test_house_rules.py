@@ -137,13 +137,36 @@ def test_a_room_whose_name_is_a_regex_counts_by_all_words_that_were_used() -> No
     assert not refused(guarded('not tr.Exists(goto("acme inc[.]"))'), "go_to", "acme inc ").is_late
     for formula in (
         'not tr.Exists(at("lab 3", pick(".*")))',
+        'not tr.Exists(at("^lab 3$", pick(".*")))',
         'not tr.OnlyAfterLast(goto("lab 3")).Exists(pick(".*"))',
+        'not tr.OnlyAfterLast(goto("^lab 3$")).Exists(pick(".*"))',
     ):
         three, four = guarded(formula), guarded(formula)
         three.perform("go_to", ["lab 3"])
         assert not refused(three, "pick", "knife").is_late
         four.perform("go_to", ["lab 4"])
         four.perform("pick", ["knife"])
+
+
+def test_all_names_of_a_room_are_those_of_one_room() -> None:
+    world = World((Room("hall"), Room("lab [0-9]")), "hall")
+    after = rule('not tr.Last(say("done")) or tr.Exists(goto("^lab 3$")) and tr.Exists(goto("0-9"))')
+    for number, may in ((3, True), (4, False)):
+        one = SimulatedRobot(world, AS_WRITTEN, guard=RuleGuard([after]))
+        one.perform("go_to", [f"lab {number}"])
+        if may:
+            one.perform("say", ["done"])
+        else:
+            refused(one, "say", "done")
+
+
+def test_a_thing_whose_name_is_a_regex_counts_by_the_words_of_the_request_afterwards() -> None:
+    world = World((Room("hall", ("cup|mug",)),), "hall")
+    silent = rule('not tr.OnlyAfterFirst(pick("^mug$")).Exists(say(".*"))')
+    for rules in (AS_WRITTEN, Rules(literals="as-written", events="as-happened")):
+        one = SimulatedRobot(world, rules, guard=RuleGuard([silent]))
+        one.perform("pick", ["mug"])
+        refused(one, "say", "I have it")
 
 
 def test_a_rule_that_ends_the_run_comes_before_one_that_refuses() -> None:
