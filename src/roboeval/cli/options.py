@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from inspect import Signature, signature
 from pathlib import Path
@@ -16,6 +16,7 @@ from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.runs.folder import Run
     from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
 
@@ -191,6 +192,13 @@ class Opened(NamedTuple):
 
     results: Results
     again: str  # the command that goes on with judging it
+
+
+def note_houses(runs: Iterable[Run], suite: str) -> None:
+    """Say that runs were judged with house rules, too, which are not shown unless they are named."""
+    if houses := dict.fromkeys(house for run in runs for house in run.houses(suite)):
+        files = " or ".join(f"--rules {house}.yaml" for house in houses)
+        note(f"judged with house rules, too; {files} shows that")
 
 
 def expect_same_suite(opened: Sequence[Opened]) -> None:

@@ -15,6 +15,7 @@ from roboeval.cli.options import (
     command,
     expect_same_suite,
     named,
+    note_houses,
     open_current,
 )
 from roboeval.cli.output import fail, note, watched
@@ -83,6 +84,8 @@ def report(
     written = write_report(*headline(read), parts, out)
     for _ in watched(written, "writing", pieces(parts)):
         pass
+    if rules is None:
+        note_houses([one.results.run for one in opened], suite)
     note(f"the report is in {out / 'index.html'}")
 
 

@@ -19,6 +19,7 @@ from roboeval.cli.options import (
     complaint_of,
     load,
     named,
+    note_houses,
     open_current,
     open_run,
     task_names,
@@ -65,6 +66,8 @@ def show(
             else house_of(results.run, results.known_suite, results.table, ablated=ablation)
         )
         print_summary(counted, title=str(run), as_json=json, stale=results.stale, house=house)
+        if rules is None:
+            note_houses([results.run], suite)
     else:
         if k:
             fail(f"--k applies to a whole run; leave out {selection} or --k")

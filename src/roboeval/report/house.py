@@ -20,6 +20,7 @@ def house(runs: Sequence[JudgedRun]) -> Section:
 def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
     """How many programs break a rule, and how many tasks are done without and with the rules."""
     rows: list[list[Cell]] = []
+    notes = []
     for run, one in found:
         assert run.house is not None
         assert one.cost is not None
@@ -31,7 +32,13 @@ def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
                 *(*scores, one.cost.mean, one.cost.low, one.cost.high),
             ]
         )
-    return sheet("house", rows)
+        measured = ("share that breaks a rule", broken), ("difference", one.cost)
+        notes += [
+            f"{run.name}: the interval of the {what} is {estimate.ends()}."
+            for what, estimate in measured
+            if not estimate.is_known
+        ]
+    return sheet("house", rows, notes=notes)
 
 
 def broken_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:

@@ -56,6 +56,34 @@ def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
     assert told["house_rules"]["cost"]["mean"] < 0
 
 
+def test_where_rules_are_not_named_their_verdicts_are_told_of(folder: Path) -> None:
+    evaluated = roboeval(
+        "evaluate", "recorded:careful", "--out", "run", "--rules", "house.yaml", *TASKS, cwd=folder
+    )
+    assert evaluated.status == 0
+    told = refused("show", "run", cwd=folder)
+    assert told.file == "run"
+    assert "was judged with house rules only (house); name their file with --rules, or run" in told.sentence
+    assert roboeval("evaluate", "run", *TASKS, cwd=folder).status == 0
+    hint = "judged with house rules, too; --rules house.yaml shows that"
+    for command in (("show", "run"), ("report", "run", "--out", "report", "--no-check")):
+        assert hint in roboeval(*command, cwd=folder).err
+    assert hint not in roboeval("show", "run", "--rules", "house.yaml", cwd=folder).err
+
+
+def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> None:
+    rule = "rules: [{name: silent, says: Say nothing., always: 'not tr.Exists(goto(\".*\"))'}]"
+    (folder / "house.yaml").write_text(rule)
+    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+    shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
+    assert "100.0% of the programs" in shown
+    assert "(95% interval unknown: all prompts are alike)" in " ".join(shown.split())
+    reported = roboeval("report", "run", "--rules", "house.yaml", "--out", "report", "--no-check", cwd=folder)
+    assert reported.status == 0, reported.err
+    page = (folder / "report" / "index.html").read_text()
+    assert "the interval of the share that breaks a rule is unknown: all prompts are alike." in page
+
+
 def test_rows_are_the_same_with_any_number_of_workers_and_on_both_roads(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:hasty", "--out", "run", *TASKS, cwd=folder).status == 0
     one = judged(folder, "--workers", "1")

@@ -15,7 +15,7 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.metrics import Estimate, judged_count
+from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import Failures, Missing, Summary
 from roboeval.evaluation.explanation import NOT_RECORDED
 from roboeval.evaluation.failures import label_of, plural_of
@@ -62,21 +62,16 @@ def house_view(found: BrokenRules) -> RenderableType:
     for rule, count in found.by_rule.items():
         table.add_row(f"{count:,}", Text(visible(rule)))
     share = f"{found.broken.mean:.1%} of the programs of a prompt break a rule of the house, on average"
-    share += f" ({_interval(found.broken)})"
+    share += f" (95% interval {found.broken.ends()})"
     parts: list[RenderableType] = [Text(), Text(share, "bold"), table]
     if found.cost is None:
         parts.append(Text("evaluate the run without --rules, too, to see what the rules cost", "dim"))
     else:
+        ends = found.cost.ends()
         parts.append(
-            Text(
-                f"pass@1 with the rules less pass@1 without: {found.cost.mean:+.3f} ({_interval(found.cost)})"
-            )
+            Text(f"pass@1 with the rules less pass@1 without: {found.cost.mean:+.3f} (95% interval {ends})")
         )
     return Group(*parts)
-
-
-def _interval(estimate: Estimate) -> str:
-    return f"95% interval {estimate.low:.3f} to {estimate.high:.3f}"
 
 
 def _missed(missing: Missing) -> Iterator[Text]:

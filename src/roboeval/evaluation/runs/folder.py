@@ -25,6 +25,8 @@ from roboeval.evaluation.runs.completions import (
 from roboeval.evaluation.runs.published import passed_over, published_completions
 from roboeval.suites.load import ABLATED, Suite
 
+RULES = "-rules-"  # between a suite and house rules, in the name of an evaluation
+
 
 @dataclass(frozen=True)
 class Source:
@@ -100,6 +102,11 @@ class Run:
         """The names of the suites by which it was judged, sorted."""
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
         return sorted({key.removesuffix(ABLATED) for key in keys})
+
+    def houses(self, suite: str) -> list[str]:
+        """The names of the house rules by which a suite has judged it, but for the suite's own, sorted."""
+        before = f"{suite}{RULES}"
+        return [key.removeprefix(before) for key in self.judged_by() if key.startswith(before)]
 
     def read(self, suite: Suite | None = None) -> Iterator[Completion]:
         """Its completions; with a suite, all must be of tasks and prompts of it."""
@@ -218,7 +225,7 @@ def load_head(path: Path) -> dict[str, Any]:
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
     """The name of an evaluation's files."""
     named = suite.house is not None and suite.house.name
-    rules = f"-rules-{named}" if named else ""
+    rules = f"{RULES}{named}" if named else ""
     return suite.name + rules + ABLATED * ablated
 
 
@@ -260,7 +267,13 @@ def evaluation_of(
     if not run.completions.is_file():
         raise UserError("is not a run: it has no completions.jsonl", file=path)
     if not run.rows(key).is_file():
-        others = run.judged_by()
+        others, houses = run.judged_by(), run.houses(suite.name)
+        if houses and key == evaluation_key(suite.with_house_rules(None), ablated=ablated):
+            raise UserError(
+                f"was judged with house rules only ({', '.join(houses)}); "
+                f"name their file with --rules, or run `{again}`",
+                file=path,
+            )
         if not others or suite.name in others:
             raise UserError(f"has not been judged; run `{again}`", file=path)
         judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
