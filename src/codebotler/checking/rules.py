@@ -29,13 +29,17 @@ def _as_name(text: str) -> str:
     return text
 
 
+def _on_one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
 class RuleFile(BaseModel):
     """One rule in a file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(strict=True), AfterValidator(_as_name)]
-    says: Annotated[Text, Field(min_length=1)]
+    says: Annotated[Text, Field(min_length=1), AfterValidator(_on_one_line)]
     always: Text | None = None
     finally_: Annotated[Text | None, Field(alias="finally")] = None
     refuse: Annotated[bool, Field(strict=True)] = False
@@ -57,11 +61,10 @@ class RuleFile(BaseModel):
             return Rule(self.name, self.says, formula, "finally")
         formula = _parsed(self.always, file, (*at, "always"), skills)
         if not holds(formula, ()):
-            whenever = f"not tr.Last(...) or {_bracketed(formula)}"
-            sentence = f'the rule "{self.name}" is broken before anything has happened; say when it counts'
-            raise file.wrong(
-                f'{sentence}: {whenever}, or write "finally" if it counts at the end', *at, "always"
-            )
+            whenever = f'not tr.Last(goto(".*")) or {_bracketed(formula)}'
+            sentence = f'the rule "{self.name}" is broken before anything has happened'
+            mend = f'say when it counts, such as on each drive: {whenever}, or write "finally" for the end'
+            raise file.wrong(f"{sentence}; {mend}", *at, "always")
         return Rule(self.name, self.says, formula, "always", self.refuse)
 
 
@@ -89,7 +92,7 @@ def _parsed(text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula
         formula = parse(text, skills=skills)
     except RtlSyntaxError as error:
         there = brief(text[error.column - 1 :], MOST_QUOTED)
-        where = f"column {error.column}" + (f", at {there}" if there else "")
+        where = f"column {error.column} of it" + (f", at {there}" if there else "")
         raise file.wrong(f"this is not a formula: {where}: {error.problem}", *at) from None
     for element in elements(formula):
         for pattern in _regexes(element):

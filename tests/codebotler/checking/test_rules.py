@@ -47,6 +47,11 @@ def test_rules_are_read_in_order(tmp_path: Path) -> None:
     assert refusing.refuse
 
 
+def test_a_sentence_on_several_lines_is_one_line(tmp_path: Path) -> None:
+    text = f"rules:\n  - name: a\n    says: |\n      Stay\n      out.\n    always: '{HOLDS}'\n"
+    assert [rule.says for rule in read_rules(rules_in(tmp_path, text))] == ["Stay out."]
+
+
 @pytest.mark.parametrize(
     ("text", "line", "named"),
     [
@@ -85,13 +90,13 @@ def test_rules_are_read_in_order(tmp_path: Path) -> None:
         (
             "rules:\n  - name: a\n    says: b\n    always: not tr.Exist(goto('x'))\n",
             4,
-            ["column 8, at Exist(goto(", "Exists?"],
+            ["column 8 of it, at Exist(goto(", "Exists?"],
         ),
         ("rules:\n  - name: a\n    says: b\n    always: tr.Exists(fly('x'))\n", 4, ["unknown element fly"]),
         (
             "rules:\n  - name: a\n    says: b\n    always: tr.Exists(say('hello'))\n",
             4,
-            ["before anything", 'not tr.Last(...) or tr.Exists(say("hello"))'],
+            ["before anything", 'not tr.Last(goto(".*")) or tr.Exists(say("hello")), or'],
         ),
         (f"rules:\n  - name: a\n    says: b\n    finally: '{HOLDS}'\n    refuse: true\n", 5, ['"refuse"']),
         (f"rules:\n{TWICE}{TWICE}", 5, ['"a"', "twice"]),
