@@ -19,7 +19,7 @@ import threading
 import time
 from collections.abc import Callable
 from functools import cache
-from importlib.machinery import SourceFileLoader
+from importlib.machinery import BuiltinImporter, FrozenImporter, SourceFileLoader
 from pathlib import Path
 from types import CodeType
 from typing import IO
@@ -30,13 +30,16 @@ from codebotler.simulator.sandbox import (
     BATCH_SERVER,
     CPU_SECONDS,
     FLAGS,
+    FORK_SERVER,
     HEADER,
+    LIVE_SERVER,
     MAX_FRAME,
     MORE,
     PIECE,
     PREPARER,
     WITHOUT_REFERENCES,
 )
+from codebotler.simulator.sandbox.stdlib import IMPORTED
 
 PROCESSOR_TIME = "seconds of processor time"  # how the message of a program ends that computed for too long
 LONGEST = 60.0  # seconds of waiting for a process in all; nothing that computes takes so long
@@ -60,7 +63,7 @@ MODULES = {PREPARER: f"{__package__}.sandbox.preparer", BATCH_SERVER: f"{BATCHES
 
 def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
     """Start a process in one of the roles, and hand it descriptors."""
-    handed = (compiled_file(*(SIMULATION if role == BATCH_SERVER else ())).fileno(), *descriptors)
+    handed = (compiled_file(role).fileno(), *descriptors)
     module = MODULES.get(role, f"{__package__}.sandbox.fork_server")
     with ONE_AT_A_TIME:
         return subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
@@ -91,25 +94,26 @@ os.register_at_fork(
 )
 
 
-def compiled_file(*further: str) -> IO[bytes]:
-    """A file with the code of the modules that isolated processes run, and of further ones."""
+def compiled_file(role: str) -> IO[bytes]:
+    """A file with the code of the modules that a process in one of the roles runs."""
     with ONE_AT_A_TIME:
-        return _written_file(further)
+        return _written_file(FORK_SERVER if role == LIVE_SERVER else role)
 
 
 @cache
-def _written_file(further: tuple[str, ...]) -> IO[bytes]:
+def _written_file(role: str) -> IO[bytes]:
     file: IO[bytes] = (  # closed at the end of this process; in memory if possible, since a disk may be full
         os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
     )
     atexit.register(file.close)
-    file.write(compiled_modules(compiled, further))
+    file.write(compiled_modules(compiled, role))
     file.flush()
     return file
 
 
-def compiled_modules(compiler: Callable[[str, str], bytes], further: tuple[str, ...] = ()) -> bytes:
-    """The code of all modules that isolated processes run, by name, as one message."""
+def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
+    """The code of all modules that a process in one of the roles runs, by name, as one message."""
+    further = SIMULATION if role == BATCH_SERVER else ()
     simulator, package = __package__, __package__ + ".sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
     files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}
@@ -117,34 +121,53 @@ def compiled_modules(compiler: Callable[[str, str], bytes], further: tuple[str, 
     folder = SANDBOX.parents[1]
     files |= {name: str(folder.joinpath(*name.split(".")[1:]).with_suffix(".py")) for name in further}
     empty = [simulator.partition(".")[0], simulator, *([CORE, f"{CORE}.skills", BATCHES] if further else ())]
-    codes = {name: compiled_source("", name) for name in empty}
-    codes |= {name: compiler(file, name) for name, file in files.items()}
+    codes = {name: compiled_source("", f"<{name}>") for name in empty}
+    codes |= {name: compiler(file, f"<{name}>") for name, file in files.items()}
+    if role not in {PREPARER, BATCH_SERVER}:
+        codes |= {name: compiled(str(file), file.name) for name, file in stdlib_files().items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 
 
+def stdlib_files() -> dict[str, Path]:
+    """Nearly all modules of the standard library that programs can import, or that these are made of."""
+    folder, files = Path(os.__file__).parent, {}
+    for name in IMPORTED:
+        path = folder.joinpath(*name.split("."))
+        if BuiltinImporter.find_spec(name) or FrozenImporter.find_spec(name):
+            continue
+        if path.with_suffix(".py").is_file():
+            files[name] = path.with_suffix(".py")
+        elif (path / "__init__.py").is_file():
+            files[name] = path / "__init__.py"
+            files |= {
+                f"{name}.{part.stem}": part for part in sorted(path.glob("*.py")) if part.stem[:2] != "__"
+            }
+    return files
+
+
 @cache
-def compiled(file: str, name: str) -> bytes:
-    """The code of one module, the same however this interpreter was started."""
+def compiled(file: str, shown: str) -> bytes:
+    """The code of one module, the same however this interpreter was started; `shown` is in tracebacks."""
     if sys.flags.optimize:
-        return compiled_source(Path(file).read_text(encoding="utf-8"), name)
-    code = SourceFileLoader(name, file).get_code(name)
+        return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
+    code = SourceFileLoader(shown, file).get_code(shown)
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
         # It was written by an interpreter that leaves columns out, so that it is shorter.
-        return compiled_source(Path(file).read_text(encoding="utf-8"), name)
-    return dumped(code, name)
+        return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
+    return dumped(code, shown)
 
 
-def compiled_source(source: str, name: str) -> bytes:
+def compiled_source(source: str, shown: str) -> bytes:
     """The same of a module that is in no file, or in another form there."""
-    return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), name)
+    return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), shown)
 
 
-def dumped(code: CodeType, name: str) -> bytes:
+def dumped(code: CodeType, shown: str) -> bytes:
     """Code that names no path, whose length would move what comes after it in memory."""
 
     def nameless(code: CodeType) -> CodeType:
         parts = (nameless(part) if isinstance(part, CodeType) else part for part in code.co_consts)
-        return code.replace(co_filename=f"<{name}>", co_consts=tuple(parts))
+        return code.replace(co_filename=shown, co_consts=tuple(parts))
 
     return marshal.dumps(nameless(code), WITHOUT_REFERENCES)
 

@@ -24,11 +24,12 @@ from codebotler.core.world import Room, World
 from codebotler.simulator import isolated_process, pool
 from codebotler.simulator.engine import digest, run
 from codebotler.simulator.fork_server import BatchServer
-from codebotler.simulator.isolated_process import SIMULATION, LostProcessError, compiled_file
+from codebotler.simulator.isolated_process import LostProcessError, compiled_file
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import FEW, WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
+from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, PREPARER
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
@@ -68,8 +69,8 @@ def held() -> tuple[set[object], ...]:
 @pytest.fixture
 def nothing_is_left() -> Iterator[None]:
     """Compares what this process holds after the test with what it held before."""
-    for further in ((), SIMULATION):
-        compiled_file(*further)  # files that stay
+    for role in (PREPARER, BATCH_SERVER, FORK_SERVER):
+        compiled_file(role)  # files that stay
     before = held()
     yield
     assert [after - earlier for after, earlier in zip(held(), before, strict=True)] == [set()] * 3
@@ -616,16 +617,16 @@ resource.setrlimit = with_fewer
 def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def compiled(file: str, name: str) -> bytes:
-        prelude = LIKE_MACOS if name == "codebotler.simulator.sandbox" else ""
+    def compiled(file: str, shown: str) -> bytes:
+        prelude = LIKE_MACOS if shown == "<codebotler.simulator.sandbox>" else ""
         source = Path(file).read_text(encoding="utf-8")
         return isolated_process.compiled_source(
-            source.replace('"""The isolated', prelude + '"""The isolated', 1), name
+            source.replace('"""The isolated', prelude + '"""The isolated', 1), shown
         )
 
     with TemporaryFile() as file:
         monkeypatch.setattr(isolated_process, "compiled_file", lambda *_: file)
-        file.write(isolated_process.compiled_modules(compiled, SIMULATION))
+        file.write(isolated_process.compiled_modules(compiled, BATCH_SERVER))
         file.flush()
         programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
         outcomes = list(run([(program, WORLD) for program in programs], workers=1))
@@ -721,11 +722,33 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
     assert "5 seconds of processor time" in told("trap '' XCPU INT", "sum(range(10**12))")
 
 
+MODULES_TOLD = """
+import sys
+
+def task_program():
+    modules = [module for module in sys.modules.values() if getattr(module, "__spec__", None)]
+    say(str(len(modules)))
+    say(str([m.__name__ for m in modules if type(m.__spec__.loader).__name__.startswith("Source")]))
+    say(str([(m, vars(m).get("__file__"), vars(m).get("__path__")) for m in modules]))
+"""
+
+
+def test_a_fork_server_compiles_next_to_nothing_and_modules_name_no_folder() -> None:
+    """Compiling the standard library would take most of its start; a path would differ between machines."""
+    worker = Worker(one_process_per_run=True)
+    outcome = worker.run(MODULES_TOLD, lambda: SimulatedRobot(WORLD, Rules(literals="as-written")))
+    worker.close()
+    number, compiled, told = said(outcome)
+    assert int(number) > 200
+    assert len(compiled.split(",")) < 30
+    assert str(Path(os.__file__).parent) not in told
+
+
 def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(_: BatchServer) -> None:
         raise KeyboardInterrupt
 
-    compiled_file(*SIMULATION)  # a file that stays open
+    compiled_file(BATCH_SERVER)  # a file that stays open
     before, processes = set(Path("/proc/self/fd").iterdir()), fork_servers()
     monkeypatch.setattr(BatchServer, "_set_up", interrupted)
     with pytest.raises(KeyboardInterrupt), WorkerPool(1):

@@ -44,6 +44,9 @@ def get_ready(
     sys.pycache_prefix = None
     for name in [name for name in sys.modules if name.partition(".")[0] == "codebotler"]:
         del sys.modules[name]
+    for module in sys.modules.values():
+        if hasattr(module, "__path__"):
+            module.__path__ = []  # which would name folders of this machine
     sys.meta_path[:] = [NothingMore()]
     give_up_rights()
     seccomp = usable_filter()

@@ -23,15 +23,21 @@ def main(module: str, role: str, descriptors: list[str]) -> None:
     if descriptors:
         start_again(list(map(int, descriptors)))
     if role not in ("preparer", "batch-fork-server"):  # bytecode, now there and now not, would move the heap
-        sys.pycache_prefix = os.devnull
-    sys.meta_path.insert(0, CompiledModules(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
+        sys.pycache_prefix = os.devnull  # of what is not handed over
+    modules = CompiledModules(loads(os.pread(CODES, os.fstat(CODES).st_size, 0)))  # noqa: S302 - from the engine
+    sys.meta_path.insert(0, modules)
     os.close(CODES)
     taken_on = __import__(module, fromlist=["serve"])
-    taken_on.serve(*taken_on.get_ready(role))
+    ready = taken_on.get_ready(role)
+    modules.codes.clear()  # nothing is imported any more
+    taken_on.serve(*ready)
 
 
 class CompiledModules:
-    """Importer of modules that the engine has compiled, since a compiler would double a fork server."""
+    """Importer of modules that the engine has compiled, since a compiler would double a fork server.
+
+    Those of the standard library look as if they came from a file.
+    """
 
     def __init__(self, codes: dict[str, bytes]) -> None:
         self.codes = codes  # marshalled, by the name of the module
@@ -41,14 +47,22 @@ class CompiledModules:
         if name not in self.codes:
             return None
         is_package = any(other.startswith(name + ".") for other in self.codes)
-        return ModuleSpec(name, self, is_package=is_package)  # type: ignore[arg-type]  # it has what is needed
+        spec = ModuleSpec(name, self, is_package=is_package)  # type: ignore[arg-type]  # it has what is needed
+        if is_package and name.partition(".")[0] != "codebotler":  # some of it may not have been handed over
+            folder = os.__file__.rpartition("/")[0]
+            spec.submodule_search_locations = [f"{folder}/{name.replace('.', '/')}"]
+        return spec
 
     def create_module(self, _: ModuleSpec) -> None:
         """Make an ordinary module."""
 
     def exec_module(self, module: types.ModuleType) -> None:
-        """Run its code."""
-        exec(loads(self.codes[module.__name__]), vars(module))  # noqa: S102, S302 - from the engine
+        """Run its code, for which there is no use afterwards."""
+        name, spec = module.__name__, module.__spec__
+        if spec is not None and name.partition(".")[0] != "codebotler":
+            module.__file__ = spec.origin = f"{name}.py"
+            spec.has_location = True
+        exec(loads(self.codes.pop(name)), vars(module))  # noqa: S102, S302 - from the engine
 
 
 def start_again(descriptors: list[int]) -> NoReturn:

@@ -37,6 +37,7 @@ CODECS = """
     utf_16 utf_16_be utf_16_le utf_32 utf_7 utf_8 utf_8_sig
 """.split()  # noqa: SIM905 - the same
 
+IMPORTED = (*LISTED, "_strptime", *(f"encodings.{codec}" for codec in CODECS))
 SOME_VERSIONS_HAVE = ("typing.io", "typing.re")
 
 
@@ -51,7 +52,7 @@ def load_stdlib(run: ProgramRun) -> None:
     # them, and from then on leaves another heap behind.
     os.register_at_fork = posix.register_at_fork = lambda **_: None
     sys.modules["_queue"] = None  # type: ignore[assignment]  # `queue` then takes its own, with simulated locks
-    for name in [*LISTED, "_strptime", *(f"encodings.{codec}" for codec in CODECS)]:
+    for name in IMPORTED:
         importlib.import_module(name)
     for name in (*SOME_VERSIONS_HAVE, "_queue"):
         sys.modules.pop(name, None)
