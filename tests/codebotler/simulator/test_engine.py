@@ -729,7 +729,8 @@ def task_program():
     modules = [module for module in sys.modules.values() if getattr(module, "__spec__", None)]
     say(str(len(modules)))
     say(str([m.__name__ for m in modules if type(m.__spec__.loader).__name__.startswith("Source")]))
-    say(str([(m, vars(m).get("__file__"), vars(m).get("__path__")) for m in modules]))
+    for module in modules:
+        say(str((module, vars(module).get("__file__"), vars(module).get("__path__"))))
 """
 
 
@@ -738,10 +739,10 @@ def test_a_fork_server_compiles_next_to_nothing_and_modules_name_no_folder() -> 
     worker = Worker(one_process_per_run=True)
     outcome = worker.run(MODULES_TOLD, lambda: SimulatedRobot(WORLD, Rules(literals="as-written")))
     worker.close()
-    number, compiled, told = said(outcome)
+    number, compiled, *told = said(outcome)
     assert int(number) > 200
     assert len(compiled.split(",")) < 30
-    assert str(Path(os.__file__).parent) not in told
+    assert [text for text in told if str(Path(os.__file__).parent) in text] == []
 
 
 def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
