@@ -36,7 +36,7 @@ from codebotler.rtl.semantics import is_match
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import Aliases, Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.rules import finds, resolve_room
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import NewRobot, Worker
@@ -256,12 +256,12 @@ class WatchedGuard(RuleGuard):
 
     refused: Event | None = None
 
-    def judge(self, *attempts: Aliases) -> None:
+    def judge(self, *attempts: Event) -> None:
         """Judge an attempt, as always."""
         try:
             super().judge(*attempts)
         except RuleViolationError:
-            self.refused = attempts[0][0]
+            self.refused = attempts[0]
             raise
 
 

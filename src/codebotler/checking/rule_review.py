@@ -90,7 +90,7 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
     if last.answer is not None:  # a question always has another option
         last = replace(last, options=(*last.options, Option(last.answer), Option(OTHER)))
     try:
-        guard.judge((replace(last, found=None, answer=None),))
+        guard.judge(replace(last, found=None, answer=None))
     except RuleViolationError:
         return False
     return True

@@ -14,10 +14,11 @@ from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, aliases, names_of
+from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names_of
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
 
+HERE = "get_current_location"
 TELLING = 6.0  # seconds within which a robot has been told to stop
 
 
@@ -58,6 +59,7 @@ class LiveRobot:
         self.rules = Rules(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # of the program, which calls a skill there
         self._place, self._held = place, ""
+        self._here = [place]  # where the robot may be, as rules name it
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
@@ -115,7 +117,7 @@ class LiveRobot:
             result = self._logged(row, [_text(argument) for argument in arguments], event)
         except RobotError:
             if event and row.recording and row.recording.when_tried:
-                self._happened(event)
+                self._happened(event, failed=True)
             raise
         if event is None or row.recording is None:
             return result
@@ -143,21 +145,25 @@ class LiveRobot:
     def _judge(self, guard: RuleGuard, event: Event) -> None:
         """Refuse what a rule forbids, in whichever room it would happen; the robot is not told."""
         rooms = self._meant(event.text) if event.kind == "goto" else []
-        possible = [(event.text,), *(names_of(room, event.text) for room in rooms if room != event.text)]
-        places = self._room_names(event.place)
+        texts = [event.text, *(names_of(room, event.text) for room in rooms if room != event.text)]
         try:
-            guard.judge(*(aliases(event, names, places) for names in possible))
+            guard.judge(*(replace(event, text=text, place=place) for text in texts for place in self._here))
         except RuleViolationError as broken:
             self._end_by(broken)
             raise
 
-    def _happened(self, event: Event) -> None:
+    def _happened(self, event: Event, *, failed: bool = False) -> None:
         """Tell the guard what has happened, which may break a rule that depends on an answer."""
         if self._guard is None:
             return
+        places, texts = self._here, [event.text]
+        if event.kind == "goto":
+            texts = self._reached(event.text)
+            self._here = self._left(places, texts) if failed else texts
         try:
-            names = self._room_names(event.text) if event.kind == "goto" else (event.text,)
-            self._guard.happened(*aliases(event, names, self._room_names(event.place)))
+            self._guard.happened(
+                *(replace(event, text=text, place=place) for text in texts for place in places)
+            )
         except RuleViolationError as broken:
             self._end_by(broken)
             raise
@@ -181,10 +187,29 @@ class LiveRobot:
     def _meant(self, request: str) -> list[str]:
         return [] if self._room_map is None else self._room_map.rooms_meant(request)
 
-    def _room_names(self, request: str) -> Sequence[str]:
-        """The names of the room to which a request leads, as rules see it."""
-        known = None if self._room_map is None or not request else self._room_map.room(request)
-        return names_of(known, request) if known else (request,)
+    def _reached(self, request: str) -> list[str]:
+        """The room to which a drive has led, as rules name it; several if nobody knows which of them."""
+        meant = self._meant(request)
+        if len(meant) > 1 and (room := self._room_now()) in meant:
+            meant = [room]
+        return [names_of(room, request) for room in meant] or [request]
+
+    def _left(self, places: list[str], goals: list[str]) -> list[str]:
+        """Where the robot may be after a drive from one of some places that has failed on its way."""
+        known = None if self._room_map is None else self._room_map.rooms
+        possible = [*places, *(goal for goal in goals if known is None or goal in known)]
+        room = self._room_now() if len(possible) > 1 else None
+        return possible if room is None else [next((one for one in possible if one == room), room)]
+
+    def _room_now(self) -> str | None:
+        """The room in which the robot says it is, if it says one that it knows."""
+        if HERE not in self.skills or HERE in self.robot.missing or self._room_map is None:
+            return None
+        try:
+            room = answered(self.skills[HERE], self.robot.perform(HERE, ()))
+        except (RobotError, CancelledError):
+            return None
+        return room if isinstance(room, str) and room in self._room_map.rooms else None
 
     def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, logged."""

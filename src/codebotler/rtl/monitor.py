@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -35,26 +35,27 @@ class Monitor:
         self._state: Any = machine.start
         self.holds = machine.accepts(self._state)
         self._seen = 0
-        letters = None if events is None else [machine.letter(machine.mask((event,), 0)) for event in events]
+        letters = None if events is None else [machine.letter(machine.mask(event, 0)) for event in events]
         self._future = None if letters is None else _Future.of(formula, letters)
+
+    @property
+    def state(self) -> object:
+        """What counts of the past: monitors of one formula with equal states say the same from now on."""
+        return self._state
 
     @property
     def is_final(self) -> bool | None:
         """Whether no events can change that; None if `events` are not given, or it would take too long."""
         return None if self._future is None else self._future.is_final
 
-    def feed(self, event: Event, *aliases: Event) -> bool:
+    def feed(self, event: Event) -> bool:
         """Take the next event, and return whether the formula holds now.
-
-        Args:
-            event: what has happened.
-            aliases: the same by other names, such as those of a room; it matches as what any of them does.
 
         Raises:
             Inconclusive: an option is no text; the event does not count.
             ValueError: the event is not one of `events`; it does not count.
         """
-        mask = self._machine.mask((event, *aliases), self._seen)
+        mask = self._machine.mask(event, self._seen)
         if self._future is not None:
             self._future.step(self._machine.letter(mask))
         known = self._machine.steps.get((self._state, mask))
@@ -62,10 +63,10 @@ class Monitor:
         self._seen += 1
         return self.holds
 
-    def would_hold(self, event: Event, *aliases: Event) -> bool:
+    def would_hold(self, event: Event) -> bool:
         """Whether the formula would hold if this came next; Inconclusive if an option of it is no text."""
         machine = self._machine
-        mask = machine.mask((event, *aliases), self._seen)
+        mask = machine.mask(event, self._seen)
         return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
 
 
@@ -90,16 +91,15 @@ class _Machine:
         """That of a formula."""
         return cls(formula)
 
-    def mask(self, aliases: Sequence[Event], at: int) -> int:
-        """The letter of an event, by all its names."""
-        wanted = self._by_kind.get(aliases[0].kind)
+    def mask(self, event: Event, at: int) -> int:
+        """The letter of an event."""
+        wanted = self._by_kind.get(event.kind)
         if wanted is None:  # which is so for most rules and events
             return 0
         found = 0
         for bit, element in wanted:
-            for event in aliases:
-                if is_match(element, event, at):
-                    found |= bit
+            if is_match(element, event, at):
+                found |= bit
         return found
 
     def letter(self, mask: int) -> Letter:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
 from codebotler.core.errors import VIOLATION, RobotError
-from codebotler.core.trace import Event, attempted
+from codebotler.core.trace import Event, Names, attempted
 from codebotler.rtl import Formula, Inconclusive, Monitor
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.wording import event_words
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 
 Verdict: TypeAlias = Literal["forbids", "cannot judge", "is broken by"]
-Aliases: TypeAlias = tuple[Event, ...]
-"""One event, by each of the names that its rooms and things go by."""
+Watched: TypeAlias = "tuple[Rule, Monitor, frozenset[str]]"  # the last: see `_depends_on`
 
 
 @dataclass(frozen=True)
@@ -76,11 +76,16 @@ class RuleGuard:
 
     def __init__(self, rules: Sequence[Rule]) -> None:
         self.rules = tuple(rules)
-        watched = [(rule, Monitor(rule.formula), _depends_on(rule)) for rule in rules]
-        self._always = [each for each in watched if each[0].when == "always"]
-        self._finally = [each for each in watched if each[0].when == "finally"]
+        self._watch([(rule, Monitor(rule.formula), _depends_on(rule)) for rule in rules])
         self._unjudged: set[str] = set()  # names of rules that had to compare an option that is no text
         self._came = ""  # the words of the last drive
+
+    def _watch(self, watched: Iterable[Watched]) -> None:
+        """Go on with monitors; of one rule there are several where it is uncertain what has happened."""
+        self._always: list[Watched] = []
+        self._finally: list[Watched] = []
+        for each in watched:
+            (self._always if each[0].when == "always" else self._finally).append(each)
 
     @property
     def may_refuse(self) -> bool:
@@ -90,63 +95,83 @@ class RuleGuard:
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
         """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
         row, before = robot.skills[skill], len(robot.events)
-        places = names_of(robot.room, self._came)
-        attempt = attempted(row, arguments, place=robot.room, time=robot.now, holding=robot.held or "")
+        place, thing, held = names_of(robot.room, self._came), robot.taken, robot.held or ""
+        holding = held if thing is None else names_of(thing.label, held)
+        attempt = attempted(row, arguments, place=place, time=robot.now, holding=holding)
         if attempt is None:
             return robot.execute(skill, arguments)
         is_drive = row.recording is not None and row.recording.is_drive
-        possible = _possible_names(robot, attempt, arguments, is_drive=is_drive)
-        self.judge(*(aliases(attempt, names, places) for names in possible))
+        self.judge(*_attempts(robot, attempt, arguments, is_drive=is_drive))
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
-            for event in robot.events[before:]:
-                self.happened(*aliases(event, (event.text,), places))
+            tried = [attempt] if row.recording is not None and row.recording.when_tried else []
+            for event in robot.events[before:] or tried:
+                self.happened(_seen(event, event.text, attempt))
             raise
         if is_drive:
             self._came = attempt.text
+        moved = thing or robot.taken
         for event in robot.events[before:]:
-            what = robot.room if is_drive else event.text
-            names = names_of(what, attempt.text) if event.kind == attempt.kind else (what,)
-            self.happened(*aliases(event, names, places))
+            if is_drive:
+                text = names_of(robot.room, attempt.text)
+            elif moved is not None and event.kind in {"pick", "place"}:
+                text = names_of(moved.label, attempt.text)
+            else:
+                text = event.text
+            self.happened(_seen(event, text, attempt))
         return result
 
-    def judge(self, *attempts: Aliases) -> None:
+    def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
         caught: RuleViolationError | None = None
         for rule, monitor, depends in self._always:
             for attempt in attempts:
-                if attempt[0].kind in depends:
+                if attempt.kind in depends:
                     can_hold = any(_would_hold(monitor, event) for event in _results(rule, attempt))
                 else:
                     can_hold = _would_hold(monitor, attempt)
                 if not can_hold:
                     unclear = _is_unclear(monitor, attempt)
-                    broken = RuleViolationError(rule, attempt[0], "cannot judge" if unclear else "forbids")
+                    broken = RuleViolationError(rule, attempt, "cannot judge" if unclear else "forbids")
                     if broken.ends_run:
                         raise broken
                     caught = caught or broken  # another rule may end the run
         if caught is not None:
             raise caught
 
-    def happened(self, event: Event, *others: Event) -> None:
+    def happened(self, *possible: Event) -> None:
         """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee.
 
         Args:
-            event: what has happened.
-            others: the same by other names.
+            possible: the event; several if it is uncertain which of them it was. Then rules hold only if they
+                do so whichever it was.
         """
+        watched = [*self._always, *self._finally]
+        late = None
+        for event in possible[1:]:
+            apart = [(rule, copy(monitor), depends) for rule, monitor, depends in watched]
+            late = self._feed(apart, event) or late
+            self._watch([*self._always, *self._finally, *apart])
+        late = self._feed(watched, possible[0]) or late
+        if len(possible) > 1:
+            different = {(each[0].name, each[1].state): each for each in (*self._always, *self._finally)}
+            self._watch(different.values())
+        if late is not None:
+            raise late
+
+    def _feed(self, watched: Iterable[Watched], event: Event) -> RuleViolationError | None:
+        """Tell monitors what has happened; the first rule that is broken now."""
         late: RuleViolationError | None = None
-        for rule, monitor, _ in (*self._always, *self._finally):
+        for rule, monitor, _ in watched:
             try:
-                holds = monitor.feed(event, *others)
+                holds = monitor.feed(event)
             except Inconclusive:
                 self._unjudged.add(rule.name)
                 holds = False
             if not holds and rule.when == "always" and late is None:
                 late = RuleViolationError(rule, event, "is broken by")
-        if late is not None:
-            raise late
+        return late
 
     def at_end(self) -> RuleViolationError | None:
         """The first rule that is not kept if the mission ends now."""
@@ -156,53 +181,52 @@ class RuleGuard:
         return None
 
 
-def _possible_names(
+def _attempts(
     robot: SimulatedRobot, attempt: Event, arguments: Sequence[Argument], *, is_drive: bool
-) -> Iterator[Sequence[str]]:
-    """The words of a request, and the names of each room or thing that it may mean, outer spaces or not."""
-    yield (attempt.text,)
+) -> Iterator[Event]:
+    """An attempt, and the same with the other rooms or things that it may mean, outer spaces or not."""
+    yield attempt
     meant: list[str] = []
     for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
         meant += robot.meant_rooms(request) if is_drive else _moved(robot, attempt.kind, request)
     for name in dict.fromkeys(meant):
         if name != attempt.text:
-            yield names_of(name, attempt.text)
+            yield replace(attempt, text=names_of(name, attempt.text))
 
 
-def names_of(name: str, request: str) -> Sequence[str]:
-    """The names of a room or thing: its own, and the words that asked for it where its own is a regex."""
-    return (name,) if not request or name.casefold() in request.casefold() else (name, request)
+def _seen(event: Event, text: str, attempt: Event) -> Event:
+    """An event as rules see it, by all names of the room and of what is held."""
+    holding = attempt.holding if event.holding else ""
+    if event.text is text and event.place is attempt.place and event.holding is holding:
+        return event
+    return replace(event, text=text, place=attempt.place, holding=holding)
 
 
-def aliases(event: Event, names: Sequence[str], places: Sequence[str]) -> Aliases:
-    """An event by each of the names of what it is about, and of the room where it happens."""
-    if len(names) == len(places) == 1 and event.text == names[0] and event.place == places[0]:
-        return (event,)
-    return tuple(replace(event, text=name, place=place) for name in names for place in places)
+def names_of(name: str, request: str) -> str:
+    """A room or thing by its name, and by the words that asked for it where its name is a regex."""
+    return name if not request or name.casefold() in request.casefold() else Names(name, request)
 
 
 def _moved(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
     """By which name the thing is recorded that would be picked up or put down."""
-    if robot.rules.events != "as-happened":
-        return ()
     if kind == "place" and robot.taken is not None:
         return (robot.taken.label,)
     here = robot.things[robot.room] if kind == "pick" else ()
     return [thing.label for thing in here if thing.is_meant_by(request, robot.rules.matching)][:1]
 
 
-def _is_unclear(monitor: Monitor, event: Aliases) -> bool:
+def _is_unclear(monitor: Monitor, event: Event) -> bool:
     """Whether an event cannot be judged, since it has options that are no text."""
     try:
-        monitor.would_hold(*event)
+        monitor.would_hold(event)
     except Inconclusive:
         return True
     return False
 
 
-def _would_hold(monitor: Monitor, event: Aliases) -> bool:
+def _would_hold(monitor: Monitor, event: Event) -> bool:
     try:
-        return monitor.would_hold(*event)
+        return monitor.would_hold(event)
     except Inconclusive:
         return False
 
@@ -221,12 +245,11 @@ def _results_of(rule: Rule) -> tuple[frozenset[str], frozenset[str]]:
     return found, frozenset(one.kind for one in wanted if one.answer is not None)
 
 
-def _results(rule: Rule, attempt: Aliases) -> Sequence[Aliases]:
+def _results(rule: Rule, attempt: Event) -> Sequence[Event]:
     """An event as it may turn out, as far as a rule tells that apart."""
     found, answered = _results_of(rule)
-    kind, options = attempt[0].kind, attempt[0].options
-    if kind in found:
-        return [tuple(replace(one, found=is_found) for one in attempt) for is_found in (True, False)]
-    if kind in answered and options:
-        return [tuple(replace(one, answer=option.text) for one in attempt) for option in options]
+    if attempt.kind in found:
+        return [replace(attempt, found=True), replace(attempt, found=False)]
+    if attempt.kind in answered and attempt.options:
+        return [replace(attempt, answer=option.text) for option in attempt.options]
     return (attempt,)

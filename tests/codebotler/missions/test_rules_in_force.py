@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.cli.run import checker
+from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, State
@@ -51,14 +52,20 @@ def knowing(*rooms: str) -> Answering:
 
 
 def ran(
-    folder: Path, robot: Robot, program: str, rules: Sequence[Rule], rooms: RoomMap = ROOMS
+    folder: Path,
+    robot: Robot,
+    program: str,
+    rules: Sequence[Rule],
+    rooms: RoomMap = ROOMS,
+    *,
+    place: str = "hall",
 ) -> tuple[Mission, list[Line]]:
     mission = Mission(folder, robot.name)
     mission.draft(program)
     mission.check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
-        mission.run(reserved, "hall", rules=rules, room_map=rooms)
+        mission.run(reserved, place, rules=rules, room_map=rooms)
     lines = (mission.folder / EVENTS).read_text().splitlines()
     return mission, [json.loads(line) for line in lines]
 
@@ -147,6 +154,51 @@ def test_a_room_is_the_one_where_a_request_leads(tmp_path: Path) -> None:
     for room, state in (("room 10", State.STOPPED), ("room 1", State.DONE)):
         mission, _ = ran(tmp_path / room[-2:], answering(), program.format(room), [silent], rooms)
         assert mission.state is state, room
+
+
+IN_LAB_2 = Rule("quiet", "Say nothing in lab 2.", parse('not tr.Exists(at("lab 2", say(".*")))'))
+LABS = RoomMap(("hall", "lab", "lab 2"), "hall", plain=True)
+
+
+def told_room(room: str | None) -> str:
+    if room is None:
+        raise RobotError("NoLocation", "the map is not loaded")
+    return room
+
+
+@pytest.mark.parametrize(
+    ("where", "state"), [(None, State.STOPPED), ("lab", State.DONE), ("lab 2", State.STOPPED)]
+)
+def test_where_a_drive_may_have_led_counts_unless_the_robot_tells(
+    tmp_path: Path, where: str | None, state: State
+) -> None:
+    robot = answering(lambda skill, _: told_room(where) if skill == "get_current_location" else None)
+    program = "def task_program():\n    go_to('the lab 2, at the window')\n    say('hello')\n"
+    mission, _ = ran(tmp_path, robot, program, [IN_LAB_2], LABS)
+    assert mission.state is state
+
+
+@pytest.mark.parametrize(("where", "state"), [(None, State.STOPPED), ("hall", State.DONE)])
+def test_a_robot_may_be_anywhere_between_after_a_drive_that_failed(
+    tmp_path: Path, where: str | None, state: State
+) -> None:
+    def answer(skill: str, _: str) -> Result:
+        if skill == "go_to":
+            raise RobotError("GoToInvalidLocation", "the door is shut")
+        return told_room(where) if skill == "get_current_location" else None
+
+    program = "def task_program():\n    try: go_to('lab 2')\n    except Exception: say('hello')\n"
+    mission, _ = ran(tmp_path, answering(answer), program, [IN_LAB_2], LABS)
+    assert mission.state is state
+
+
+def test_where_the_robot_starts_is_no_request(tmp_path: Path) -> None:
+    """A room whose name lies in that of the start comes first in the list."""
+    rooms = RoomMap(("office", "bob's office"), "bob's office")
+    rule = Rule("bob", "Say nothing at Bob's.", parse('not tr.Exists(at("bob\'s office", say(".*")))'))
+    program = "def task_program():\n    say('hello')\n"
+    mission, _ = ran(tmp_path, answering(), program, [rule], rooms, place="bob's office")
+    assert mission.state is State.STOPPED
 
 
 def test_what_is_carried_counts_on_the_simulated_robot(tmp_path: Path) -> None:

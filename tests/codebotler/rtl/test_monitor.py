@@ -72,14 +72,6 @@ def test_what_is_final_stays_so_for_any_formula(
         final = now if monitor.is_final else final
 
 
-def test_an_event_matches_by_any_of_its_names() -> None:
-    monitor = Monitor(parse('tr.Exists(goto("^lab 1$")) and tr.Exists(goto("^lab .12.$"))'))
-    names = Event("goto", "lab [12]"), Event("goto", "lab 1")
-    assert not any(monitor.would_hold(name) for name in names)
-    assert monitor.would_hold(*names)
-    assert monitor.feed(*reversed(names))
-
-
 def test_what_cannot_happen_is_refused_and_does_not_count() -> None:
     monitor = Monitor(parse('tr.Exists(say("attic"))'), ROOMS)
     assert monitor.is_final

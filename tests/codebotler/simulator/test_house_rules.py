@@ -160,13 +160,65 @@ def test_all_names_of_a_room_are_those_of_one_room() -> None:
             refused(one, "say", "done")
 
 
-def test_a_thing_whose_name_is_a_regex_counts_by_the_words_of_the_request_afterwards() -> None:
-    world = World((Room("hall", ("cup|mug",)),), "hall")
-    silent = rule('not tr.OnlyAfterFirst(pick("^mug$")).Exists(say(".*"))')
-    for rules in (AS_WRITTEN, Rules(literals="as-written", events="as-happened")):
-        one = SimulatedRobot(world, rules, guard=RuleGuard([silent]))
+AS_HAPPENED = Rules(literals="as-written", events="as-happened")
+
+
+@pytest.mark.parametrize("rules", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
+@pytest.mark.parametrize("name", ["^cup[|]mug$", "^mug$"])
+def test_a_thing_whose_name_is_a_regex_counts_by_it_and_by_the_words_of_the_request(
+    rules: Rules, name: str
+) -> None:
+    world = World((Room("hall", ("cup|mug",)), Room("office")), "hall")
+
+    def guarded(formula: str) -> SimulatedRobot:
+        return SimulatedRobot(world, rules, guard=RuleGuard([rule(formula)]))
+
+    assert not refused(guarded(f'not tr.Exists(pick("{name}"))'), "pick", "mug").is_late
+    for formula, skill, request in (
+        (f'not tr.OnlyAfterFirst(pick("{name}")).Exists(say(".*"))', "say", "I have it"),
+        (f'not tr.Exists(holding("{name}", goto(".*")))', "go_to", "office"),
+        (f'not tr.Exists(place("{name}"))', "place", "mug"),
+    ):
+        one = guarded(formula)
         one.perform("pick", ["mug"])
-        refused(one, "say", "I have it")
+        assert not refused(one, skill, request).is_late
+
+
+def test_a_room_is_without_a_word_if_none_of_its_names_has_it() -> None:
+    world = World((Room("hall"), Room("lab [0-9]")), "hall")
+    one = SimulatedRobot(world, AS_WRITTEN, guard=RuleGuard([rule('not tr.Exists(goto(without("lab 3")))')]))
+    one.perform("go_to", ["lab 3"])
+    refused(one, "go_to", "lab 4")
+
+
+@pytest.mark.parametrize("rules", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
+def test_a_drive_that_fails_has_happened(rules: Rules) -> None:
+    one = SimulatedRobot(WORLD, rules, guard=RuleGuard([rule('not tr.AtLeast(goto(".*"), 2)')]))
+    with pytest.raises(RobotError, match="attic"):
+        one.perform("go_to", ["attic"])
+    refused(one, "go_to", "office")
+
+
+def test_where_it_is_uncertain_what_has_happened_rules_hold_whatever_it_was() -> None:
+    one, other = Event("goto", "lab"), Event("goto", "lab 2")
+    for formula, may in (
+        ('not tr.Exists(goto("2")) or not tr.Exists(say(".*"))', False),
+        ('not tr.Exists(say(".*")) or tr.Exists(goto("2"))', False),
+        ('not tr.Exists(say(".*")) or tr.Exists(goto("lab"))', True),
+    ):
+        for possible in ((one, other), (other, one)):
+            guard = RuleGuard([rule(formula)])
+            guard.happened(*possible)
+            guard.happened(*possible)
+            if may:
+                guard.judge(Event("say", "done"))
+            else:
+                with pytest.raises(RuleViolationError):
+                    guard.judge(Event("say", "done"))
+    late = RuleGuard([rule('not tr.Exists(goto("2"))')])
+    with pytest.raises(RuleViolationError) as caught:
+        late.happened(one, other)
+    assert caught.value.is_late
 
 
 def test_a_rule_that_ends_the_run_comes_before_one_that_refuses() -> None:
