@@ -13,6 +13,7 @@ from roboeval.cli.options import (
     EngineOption,
     JsonOption,
     ProcessOption,
+    RulesOption,
     RunArgument,
     SuiteOption,
     WorkersOption,
@@ -122,18 +123,19 @@ def resample(
     workers: WorkersOption = None,
     engine: EngineOption = "local",
     one_process_per_run: ProcessOption = False,
+    rules: RulesOption = None,
     json: JsonOption = False,
 ) -> None:
     """Compute how often programs would pass with rejection sampling.
 
-    It checks the programs of a judged run, and computes the result for each limit of retries; no model is
-    asked.
+    It checks the programs of a judged run, also by its house rules, and computes the result for each limit
+    of retries; no model is asked.
     """
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view
 
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
-        results = open_current(run, suite, ablated=False).results
+        results = open_current(run, suite, ablated=False, rules=rules).results
         checker = engine_for(len(results.places))
         prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
     limits = sorted(set(retries)) if retries else LIMITS

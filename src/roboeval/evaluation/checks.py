@@ -16,7 +16,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.folder import Run, load_head
+from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import read_checks
 from roboeval.suites.load import Suite
 
@@ -28,7 +28,7 @@ def check_programs(
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
     """Yield the problems of each program, checking those that nobody has checked with these settings.
 
-    Of the world, a check knows the rooms: those of the first world of the task.
+    Of the world, a check knows the rooms: those of the first world of the task. House rules are the suite's.
     """
     metadata = {
         "suite": suite.name,
@@ -38,7 +38,12 @@ def check_programs(
         "codebotler": __version__,
         "python": PYTHON,
     }
-    with run.writing(), contextlib.closing(_open(run, metadata)) as file:
+    if suite.house is not None:
+        metadata["house_rules"] = suite.house.digest
+    with (
+        run.writing(),
+        contextlib.closing(_open(run, evaluation_key(suite, ablated=False), metadata)) as file,
+    ):
         known = dict(read_checks(file.path))
         programs = {(c.task, c.program_sha256): c.program for c in completions}
         yield from ((key, known[key]) for key in programs if key in known)
@@ -46,7 +51,14 @@ def check_programs(
         if not new:
             return
         plans = {task.name: RoomMap.of(task.scenarios[0].world) for task in suite.tasks.values()}
-        check = partial(_check, plans, CheckSettings(samples=samples, seed=seed, rules=suite.rules))
+        settings = CheckSettings(
+            samples=samples,
+            seed=seed,
+            rules=suite.rules,
+            skills=suite.skills,
+            house_rules=() if suite.house is None else suite.house.rules,
+        )
+        check = partial(_check, plans, settings)
         works = ((task, program) for (task, _), program in new.items())
         with engine as opened:
             for key, problems in zip(new, opened.map_distinct(check, works, _sentences), strict=True):
@@ -54,8 +66,8 @@ def check_programs(
                 yield key, problems
 
 
-def _open(run: Run, metadata: dict[str, Any]) -> Appender:
-    rows, about = run.checks(metadata["suite"]), run.checks_head(metadata["suite"])
+def _open(run: Run, key: str, metadata: dict[str, Any]) -> Appender:
+    rows, about = run.checks(key), run.checks_head(key)
     about.parent.mkdir(exist_ok=True)
     if not about.exists() or load_head(about) != metadata:
         rows.unlink(missing_ok=True)

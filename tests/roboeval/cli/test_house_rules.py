@@ -61,14 +61,35 @@ def test_where_rules_are_not_named_their_verdicts_are_told_of(folder: Path) -> N
         "evaluate", "recorded:careful", "--out", "run", "--rules", "house.yaml", *TASKS, cwd=folder
     )
     assert evaluated.status == 0
-    told = refused("show", "run", cwd=folder)
-    assert told.file == "run"
-    assert "was judged with house rules only (house); name their file with --rules, or run" in told.sentence
+    (folder / "kit.yaml").write_text(RULES)
+    for more in ([], ["--rules", "kit.yaml"]):
+        told = refused("show", "run", *more, cwd=folder)
+        assert told.file == "run"
+        assert told.sentence.startswith(
+            "was judged with house rules only (house); name their file with --rules, or run"
+        )
     assert roboeval("evaluate", "run", *TASKS, cwd=folder).status == 0
     hint = "judged with house rules, too; --rules house.yaml shows that"
     for command in (("show", "run"), ("report", "run", "--out", "report", "--no-check")):
         assert hint in roboeval(*command, cwd=folder).err
     assert hint not in roboeval("show", "run", "--rules", "house.yaml", cwd=folder).err
+
+
+def accepted(folder: Path, *arguments: str) -> int:
+    """How many programs of a run the check accepts."""
+    told = json.loads(roboeval("resample", *arguments, "--json", cwd=folder).out)
+    return sum(prompt["accepted"] for prompt in told["prompts"])
+
+
+def test_rejection_sampling_rejects_what_breaks_a_rule(folder: Path) -> None:
+    of_suite = ("--suite", "rules", "--tasks", "FetchMugConflict")
+    assert roboeval("evaluate", "recorded:hasty", *of_suite, "--out", "own", cwd=folder).status == 0
+    assert accepted(folder, "own", "--suite", "rules") == 1  # of two, one of which breaks no rule
+    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+    judged(folder)
+    without = accepted(folder, "run")
+    assert accepted(folder, "run", "--rules", "house.yaml") < without
+    assert accepted(folder, "run") == without
 
 
 def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> None:

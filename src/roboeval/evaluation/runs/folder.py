@@ -91,7 +91,7 @@ class Run:
         return self.path / "evaluations" / f"{key}.json"
 
     def checks(self, key: str) -> Path:
-        """The problems of its programs; `key` is the suite's name."""
+        """The problems of its programs; `key` is that of their evaluation."""
         return self.path / "checks" / f"{key}.jsonl"
 
     def checks_head(self, key: str) -> Path:
@@ -268,12 +268,10 @@ def evaluation_of(
         raise UserError("is not a run: it has no completions.jsonl", file=path)
     if not run.rows(key).is_file():
         others, houses = run.judged_by(), run.houses(suite.name)
-        if houses and key == evaluation_key(suite.with_house_rules(None), ablated=ablated):
-            raise UserError(
-                f"was judged with house rules only ({', '.join(houses)}); "
-                f"name their file with --rules, or run `{again}`",
-                file=path,
-            )
+        if houses and suite.name not in others:
+            named = ", ".join(houses)
+            mend = f"name their file with --rules, or run `{again}`"
+            raise UserError(f"was judged with house rules only ({named}); {mend}", file=path)
         if not others or suite.name in others:
             raise UserError(f"has not been judged; run `{again}`", file=path)
         judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
