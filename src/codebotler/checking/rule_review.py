@@ -8,13 +8,14 @@ from itertools import chain, combinations
 
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.trace import Option, Trace
+from codebotler.core.trace import Names, Option, Trace
 from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided, samples
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
-from codebotler.simulator.rules import found_in
+from codebotler.rtl.reasoning.sample_strings import distinct_strings
+from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError, names_of
+from codebotler.simulator.rules import found_in, resolve_room
 from codebotler.simulator.sampled_robot import PEOPLE
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
@@ -112,12 +113,26 @@ def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None)
     """A shortest trace on which formulas hold and rules are kept, if there is one."""
     always = [rule.formula for rule in kept if rule.when == "always"]
     finally_ = [rule.formula for rule in kept if rule.when == "finally"]
-    moves = None if world is None else {room.name: room.name for room in world.rooms}
-    start = "" if world is None else world.robot
     spoken_of = [*wanted, *always, *finally_]
+    moves = None if world is None else {room: room for room in _rooms(spoken_of, world)}
+    start = "" if world is None else world.robot
     possible = [*dict.fromkeys(chain.from_iterable(map(_holding_needs_a_pick, spoken_of)))]
     reasoner = Reasoner([*spoken_of, *possible], moves, start)
     return reasoner.trace([*wanted, *finally_], always=[*always, *possible], shortest=True)
+
+
+def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
+    """The rooms of a world, by name; of those named by a regex, also by words that formulas tell apart."""
+    names = [room.name for room in world.rooms]
+    spoken_of = [*chain.from_iterable(map(elements, formulas))]
+    told: list[Text] = [one.text for one in spoken_of if one.kind == "goto"]
+    told += [Regex(one.place_regex.pattern) for one in spoken_of if one.place_regex is not None]
+    for name in names:
+        yield name
+        for word in distinct_strings((Regex(name), *dict.fromkeys(told))):
+            names_it = isinstance(names_of(name, word), Names) and resolve_room(names, word) == name
+            if names_it and any(text.matches(word) != text.matches(name) for text in told):
+                yield Names(word, name)
 
 
 def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:

@@ -201,3 +201,20 @@ def test_the_monitor_agrees_with_every_example() -> None:
         monitor = Monitor(review.rule.formula)
         assert review.breaks is not None
         assert [monitor.feed(event) for event in review.breaks][-1] is False
+
+
+@pytest.mark.parametrize(
+    ("formula", "breaks"),
+    [
+        ('not tr.Exists(goto("^lab 1$"))', [("lab 1", "")]),
+        ('not tr.Exists(goto(".12."))', [("lab [12]", "")]),
+        ('not tr.Exists(at("lab 2", goto("hall")))', [("lab 2", "hall"), ("hall", "lab 2")]),
+    ],
+)
+def test_a_room_whose_name_is_a_regex_has_examples_in_its_words(
+    formula: str, breaks: list[tuple[str, str]]
+) -> None:
+    world = World((Room("hall"), Room("lab [12]"), Room("acme inc.")), "hall")
+    (review,) = reviewed([Rule("lab", "Keep out.", parse(formula))], world)
+    assert review.breaks is not None
+    assert [(event.text, event.place) for event in review.breaks] == breaks
