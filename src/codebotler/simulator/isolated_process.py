@@ -19,7 +19,7 @@ import threading
 import time
 from collections.abc import Callable
 from functools import cache
-from importlib.machinery import BuiltinImporter, FrozenImporter, SourceFileLoader
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType
 from typing import IO
@@ -102,11 +102,12 @@ def compiled_file(role: str) -> IO[bytes]:
 
 @cache
 def _written_file(role: str) -> IO[bytes]:
+    codes = compiled_modules(compiled, role)
     file: IO[bytes] = (  # closed at the end of this process; in memory if possible, since a disk may be full
         os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
     )
     atexit.register(file.close)
-    file.write(compiled_modules(compiled, role))
+    file.write(codes)
     file.flush()
     return file
 
@@ -124,7 +125,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
     codes = {name: compiled_source("", f"<{name}>") for name in empty}
     codes |= {name: compiler(file, f"<{name}>") for name, file in files.items()}
     if role not in {PREPARER, BATCH_SERVER}:
-        codes |= {name: compiled(str(file), file.name) for name, file in stdlib_files().items()}
+        codes |= {name: code_of(str(file), file.name) for name, file in stdlib_files().items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 
 
@@ -133,28 +134,28 @@ def stdlib_files() -> dict[str, Path]:
     folder, files = Path(os.__file__).parent, {}
     for name in IMPORTED:
         path = folder.joinpath(*name.split("."))
-        if BuiltinImporter.find_spec(name) or FrozenImporter.find_spec(name):
-            continue
         if path.with_suffix(".py").is_file():
             files[name] = path.with_suffix(".py")
         elif (path / "__init__.py").is_file():
             files[name] = path / "__init__.py"
-            files |= {
-                f"{name}.{part.stem}": part for part in sorted(path.glob("*.py")) if part.stem[:2] != "__"
-            }
+            parts = (part for part in sorted(path.glob("*.py")) if part.stem != "__init__")
+            files |= {f"{name}.{part.stem}": part for part in parts}
     return files
 
 
-@cache
-def compiled(file: str, shown: str) -> bytes:
+def code_of(file: str, shown: str) -> bytes:
     """The code of one module, the same however this interpreter was started; `shown` is in tracebacks."""
-    if sys.flags.optimize:
-        return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
-    code = SourceFileLoader(shown, file).get_code(shown)
+    code = None
+    if not sys.flags.optimize:
+        with contextlib.suppress(EOFError, ImportError, ValueError):  # bytecode that is damaged
+            code = SourceFileLoader(shown, file).get_code(shown)
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
         # It was written by an interpreter that leaves columns out, so that it is shorter.
         return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
     return dumped(code, shown)
+
+
+compiled = cache(code_of)
 
 
 def compiled_source(source: str, shown: str) -> bytes:

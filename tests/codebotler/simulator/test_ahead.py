@@ -1,9 +1,12 @@
 """The child that is forked ahead, the program that is prepared ahead, and what becomes of them in trouble."""
 
+import marshal
 import os
+import py_compile
 import signal
 from collections.abc import Iterator
 from importlib.machinery import SourceFileLoader
+from importlib.util import cache_from_source
 from pathlib import Path
 from types import CodeType
 
@@ -130,7 +133,7 @@ def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pyte
     file = tmp_path / "module.py"
     file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
     wanted = isolated_process.compiled_source(file.read_text(encoding="utf-8"), "module")
-    assert isolated_process.compiled.__wrapped__(str(file), "module") == wanted
+    assert isolated_process.code_of(str(file), "module") == wanted
     get_code = SourceFileLoader.get_code
 
     def without_columns(self: SourceFileLoader, name: str) -> CodeType | None:
@@ -138,4 +141,16 @@ def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pyte
         return code and code.replace(co_linetable=b"")
 
     monkeypatch.setattr(SourceFileLoader, "get_code", without_columns)
-    assert isolated_process.compiled.__wrapped__(str(file), "module") == wanted
+    assert isolated_process.code_of(str(file), "module") == wanted
+
+
+def test_bytecode_that_is_damaged_is_not_taken(tmp_path: Path) -> None:
+    file = tmp_path / "module.py"
+    file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
+    wanted = isolated_process.compiled_source(file.read_text(encoding="utf-8"), "module")
+    bytecode = Path(cache_from_source(str(file)))
+    py_compile.compile(str(file), doraise=True)
+    whole = bytecode.read_bytes()
+    for damaged in (whole[:20], whole[:16] + b"\xff" * 9, whole[:16] + marshal.dumps(1)):
+        bytecode.write_bytes(damaged)
+        assert isolated_process.code_of(str(file), "module") == wanted

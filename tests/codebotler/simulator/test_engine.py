@@ -722,6 +722,25 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
     assert "5 seconds of processor time" in told("trap '' XCPU INT", "sum(range(10**12))")
 
 
+HANDED_OVER = f"""
+from hashlib import sha256
+from codebotler.simulator.isolated_process import compiled, compiled_modules
+print(sha256(compiled_modules(compiled, {FORK_SERVER!r})).hexdigest())
+"""
+
+
+def test_what_a_fork_server_is_handed_does_not_depend_on_how_python_was_started() -> None:
+    def told(*flags: str, **variables: str) -> str:
+        command = [sys.executable, *flags, "-c", HANDED_OVER]
+        environment = {**os.environ, **variables}
+        return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
+
+    plain = told(PYTHONHASHSEED="1")
+    assert len(plain.strip()) == 64
+    assert told("-X", "frozen_modules=off", PYTHONHASHSEED="2") == plain
+    assert told("-O", PYTHONDONTWRITEBYTECODE="1") == plain
+
+
 MODULES_TOLD = """
 import sys
 
@@ -730,7 +749,7 @@ def task_program():
     say(str(len(modules)))
     say(str([m.__name__ for m in modules if type(m.__spec__.loader).__name__.startswith("Source")]))
     for module in modules:
-        say(str((module, vars(module).get("__file__"), vars(module).get("__path__"))))
+        say(str((module, module.__spec__, vars(module).get("__file__"), vars(module).get("__path__"))))
 """
 
 
@@ -743,6 +762,17 @@ def test_a_fork_server_compiles_next_to_nothing_and_modules_name_no_folder() -> 
     assert int(number) > 200
     assert len(compiled.split(",")) < 30
     assert [text for text in told if str(Path(os.__file__).parent) in text] == []
+
+
+def test_an_interrupt_while_code_is_compiled_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> bytes:
+        raise KeyboardInterrupt
+
+    before = set(Path("/proc/self/fd").iterdir())
+    monkeypatch.setattr(isolated_process, "compiled_modules", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        compiled_file("no role that was compiled before")
+    assert set(Path("/proc/self/fd").iterdir()) == before
 
 
 def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -165,6 +165,11 @@ WORKS: dict[str, tuple[str, object]] = {
         task("say(f'{255:X}|{3.14159:.2F}|{7!R:>5}|ABC')".replace("!R", "!r")),
         ["FF|3.14|    7|abc"],
     ),
+    "a log with a wrong format": (
+        "import logging\n"
+        + task("logging.warning('found %d', 'kitchen')\nlogging.warning('a', 1)\nsay('done')"),
+        ["done"],
+    ),
     "bytes are no text": (task("say(b'ABC'.decode())"), ["ABC"]),
     "match": (
         task(

@@ -46,7 +46,9 @@ def get_ready(
         del sys.modules[name]
     for module in sys.modules.values():
         if hasattr(module, "__path__"):
-            module.__path__ = []  # which would name folders of this machine
+            module.__path__ = [""]  # no folder of this machine, but one, which `logging` takes for granted
+            if module.__spec__ is not None:
+                module.__spec__.submodule_search_locations = module.__path__
     sys.meta_path[:] = [NothingMore()]
     give_up_rights()
     seccomp = usable_filter()
