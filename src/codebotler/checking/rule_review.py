@@ -15,7 +15,7 @@ from codebotler.rtl.reasoning import Reasoner, Undecided, samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError, names_of
-from codebotler.simulator.rules import found_in, resolve_room
+from codebotler.simulator.rules import finds, found_in
 from codebotler.simulator.sampled_robot import PEOPLE
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
@@ -130,7 +130,8 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
     for name in names:
         yield name
         for word in distinct_strings((Regex(name), *dict.fromkeys(told))):
-            names_it = isinstance(names_of(name, word), Names) and resolve_room(names, word) == name
+            found = [one for one in names if finds(word, one, "label-in-request")]
+            names_it = isinstance(names_of(name, word), Names) and found == [name]
             if names_it and any(text.matches(word) != text.matches(name) for text in told):
                 yield Names(word, name)
 

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from typing import Protocol
 
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
 from codebotler.robots import base
@@ -106,18 +107,31 @@ class LiveRobot:
         """Execute one skill, or raise RobotError, StoppedError, RobotLostError, or OSError for its log."""
         self._check_end()
         row = self.skills[skill]
-        if row.recording is not None and row.recording.is_drive:  # what is judged is what the robot is told
+        if skill in SKILLS:
+            return self._performed(row, arguments)
+        try:
+            result = self._performed(row, arguments)
+        except RobotError:
+            self._find_out()
+            raise
+        self._find_out()  # nobody knows what a user's skill does inside
+        return result
+
+    def _performed(self, row: Skill, arguments: Sequence[Argument]) -> Result:
+        """What comes of one skill, as `perform` tells it."""
+        is_drive = row.recording is not None and row.recording.is_drive
+        if is_drive:  # what is judged is what the robot is told
             arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
         event = attempted(row, arguments, place=self._place, time=self.now, holding=self._held)
         if event is not None and self._guard is not None:
-            self._judge(self._guard, event)
+            self._judge(self._guard, event, is_drive=is_drive)
         if event and row.recording and row.recording.when_tried:
             self._events.append(event)
         try:
             result = self._logged(row, [_text(argument) for argument in arguments], event)
         except RobotError:
             if event and row.recording and row.recording.when_tried:
-                self._happened(event, failed=True)
+                self._happened(event, is_drive=is_drive, failed=True)
             raise
         if event is None or row.recording is None:
             return result
@@ -127,14 +141,14 @@ class LiveRobot:
         answer = None if chosen is None else event.options[chosen].text
         found = result if isinstance(result, bool) else None
         self._events.append(replace(event, answer=answer, found=found))
-        self._place_and_hold(event)
-        self._happened(self._events[-1])
+        if is_drive:
+            self._place = event.text
+        self._hold(event)
+        self._happened(self._events[-1], is_drive=is_drive)
         return result if chosen is None else chosen
 
-    def _place_and_hold(self, event: Event) -> None:
+    def _hold(self, event: Event) -> None:
         match event.kind:
-            case "goto":
-                self._place = event.text
             case "pick":
                 self._held = event.text or "something"
             case "place":
@@ -142,9 +156,9 @@ class LiveRobot:
 
     # --- rules
 
-    def _judge(self, guard: RuleGuard, event: Event) -> None:
+    def _judge(self, guard: RuleGuard, event: Event, *, is_drive: bool) -> None:
         """Refuse what a rule forbids, in whichever room it would happen; the robot is not told."""
-        rooms = self._meant(event.text) if event.kind == "goto" else []
+        rooms = self._meant(event.text) if is_drive else []
         texts = [event.text, *(names_of(room, event.text) for room in rooms if room != event.text)]
         try:
             guard.judge(*(replace(event, text=text, place=place) for text in texts for place in self._here))
@@ -152,14 +166,13 @@ class LiveRobot:
             self._end_by(broken)
             raise
 
-    def _happened(self, event: Event, *, failed: bool = False) -> None:
+    def _happened(self, event: Event, *, is_drive: bool, failed: bool = False) -> None:
         """Tell the guard what has happened, which may break a rule that depends on an answer."""
         if self._guard is None:
             return
         places, texts = self._here, [event.text]
-        if event.kind == "goto":
-            texts = self._reached(event.text)
-            self._here = self._left(places, texts) if failed else texts
+        if is_drive:
+            texts = self._driven(event.text, failed=failed)
         try:
             self._guard.happened(
                 *(replace(event, text=text, place=place) for text in texts for place in places)
@@ -187,29 +200,33 @@ class LiveRobot:
     def _meant(self, request: str) -> list[str]:
         return [] if self._room_map is None else self._room_map.rooms_meant(request)
 
-    def _reached(self, request: str) -> list[str]:
-        """The room to which a drive has led, as rules name it; several if nobody knows which of them."""
+    def _driven(self, request: str, *, failed: bool) -> list[str]:
+        """The rooms to which a drive may have led, as rules name them."""
         meant = self._meant(request)
-        if len(meant) > 1 and (room := self._room_now()) in meant:
-            meant = [room]
-        return [names_of(room, request) for room in meant] or [request]
+        goals = [names_of(room, request) for room in meant] or [request]
+        if failed:
+            self._here += goals if meant or self._room_map is None else []
+            self._find_out()
+            return goals  # that it has not reached one of them does not tell which it tried
+        self._here = [*goals]
+        if len(meant) != 1:
+            self._find_out()
+        return self._here if self._here[0] in goals else goals
 
-    def _left(self, places: list[str], goals: list[str]) -> list[str]:
-        """Where the robot may be after a drive from one of some places that has failed on its way."""
-        known = None if self._room_map is None else self._room_map.rooms
-        possible = [*places, *(goal for goal in goals if known is None or goal in known)]
-        room = self._room_now() if len(possible) > 1 else None
-        return possible if room is None else [next((one for one in possible if one == room), room)]
+    def _find_out(self) -> None:
+        """Ask the robot where it is; if it does not tell, it may be in any of the rooms known by now."""
+        if self._guard is not None and (room := self._room_now()) is not None:
+            self._here = [next((one for one in self._here if one == room), room)]
 
     def _room_now(self) -> str | None:
-        """The room in which the robot says it is, if it says one that it knows."""
+        """The room in which the robot says it is, if that is one of those that it knows."""
         if HERE not in self.skills or HERE in self.robot.missing or self._room_map is None:
             return None
         try:
-            room = answered(self.skills[HERE], self.robot.perform(HERE, ()))
+            told = str(answered(self.skills[HERE], self.robot.perform(HERE, ()))).strip().casefold()
         except (RobotError, CancelledError):
             return None
-        return room if isinstance(room, str) and room in self._room_map.rooms else None
+        return next((room for room in self._room_map.rooms if room.strip().casefold() == told), None)
 
     def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, logged."""

@@ -9,12 +9,14 @@ from functools import lru_cache
 from typing import Literal, TypeAlias
 
 from codebotler.core.errors import VIOLATION, RobotError
+from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Names, attempted
 from codebotler.rtl import Formula, Inconclusive, Monitor
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.wording import event_words
-from codebotler.simulator.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot, Thing
 
+DRIVE, MOVES = "goto", {"pick", "place"}  # kinds of events
 Verdict: TypeAlias = Literal["forbids", "cannot judge", "is broken by"]
 Watched: TypeAlias = "tuple[Rule, Monitor, frozenset[str]]"  # the last: see `_depends_on`
 
@@ -78,7 +80,7 @@ class RuleGuard:
         self.rules = tuple(rules)
         self._watch([(rule, Monitor(rule.formula), _depends_on(rule)) for rule in rules])
         self._unjudged: set[str] = set()  # names of rules that had to compare an option that is no text
-        self._came = ""  # the words of the last drive
+        self._here = ""  # the room, as rules name it
 
     def _watch(self, watched: Iterable[Watched]) -> None:
         """Go on with monitors; of one rule there are several where it is uncertain what has happened."""
@@ -95,32 +97,51 @@ class RuleGuard:
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
         """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
         row, before = robot.skills[skill], len(robot.events)
-        place, thing, held = names_of(robot.room, self._came), robot.taken, robot.held or ""
+        if self._here != robot.room:
+            self._here = robot.room
+        thing, held = robot.taken, robot.held or ""
         holding = held if thing is None else names_of(thing.label, held)
-        attempt = attempted(row, arguments, place=place, time=robot.now, holding=holding)
-        if attempt is None:
-            return robot.execute(skill, arguments)
-        is_drive = row.recording is not None and row.recording.is_drive
-        self.judge(*_attempts(robot, attempt, arguments, is_drive=is_drive))
+        attempt = attempted(row, arguments, place=self._here, time=robot.now, holding=holding)
+        if attempt is not None:
+            self.judge(*_attempts(robot, attempt, arguments, is_drive=_is_drive(row)))
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
-            tried = [attempt] if row.recording is not None and row.recording.when_tried else []
-            for event in robot.events[before:] or tried:
-                self.happened(_seen(event, event.text, attempt))
+            tried = [attempt] if attempt is not None and _is_tried(row) else []
+            self._take_in(robot, row, robot.events[before:] or tried, thing, attempt, failed=True)
             raise
-        if is_drive:
-            self._came = attempt.text
-        moved = thing or robot.taken
-        for event in robot.events[before:]:
-            if is_drive:
-                text = names_of(robot.room, attempt.text)
-            elif moved is not None and event.kind in {"pick", "place"}:
-                text = names_of(moved.label, attempt.text)
-            else:
-                text = event.text
-            self.happened(_seen(event, text, attempt))
+        self._take_in(robot, row, robot.events[before:], thing, attempt)
         return result
+
+    def _take_in(
+        self,
+        robot: SimulatedRobot,
+        row: Skill,
+        events: Sequence[Event],
+        thing: Thing | None,
+        attempt: Event | None,
+        *,
+        failed: bool = False,
+    ) -> None:
+        """Take what has happened in a call, by all names of rooms and things; before, it held `thing`."""
+        start, own = self._here, _own_event(row, events, attempt, failed=failed)
+        moved = thing or robot.taken if sum(event.kind in MOVES for event in events) == 1 else None
+        for number, event in enumerate(events, 1):
+            text, asked = event.text, attempt.text if event is own and attempt is not None else event.text
+            place = next((name for name in (start, self._here) if name == event.place), event.place)
+            holding = (
+                attempt.holding if attempt is not None and attempt.holding == event.holding else event.holding
+            )
+            is_drive = event.kind == DRIVE or (event is own and _is_drive(row))
+            if is_drive and not (failed and (event is own or number == len(events))):
+                later = (each.place for each in events[number:] if event is not own and each is not own)
+                self._here = text = names_of(next(later, robot.room), asked)
+            elif moved is not None and event.kind in MOVES:
+                text = names_of(moved.label, asked)
+            if text is event.text and place is event.place and holding is event.holding:
+                self.happened(event)
+            else:
+                self.happened(replace(event, text=text, place=place, holding=holding))
 
     def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
@@ -194,12 +215,19 @@ def _attempts(
             yield replace(attempt, text=names_of(name, attempt.text))
 
 
-def _seen(event: Event, text: str, attempt: Event) -> Event:
-    """An event as rules see it, by all names of the room and of what is held."""
-    holding = attempt.holding if event.holding else ""
-    if event.text is text and event.place is attempt.place and event.holding is holding:
-        return event
-    return replace(event, text=text, place=attempt.place, holding=holding)
+def _own_event(row: Skill, events: Sequence[Event], attempt: Event | None, *, failed: bool) -> Event | None:
+    """Which of the events of a call is that of its skill, and not one of what the skill does inside."""
+    if attempt is None or not events or (failed and row.adds_event and not _is_tried(row)):
+        return None
+    return events[-1 if row.adds_event and not _is_tried(row) else 0]
+
+
+def _is_drive(row: Skill) -> bool:
+    return row.recording is not None and row.recording.is_drive
+
+
+def _is_tried(row: Skill) -> bool:
+    return row.recording is not None and row.recording.when_tried
 
 
 def names_of(name: str, request: str) -> str:

@@ -10,6 +10,7 @@ import pytest
 
 from codebotler.cli.run import checker
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, State
@@ -178,6 +179,68 @@ def test_where_a_drive_may_have_led_counts_unless_the_robot_tells(
     assert mission.state is state
 
 
+def test_a_robot_that_tells_of_a_room_which_nobody_meant_is_there(tmp_path: Path) -> None:
+    for request_, where in (("the lab, by the hall", "Lab 2 "), ("where the computers are", "lab 2")):
+        robot = answering(lambda skill, _: where if skill == "get_current_location" else None)  # noqa: B023 - at once
+        program = f"def task_program():\n    go_to({request_!r})\n    say('hello')\n"
+        mission, _ = ran(tmp_path / where.strip(), robot, program, [IN_LAB_2], LABS)
+        assert mission.state is State.STOPPED, request_
+
+
+def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: Path) -> None:
+    def answer(skill: str, _: str) -> Result:
+        if skill == "go_to":
+            raise RobotError("GoToInvalidLocation", "the door is shut")
+        return "hall" if skill == "get_current_location" else None
+
+    tried = Rule(
+        "tried", "Be silent after that.", parse('not tr.OnlyAfterFirst(goto("lab")).Exists(say("."))')
+    )
+    program = "def task_program():\n    try: go_to('hall by the lab')\n    except Exception: say('hello')\n"
+    mission, _ = ran(tmp_path, answering(answer), program, [tried], LABS)
+    assert mission.state is State.STOPPED
+
+
+OWN = """
+from codebotler import Simulation, skill
+
+@skill(verb="fly to {room}", names="room")
+def fly_to(sim: Simulation, room: str) -> None:
+    "Fly to a room."
+    sim.drive(room)
+
+@skill(verb="patrol", event=None)
+def patrol(sim: Simulation) -> None:
+    "Go through all rooms."
+    for room in sim.rooms:
+        sim.drive(room)
+"""
+
+
+@pytest.mark.parametrize(
+    ("call", "formula", "done"),
+    [
+        ("fly_to('the lab 2')", 'not tr.Exists(fly_to("^lab 2$"))', 0),
+        ("fly_to('the lab 2')", 'not tr.Exists(at("lab 2", say(".*")))', 1),
+        ("fly_to('lab 2')", 'not tr.Exists(at("hall", say(".*")))', 2),
+        ("patrol()", 'not tr.Exists(at("lab 2", say(".*")))', 1),
+        ("patrol()", 'not tr.Exists(at("hall", say(".*")))', 2),
+    ],
+)
+def test_a_skill_of_a_user_that_moves_the_robot_moves_it_for_rules_too(
+    tmp_path: Path, call: str, formula: str, done: int
+) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    skills = skills_from(tmp_path / "own.py")
+    robot = Simulated(World((Room("hall"), Room("lab 2")), "hall"), speed=None, skills=skills)
+    rule = Rule("own", "So it is.", parse(formula, skills=skills))
+    rooms = RoomMap(("hall", "lab 2"), "hall")
+    program = f"def task_program():\n    {call}\n    say('hello')\n"
+    mission, lines = ran(tmp_path, robot, program, [rule], rooms)
+    assert [line["event"] for line in lines].count("skill") == done
+    assert mission.state is (State.DONE if done == 2 else State.STOPPED)
+
+
 @pytest.mark.parametrize(("where", "state"), [(None, State.STOPPED), ("hall", State.DONE)])
 def test_a_robot_may_be_anywhere_between_after_a_drive_that_failed(
     tmp_path: Path, where: str | None, state: State
@@ -216,10 +279,11 @@ REGEXES = RoomMap(("hall", "acme inc.", "lab [0-9]"), "hall")
 @pytest.mark.parametrize("request_", ["acme inc ", " acme inc", "acme inc\t"])
 def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: str) -> None:
     """The regex of the room needs a character at its end, which would be a space."""
-    robot = answering()
+    robot = knowing("hall")
     rule = Rule("acme", "Stay out.", parse('not tr.Exists(goto("acme inc[.]"))'))
     mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], REGEXES)
-    assert (mission.state, robot.done) == (State.DONE, ["acme inc"])
+    assert mission.state is State.DONE
+    assert robot.done[0] == "acme inc"
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.files import skills_from
 from codebotler.core.trace import Event, Option, Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import holds, parse
@@ -197,6 +198,65 @@ def test_a_drive_that_fails_has_happened(rules: Rules) -> None:
     with pytest.raises(RobotError, match="attic"):
         one.perform("go_to", ["attic"])
     refused(one, "go_to", "office")
+
+
+OWN = """
+from codebotler import Simulation, skill
+
+@skill(verb="go to {room} by the vault", names="room")
+def via(sim: Simulation, room: str) -> None:
+    "Go to a room through the vault."
+    sim.drive("vault")
+    sim.drive(room)
+    sim.record("say", "here I am")
+
+@skill(verb="hop to {room}", names="room", event=None)
+def hop(sim: Simulation, room: str) -> None:
+    "Hop to a room."
+    sim.drive(room)
+
+@skill(verb="tidy {what}", names="object")
+def tidy(sim: Simulation, what: str) -> None:
+    "Put a glass down, and pick something up."
+    sim.take("glass")
+    sim.put("glass")
+    sim.take(what)
+"""
+
+
+@pytest.mark.parametrize("rules", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
+@pytest.mark.parametrize(
+    ("calls", "formula", "breaks"),
+    [
+        (["via office"], 'not tr.Exists(goto("vault"))', True),
+        (["via office"], 'not tr.Exists(say("here"))', True),
+        (["via office"], 'not tr.Exists(at("office", say(".*")))', True),
+        (["via office"], 'not tr.Exists(at("hall", say(".*")))', False),
+        (["via office"], 'not tr.Exists(at("hall", goto("office")))', False),
+        (["via office"], 'not tr.Exists(at("vault", goto("office")))', True),
+        (["hop vault", "say hello"], 'not tr.Exists(at("vault", say(".*")))', True),
+        (["hop vault"], 'not tr.Exists(goto("vault"))', True),
+        (["go_to vault", "hop office", "say hello"], 'not tr.Exists(at("vault", say(".*")))', False),
+        (["tidy mug"], 'not tr.Exists(pick("glass"))', True),
+        (["tidy mug"], 'not tr.AtLeast(pick("mug"), 2)', False),
+        (["tidy mug", "go_to office"], 'not tr.Exists(holding("mug", goto(".*")))', True),
+    ],
+)
+def test_what_a_skill_of_a_user_does_inside_counts(
+    tmp_path: Path, rules: Rules, calls: list[str], formula: str, *, breaks: bool
+) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    skills = skills_from(tmp_path / "own.py")
+    guard = RuleGuard([Rule("own", "So it is.", parse(formula, skills=skills))])
+    one = SimulatedRobot(WORLD, rules, skills, guard=guard)
+    *first, (skill, _, argument) = (call.partition(" ") for call in calls)
+    for name, _, given_ in first:
+        one.perform(name, [given_])
+    if breaks:
+        with pytest.raises(RuleViolationError):
+            one.perform(skill, [argument])
+    else:
+        one.perform(skill, [argument])
 
 
 def test_where_it_is_uncertain_what_has_happened_rules_hold_whatever_it_was() -> None:
