@@ -204,13 +204,13 @@ def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: 
 OWN = """
 from codebotler import Simulation, skill
 
-@skill(verb="fly to {room}", names="room")
-def fly_to(sim: Simulation, room: str) -> None:
-    "Fly to a room."
+@skill(verb="glide to {room}", names="room")
+def glide_to(sim: Simulation, room: str) -> None:
+    "Glide to a room."
     sim.drive(room)
 
-@skill(verb="patrol", event=None)
-def patrol(sim: Simulation) -> None:
+@skill(verb="wander", event=None)
+def wander(sim: Simulation) -> None:
     "Go through all rooms."
     for room in sim.rooms:
         sim.drive(room)
@@ -220,11 +220,11 @@ def patrol(sim: Simulation) -> None:
 @pytest.mark.parametrize(
     ("call", "formula", "done"),
     [
-        ("fly_to('the lab 2')", 'not tr.Exists(fly_to("^lab 2$"))', 0),
-        ("fly_to('the lab 2')", 'not tr.Exists(at("lab 2", say(".*")))', 1),
-        ("fly_to('lab 2')", 'not tr.Exists(at("hall", say(".*")))', 2),
-        ("patrol()", 'not tr.Exists(at("lab 2", say(".*")))', 1),
-        ("patrol()", 'not tr.Exists(at("hall", say(".*")))', 2),
+        ("glide_to('the lab 2')", 'not tr.Exists(glide_to("^lab 2$"))', 0),
+        ("glide_to('the lab 2')", 'not tr.Exists(at("lab 2", say(".*")))', 1),
+        ("glide_to('lab 2')", 'not tr.Exists(at("hall", say(".*")))', 2),
+        ("wander()", 'not tr.Exists(at("lab 2", say(".*")))', 1),
+        ("wander()", 'not tr.Exists(at("hall", say(".*")))', 2),
     ],
 )
 def test_a_skill_of_a_user_that_moves_the_robot_moves_it_for_rules_too(

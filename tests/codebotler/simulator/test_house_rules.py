@@ -204,19 +204,19 @@ OWN = """
 from codebotler import Simulation, skill
 
 @skill(verb="go to {room} by the vault", names="room")
-def via(sim: Simulation, room: str) -> None:
+def go_by(sim: Simulation, room: str) -> None:
     "Go to a room through the vault."
     sim.drive("vault")
     sim.drive(room)
     sim.record("say", "here I am")
 
 @skill(verb="hop to {room}", names="room", event=None)
-def hop(sim: Simulation, room: str) -> None:
+def hop_to(sim: Simulation, room: str) -> None:
     "Hop to a room."
     sim.drive(room)
 
-@skill(verb="tidy {what}", names="object")
-def tidy(sim: Simulation, what: str) -> None:
+@skill(verb="swap a glass for {what}", names="object")
+def swap_for(sim: Simulation, what: str) -> None:
     "Put a glass down, and pick something up."
     sim.take("glass")
     sim.put("glass")
@@ -228,18 +228,18 @@ def tidy(sim: Simulation, what: str) -> None:
 @pytest.mark.parametrize(
     ("calls", "formula", "breaks"),
     [
-        (["via office"], 'not tr.Exists(goto("vault"))', True),
-        (["via office"], 'not tr.Exists(say("here"))', True),
-        (["via office"], 'not tr.Exists(at("office", say(".*")))', True),
-        (["via office"], 'not tr.Exists(at("hall", say(".*")))', False),
-        (["via office"], 'not tr.Exists(at("hall", goto("office")))', False),
-        (["via office"], 'not tr.Exists(at("vault", goto("office")))', True),
-        (["hop vault", "say hello"], 'not tr.Exists(at("vault", say(".*")))', True),
-        (["hop vault"], 'not tr.Exists(goto("vault"))', True),
-        (["go_to vault", "hop office", "say hello"], 'not tr.Exists(at("vault", say(".*")))', False),
-        (["tidy mug"], 'not tr.Exists(pick("glass"))', True),
-        (["tidy mug"], 'not tr.AtLeast(pick("mug"), 2)', False),
-        (["tidy mug", "go_to office"], 'not tr.Exists(holding("mug", goto(".*")))', True),
+        (["go_by office"], 'not tr.Exists(goto("vault"))', True),
+        (["go_by office"], 'not tr.Exists(say("here"))', True),
+        (["go_by office"], 'not tr.Exists(at("office", say(".*")))', True),
+        (["go_by office"], 'not tr.Exists(at("hall", say(".*")))', False),
+        (["go_by office"], 'not tr.Exists(at("hall", goto("office")))', False),
+        (["go_by office"], 'not tr.Exists(at("vault", goto("office")))', True),
+        (["hop_to vault", "say hello"], 'not tr.Exists(at("vault", say(".*")))', True),
+        (["hop_to vault"], 'not tr.Exists(goto("vault"))', True),
+        (["go_to vault", "hop_to office", "say hello"], 'not tr.Exists(at("vault", say(".*")))', False),
+        (["swap_for mug"], 'not tr.Exists(pick("glass"))', True),
+        (["swap_for mug"], 'not tr.AtLeast(pick("mug"), 2)', False),
+        (["swap_for mug", "go_to office"], 'not tr.Exists(holding("mug", goto(".*")))', True),
     ],
 )
 def test_what_a_skill_of_a_user_does_inside_counts(
