@@ -172,6 +172,9 @@ def test_a_suite_is_evaluated_and_mutated_from_the_command_line(own: Own, tmp_pa
     words = ["run", "--model", "recorded:careful", "--suite", str(own.folder), "--no-report"]
     passed = CliRunner().invoke(roboeval, [*words, "--out", str(tmp_path / "careful")])
     assert "pass@1 over all prompts: 1.000" in passed.output, passed.output
+    again = ["resample", str(tmp_path / "careful"), "--suite", str(own.folder), "--json"]
+    checked = json.loads(CliRunner().invoke(roboeval, again).stdout)["prompts"]
+    assert [prompt["accepted"] for prompt in checked] == [prompt["completions"] for prompt in checked]
     mutated = CliRunner().invoke(
         roboeval, ["mutate", "--suite", str(own.folder), "--mutants", "10", "--brief"]
     )

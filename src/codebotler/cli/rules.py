@@ -71,7 +71,7 @@ def steps_view(trace: Trace) -> RenderableType:
 def is_drive(event: Event) -> bool:
     """Whether an event takes the robot to another room."""
     row = by_event(event.kind)
-    return row is not None and row.recording is not None and row.recording.is_drive
+    return row is not None and row.is_drive
 
 
 def step_sentence(event: Event, here: str = "") -> str:

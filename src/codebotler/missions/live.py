@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Protocol
 
+from codebotler.checking.room_names import HERE
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
@@ -19,7 +20,6 @@ from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
 
-HERE = "get_current_location"
 TELLING = 6.0  # seconds within which a robot has been told to stop
 
 
@@ -119,7 +119,7 @@ class LiveRobot:
 
     def _performed(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         """What comes of one skill, as `perform` tells it."""
-        is_drive = row.recording is not None and row.recording.is_drive
+        is_drive = row.is_drive
         if is_drive:  # what is judged is what the robot is told
             arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
         event = attempted(row, arguments, place=self._place, time=self.now, holding=self._held)
@@ -205,7 +205,7 @@ class LiveRobot:
         meant = self._meant(request)
         goals = [names_of(room, request) for room in meant] or [request]
         if failed:
-            self._here += goals if meant or self._room_map is None else []
+            self._here = [*self._here, *(goals if meant or self._room_map is None else ())]
             self._find_out()
             return goals  # that it has not reached one of them does not tell which it tried
         self._here = [*goals]

@@ -103,7 +103,7 @@ class RuleGuard:
         holding = held if thing is None else names_of(thing.label, held)
         attempt = attempted(row, arguments, place=self._here, time=robot.now, holding=holding)
         if attempt is not None:
-            self.judge(*_attempts(robot, attempt, arguments, is_drive=_is_drive(row)))
+            self.judge(*_attempts(robot, attempt, arguments, is_drive=row.is_drive))
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
@@ -132,7 +132,7 @@ class RuleGuard:
             holding = (
                 attempt.holding if attempt is not None and attempt.holding == event.holding else event.holding
             )
-            is_drive = event.kind == DRIVE or (event is own and _is_drive(row))
+            is_drive = event.kind == DRIVE or (event is own and row.is_drive)
             if is_drive and not (failed and (event is own or number == len(events))):
                 later = (each.place for each in events[number:] if event is not own and each is not own)
                 self._here = text = names_of(next(later, robot.room), asked)
@@ -220,10 +220,6 @@ def _own_event(row: Skill, events: Sequence[Event], attempt: Event | None, *, fa
     if attempt is None or not events or (failed and row.adds_event and not _is_tried(row)):
         return None
     return events[-1 if row.adds_event and not _is_tried(row) else 0]
-
-
-def _is_drive(row: Skill) -> bool:
-    return row.recording is not None and row.recording.is_drive
 
 
 def _is_tried(row: Skill) -> bool:

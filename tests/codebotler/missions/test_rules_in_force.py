@@ -201,6 +201,17 @@ def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: 
     assert mission.state is State.STOPPED
 
 
+def test_a_drive_that_failed_began_where_the_robot_was(tmp_path: Path) -> None:
+    def answer(skill: str, _: str) -> Result:
+        raise RobotError("GoToInvalidLocation", f"{skill}: the door is shut")
+
+    back = Rule("back", "Stay in lab 2.", parse('not tr.Exists(at("lab 2", goto(".*")))'))
+    program = "def task_program():\n    try: go_to('lab 2')\n    except Exception: pass\n"
+    for again, state in (("", State.DONE), ("    go_to('hall')\n", State.STOPPED)):
+        mission, _ = ran(tmp_path / state, answering(answer), program + again, [back], LABS)
+        assert mission.state is state
+
+
 OWN = """
 from codebotler import Simulation, skill
 

@@ -129,6 +129,11 @@ class Skill:
         return replace(self, does=does, is_idle=False)
 
     @property
+    def is_drive(self) -> bool:
+        """Whether the robot goes to a place that its event names."""
+        return self.recording is not None and self.recording.is_drive
+
+    @property
     def is_by_lot(self) -> bool:
         """Whether its function has no code, so that lots decide what comes of it."""
         return hasattr(self.does, "__wrapped__")
