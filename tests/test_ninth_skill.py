@@ -9,7 +9,7 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.checking.storyboard import step_text, steps_of
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.program import Flaw, Program
+from codebotler.core.program import Flaw, flaws
 from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, SkillTable
@@ -175,8 +175,8 @@ def test_a_check_in_imagined_worlds_knows_it() -> None:
 
 
 def test_static_check_knows_it() -> None:
-    assert Program(PROGRAMS["waves"]).problems(TABLE) == ()
-    assert [problem.kind for problem in Program(PROGRAMS["waves"]).problems()] == ["NameError", "NameError"]
-    (problem,) = Program(PROGRAMS["too many"]).problems(TABLE)
+    assert flaws(PROGRAMS["waves"], TABLE) == ()
+    assert [problem.kind for problem in flaws(PROGRAMS["waves"])] == ["NameError", "NameError"]
+    (problem,) = flaws(PROGRAMS["too many"], TABLE)
     assert isinstance(problem, Flaw)
     assert (problem.line, problem.kind) == (2, "TypeError")

@@ -7,6 +7,9 @@ import re
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -40,12 +43,18 @@ STUBBORN = """def task_program():
 """
 
 
+@contextmanager
 def begun(
-    graph: Graph, folder: Path, program: str, *options: str, robot: str = "ros1"
-) -> subprocess.Popen[str]:
+    graph: Graph,
+    folder: Path,
+    program: str,
+    *options: str,
+    robot: str = "ros1",
+    command: Sequence[str] = ("-m", "codebotler"),
+) -> Iterator[subprocess.Popen[str]]:
     (folder / "program.py").write_text(program)
-    return subprocess.Popen(
-        [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", robot, "--yes", *options],
+    with subprocess.Popen(
+        [sys.executable, *command, "run", "program.py", "--robot", robot, "--yes", *options],
         cwd=folder,
         env={
             **os.environ,
@@ -56,7 +65,11 @@ def begun(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-    )
+    ) as tool:
+        try:
+            yield tool
+        finally:
+            tool.kill()
 
 
 def test_skill_that_the_robot_lacks_is_said_before_it_moves(graph: Graph, tmp_path: Path) -> None:
@@ -92,6 +105,61 @@ def test_signal_cancels_the_goal_and_no_other_is_sent(
     server.expect("cancel", "never")
     assert (tool.returncode, server.said.empty()) == (status, True), err
     assert "stopped by" in out
+
+
+# The tool, in which a thread makes a call that lets no other thread run, not even for Ctrl-C.
+HELD = 6  # seconds
+FROZEN = f"""
+import ctypes, sys, threading, time
+from pathlib import Path
+
+def freeze():
+    while not Path("freeze").exists():
+        time.sleep(0.01)
+    ctypes.PyDLL(None).creat(b"frozen", 0o600)
+    ctypes.PyDLL(None).sleep({HELD})
+
+threading.Thread(target=freeze, daemon=True).start()
+sys.argv[0] = "codebotler"
+from codebotler.__main__ import main
+main()
+"""
+
+
+@pytest.mark.parametrize("robot", ["ros1", "rosbridge"])
+def test_robot_is_stopped_while_the_tool_hears_nothing(graph: Graph, tmp_path: Path, robot: str) -> None:
+    server = graph.serve(*SKILLS.rows)
+    with bridge(over_ros(graph.uri)) as double:
+        address = ("--address", double.address) if robot == "rosbridge" else ()
+        options = ("--despite-problems", *address)
+        with begun(graph, tmp_path, FAR, *options, robot=robot, command=("-c", FROZEN)) as tool:
+            for goal in ("", "", "never"):
+                server.expect("goal", goal)
+            (tmp_path / "freeze").touch()
+            while not (tmp_path / "frozen").exists():
+                time.sleep(0.01)
+            frozen = time.monotonic()
+            tool.send_signal(signal.SIGINT)
+            server.expect("cancel", "never")
+            assert time.monotonic() - frozen < HELD / 2
+            _, err = tool.communicate()
+    assert tool.returncode in {1, 130}, err
+    assert server.said.empty()
+
+
+def test_suspended_tool_stops_the_robot_and_says_so(graph: Graph, tmp_path: Path) -> None:
+    server = graph.serve(*SKILLS.rows)
+    with begun(graph, tmp_path, FAR, "--despite-problems") as tool:
+        for goal in ("", "", "never"):
+            server.expect("goal", goal)
+        tool.send_signal(signal.SIGSTOP)
+        try:
+            server.expect("cancel", "never")
+        finally:
+            tool.send_signal(signal.SIGCONT)
+        out, err = tool.communicate()
+    assert (tool.returncode, server.said.empty()) == (1, True), err
+    assert "no sign of life" in out + err
 
 
 @pytest.mark.parametrize("robot", ["ros1", "rosbridge"])

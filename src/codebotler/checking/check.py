@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import Protocol
 
-from codebotler.checking.problems import Check, Problem, Sample
-from codebotler.checking.room_names import MOST_ROOMS, lists_rooms, named_rooms
+from codebotler.checking.problems import Check, Sample
+from codebotler.checking.room_names import MOST_ROOMS
 from codebotler.checking.sampled import (
     SAMPLES,
     CheckSettings,
@@ -19,9 +19,8 @@ from codebotler.checking.sampled import (
     run_samples,
     sampled_runs,
 )
-from codebotler.checking.static import static_problems
+from codebotler.checking.static import read_program, read_rooms
 from codebotler.core.errors import UserError, expect_list
-from codebotler.core.program import Flaw, parsed, tree_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
@@ -154,18 +153,16 @@ def checks_on(
 def _checked(
     program: str, room_map: RoomMap, settings: CheckSettings, run: SampleRunner, width: int = AT_ONCE
 ) -> Check:
-    tree = parsed(program, compiled=True)
-    if isinstance(tree, Flaw):
-        problem = Problem(tree.kind, tree.message, tree.line)
-        return Check((problem,), (), room_map, settings.seed, settings.strict)
-    flaws = cache(partial(static_problems, program, tree, room_map, settings.skills))
-    ran = sampled_runs(partial(run, meanwhile=flaws), room_map, settings, width)
-    problems = list(flaws())
+    read = cache(partial(read_program, program, room_map, settings.skills))
+    ran = sampled_runs(partial(run, meanwhile=read), room_map, settings, width)
+    problems = list(read().problems)
+    if not read().compiles:
+        return Check(tuple(problems), (), room_map, settings.seed, settings.strict)
     for _ in range(GUESSES if room_map.guessed else 0):
         wider = _widened(room_map, ran)
         if wider == room_map:
             break
-        room_map, ran = wider, sampled_runs(partial(run, meanwhile=flaws), wider, settings, width)
+        room_map, ran = wider, sampled_runs(partial(run, meanwhile=read), wider, settings, width)
     blamed = {problem.line for problem in problems}
     problems += [problem for problem in failures(ran, room_map) if problem.line not in blamed]
     problems.sort(key=lambda problem: problem.line or 0)
@@ -198,9 +195,9 @@ def _room_map(program: str, rooms: Sequence[str] | None, start: str | None, skil
             raise UserError(f'the robot starts in "{start}", but the rooms are: {", ".join(names)}')
         return RoomMap(names, start)
     start = start or START
-    tree = tree_of(program)
-    named = [room for room in named_rooms(tree, skills) if room != start]
-    if len(named) < len(SOME_ROOMS) and lists_rooms(tree):
+    rooms_in_text, lists_all = read_rooms(program, skills)
+    named = [room for room in rooms_in_text if room != start]
+    if len(named) < len(SOME_ROOMS) and lists_all:
         named += [room for room in SOME_ROOMS if room not in named]
     return RoomMap((*named, start), start, guessed=True)
 

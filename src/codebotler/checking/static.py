@@ -1,18 +1,85 @@
-"""Static analysis: certain errors in code that is reached and not guarded, and skills that are misused."""
+"""Static analysis: certain errors in code that is reached and not guarded, and skills that are misused.
+
+Programs are read in a closed process, which nothing in their text can hold up for long.
+"""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from codebotler.checking.problems import Problem, no_room
-from codebotler.checking.room_names import fixed_drives
-from codebotler.core.program import TASK, Flaw, flaws_of, nodes
-from codebotler.core.skills.table import SkillTable
+from codebotler.checking.room_names import fixed_drives, lists_rooms, named_rooms
+from codebotler.core.program import TASK, Flaw, flaws_of, nodes, parsed, tree_of
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.skills.values import ValueType
+from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 from codebotler.simulator.sampled_robot import RoomMap
 
 EVERYTHING = frozenset({"Exception", "BaseException"})
 ENDS = (ast.Return, ast.Raise, ast.Continue, ast.Break)
+EXAMPLE = "def task_program():\n    if is_in_rom('mug'):\n        say('a mug')\n"
+
+
+@dataclass(frozen=True)
+class TextFindings:
+    """What the text of a program shows without a run."""
+
+    compiles: bool
+    problems: tuple[Problem, ...]
+
+
+def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> TextFindings:
+    """Find the certain errors of a program, one problem a line; that it takes long to read is one."""
+    try:
+        compiles, problems = _findings(program, room_map, _without_functions(skills))
+    except IsolatedCallError as error:
+        message = f"the program takes too long, or too much memory, to be read ({error.message})"
+        return TextFindings(compiles=False, problems=(Problem(error.kind, message),))
+    return TextFindings(compiles, tuple(Problem(*each) for each in problems))
+
+
+def read_rooms(program: str, skills: SkillTable) -> tuple[tuple[str, ...], bool]:
+    """Find the rooms that a program names, and whether it asks for the list of all rooms."""
+    try:
+        rooms, lists_all = _rooms(program, _without_functions(skills))
+    except IsolatedCallError:
+        return (), False
+    return tuple(rooms), lists_all
+
+
+@isolated(EXAMPLE, RoomMap(("start_loc",), "start_loc"), SKILLS)
+def _findings(
+    program: str, room_map: RoomMap, skills: SkillTable
+) -> tuple[bool, list[tuple[str, str, int | None]]]:
+    """Whether a program compiles, and the kind, the message and the line of each of its problems."""
+    tree = parsed(program, compiled=True)
+    if isinstance(tree, Flaw):
+        return False, [(tree.kind, tree.message, tree.line)]
+    found = static_problems(program, tree, room_map, skills)
+    return True, [(problem.kind, problem.message, problem.line) for problem in found]
+
+
+@isolated(EXAMPLE, SKILLS)
+def _rooms(program: str, skills: SkillTable) -> tuple[list[str], bool]:
+    """The rooms that a program names, and whether it asks for the list of all rooms."""
+    tree = tree_of(program)
+    return list(named_rooms(tree, skills)), lists_rooms(tree)
+
+
+def _without_functions(skills: SkillTable) -> SkillTable:
+    """The same skills without the code of users, which a closed process cannot import."""
+
+    def plain(value: ValueType) -> ValueType:
+        return replace(value, enum=None)
+
+    def declared(skill: Skill) -> Skill:
+        parameters = tuple(replace(one, type=plain(one.type)) for one in skill.parameters)
+        return replace(skill, does=None, parameters=parameters, returns=plain(skill.returns))
+
+    return SkillTable(tuple(one if SKILLS.get(one.name) is one else declared(one) for one in skills.rows))
 
 
 def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: SkillTable) -> list[Problem]:

@@ -15,11 +15,10 @@ from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.storyboard import steps_of, storyboard
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_BYTES, read_text, text_of
-from codebotler.core.program import TASK, bound_names
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import RunError
 from codebotler.core.words import room_name
-from codebotler.prompts.extract import program_of
+from codebotler.prompts.extract import program_in
 
 INPUT = "standard input"
 AROUND = 1
@@ -40,7 +39,7 @@ def read_program(name: str) -> str:
     text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
     if not text.strip():
         raise UserError("is empty; pipe a program or a model's reply into it", file=INPUT)
-    return text if TASK in bound_names(text) else program_of(text).source
+    return program_in(text)
 
 
 def check_view(found: Check, program: str, name: str, *, shows_all: bool = False) -> RenderableType:

@@ -1,4 +1,9 @@
-"""Programs as text: parsing, the skills they call, and what is certainly wrong with them."""
+"""Programs as text: parsing, the skills they call, and what is certainly wrong with them.
+
+Parsing takes linear time, but for texts in which CPython 3.11 is quadratic, so it has a bound. Compiling,
+`symtable` and pyflakes have no bound of their own: what uses them is called in closed processes only, on text
+that others wrote (`codebotler.simulator.isolated_call`).
+"""
 
 from __future__ import annotations
 
@@ -20,6 +25,7 @@ from codebotler.core.skills.table import Parameter, Skill, SkillTable
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
+LONGEST = 50_000  # characters of a program that is parsed: at most half a second
 MOST_NAMES, LONGEST_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
 ALIKE = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
 GIVEN = ("time", "sys")  # modules that every program finds imported
@@ -50,22 +56,13 @@ class Program:
     """Python source that should define `task_program`.
 
     Args:
-        source: its text; any text is allowed, and `problems` says what is wrong with it.
+        source: its text; any text is allowed.
     """
 
     source: str
 
     def __repr__(self) -> str:
         return f"Program({counted(len(self.source.splitlines()), 'line')})"
-
-    def problems(self, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-        """What is certainly wrong, by line; nothing is run.
-
-        Args:
-            skills: what the program may call.
-        """
-        tree = parsed(self.source, compiled=True)
-        return (tree,) if isinstance(tree, Flaw) else flaws_of(tree, self.source, skills)
 
 
 # --- parsing
@@ -101,11 +98,11 @@ def parse_expression(source: str) -> ast.expr:
 def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     """The syntax tree of any text, or why there is none; hostile nesting ends in CPython's own exceptions.
 
-    If `compiled` is set, the compiler looks for further errors, such as a stray `return`.
+    If `compiled` is set, the compiler looks for further errors, such as a stray `return`. On text that others
+    wrote, only a closed process may do that.
     """
-    if "\0" in source:
-        line = source[: source.index("\0")].count("\n") + 1
-        return Flaw(line, "SyntaxError", "the program contains a null character")
+    if "\0" in source or len(source) > LONGEST:
+        return _unreadable(source)
     try:
         tree = parse(source)
         if compiled:
@@ -121,6 +118,13 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     except (ValueError, OverflowError, SystemError) as error:
         return Flaw(None, type(error).__name__, f"the program cannot be read: {error}")
     return tree
+
+
+def _unreadable(source: str) -> Flaw:
+    if len(source) > LONGEST:
+        return Flaw(None, "MemoryError", f"the program is longer than {LONGEST:,} characters")
+    line = source[: source.index("\0")].count("\n") + 1
+    return Flaw(line, "SyntaxError", "the program contains a null character")
 
 
 def tree_of(source: str) -> ast.Module:
@@ -221,6 +225,17 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
 
 
 # --- what is certainly wrong
+
+
+def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
+    """What is certainly wrong with a program, by line; it is compiled, and not run.
+
+    Args:
+        source: its text, from a trusted author or in a closed process.
+        skills: what the program may call.
+    """
+    tree = parsed(source, compiled=True)
+    return (tree,) if isinstance(tree, Flaw) else flaws_of(tree, source, skills)
 
 
 def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 from codebotler.core.program import TASK, Flaw, Program, bound_names, entries, parsed, undefined_names
 from codebotler.core.skills.paper import SKILLS
+from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
 HELPER_ROUNDS = 20  # helpers of helpers, of which a reply to one instruction has two or three
 
@@ -23,16 +24,49 @@ def program_of(reply: str) -> Program:
     example that a base model went on to write, is dropped. A program that was cut off stays cut off.
 
     Args:
-        reply: code with or without fences and prose, or the indented body of `task_program` alone.
+        reply: code with or without fences and prose, or the indented body of `task_program` alone. One that
+            takes seconds to read is taken for the program as it is.
+
+    Raises:
+        EngineError: no isolated process can be started.
     """
+    try:
+        return Program(extract(reply))
+    except IsolatedCallError:
+        return Program(reply)
+
+
+def program_in(text: str) -> str:
+    """Find the program in a text that may be one, or a model's reply; see `program_of`.
+
+    Args:
+        text: a program that defines `task_program`, in whatever way, stays as it is.
+    """
+    try:
+        return text if defines_task(text) else program_of(text).source
+    except IsolatedCallError:
+        return text
+
+
+@isolated("def task_program():\n    say('hello')\n")
+def defines_task(text: str) -> bool:
+    """Whether a text compiles and binds `task_program` at module level."""
+    return TASK in bound_names(text)
+
+
+@isolated(
+    "Here it is:\n```python\ndef task_program():\n    greet()\n```\n```\ndef greet():\n    say('hello')\n```"
+)
+def extract(reply: str) -> str:
+    """The text of the program in a reply."""
     lines = re.split(r"\r\n|\r|\n", reply)
     tree = _tree(lines)
     if tree is not None and len(entries(tree)) <= 1 and TASK in bound_names("\n".join(lines)):
-        return Program(_joined([lines]))
+        return _joined([lines])
     reply = _without_thoughts("\n".join(lines))
     blocks = [*_blocks(reply.split("\n"))]
     chosen = _chosen(blocks)
-    return Program(reply if chosen is None else _with_helpers(chosen, blocks))
+    return reply if chosen is None else _with_helpers(chosen, blocks)
 
 
 @dataclass(frozen=True, eq=False)

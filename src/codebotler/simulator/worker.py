@@ -91,6 +91,13 @@ class Worker:
             stopped = "the engine was stopped" if self._stopped else f"an isolated process was lost: {error}"
             raise EngineError(stopped) from None
 
+    def compiles(self, source: str, robot: SkillPerformer) -> bool:
+        """Whether a program compiles, so that it can be run with a robot."""
+        try:
+            return isinstance(self._prepare(source, robot), Prepared)
+        except LostProcessError as error:
+            raise EngineError(f"an isolated process was lost: {error}") from None
+
     def stop(self) -> None:
         """End all processes, from any thread, and with them a run that is still going on."""
         self._stopped = True

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias, TypeVar
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.program import Flaw, parsed
 from codebotler.core.skills.declaration import by_name
+from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
 Node = TypeVar("Node", bound=ast.AST)
 Edit: TypeAlias = Mapping[Any, ast.AST | list[ast.stmt]]  # replacements of nodes; a list for a statement
@@ -55,11 +56,26 @@ class ProgramTree:
 
 def read(program: str) -> ProgramTree | None:
     """The tree of a program; None if it does not parse, or is nested too deeply to be unparsed."""
-    tree = parsed(program, compiled=True)
+    tree = parsed(program)
     try:
-        return None if isinstance(tree, Flaw) else ProgramTree(tree, ast.unparse(tree))
+        return (
+            None if isinstance(tree, Flaw) or not compiles(program) else ProgramTree(tree, ast.unparse(tree))
+        )
     except RecursionError:
         return None
+
+
+def compiles(program: str) -> bool:
+    """Whether a program compiles, within a few seconds and half a gigabyte."""
+    try:
+        return _compiles(program)
+    except IsolatedCallError:
+        return False
+
+
+@isolated("def task_program():\n    pass\n")
+def _compiles(program: str) -> bool:
+    return not isinstance(parsed(program, compiled=True), Flaw)
 
 
 def rewritten(node: Node, edit: Edit) -> Node:
@@ -89,7 +105,7 @@ def changed(program: ProgramTree, edit: Edit) -> str | None:
         text = ast.unparse(ast.fix_missing_locations(rewritten(program.tree, edit)))
     except RecursionError:
         return None
-    return None if isinstance(parsed(text, compiled=True), Flaw) else text
+    return text if compiles(text) else None
 
 
 # --- what stands in a tree

@@ -12,7 +12,6 @@ from statistics import fmean
 from typing import TypeAlias
 
 from codebotler.core.errors import VIOLATION
-from codebotler.core.program import Flaw, parsed
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import AHEAD, shared_pool
@@ -144,12 +143,21 @@ def _judged(worlds: int, house: HouseRules | None, batch: Batch) -> list[Compone
     suite = task.suite.with_house_rules(house)
     asked = asked_in(task.suite, task.name, first.prompt_index)
     robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
-    ran = shared_pool().here().run_all([(one.program, robots) for one in batch])
-    return [_components(one.program, outcomes, asked) for one, outcomes in zip(batch, ran, strict=True)]
+    worker = shared_pool().here()
+    ran = worker.run_all([(one.program, robots) for one in batch])
+    return [
+        _components(outcomes, asked, parses=_has_run(outcomes) or worker.compiles(one.program, robots[0]()))
+        for one, outcomes in zip(batch, ran, strict=True)
+    ]
+
+
+def _has_run(outcomes: Sequence[Outcome]) -> bool:
+    """Whether a program has certainly been executed, so that it is Python."""
+    return any(outcome.trace or outcome.error is None for outcome in outcomes)
 
 
 def _components(
-    program: str, outcomes: Sequence[Outcome], asked: Sequence[tuple[Scenario, list[bool]]]
+    outcomes: Sequence[Outcome], asked: Sequence[tuple[Scenario, list[bool]]], *, parses: bool
 ) -> Components:
     ran = [(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)]
     reward = total([Share.of(*one) for one in ran])
@@ -159,6 +167,6 @@ def _components(
         passed=float(reward == 1),
         requirements=fmean(fmean(are_met(outcome, scenario)) for outcome, scenario, _ in ran),
         without_errors=fmean(may_satisfy(outcome, scenario) for outcome, scenario, _ in ran),
-        parses=float(not isinstance(parsed(program, compiled=True), Flaw)),
+        parses=float(parses),
         rules_kept=fmean(kind != VIOLATION for kind in kinds),
     )

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from codebotler.core import program
-from codebotler.core.program import Program
+from codebotler.core.program import flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
 from codebotler.core.skills.values import NOTHING
@@ -27,7 +27,7 @@ USES_HELPER = "def task_program():\n    for room in rooms():\n        go_to(room
 
 
 def problems(text: str) -> list[tuple[int | None, str]]:
-    return [(p.line, p.message) for p in Program(text).problems()]
+    return [(p.line, p.message) for p in flaws(text)]
 
 
 def in_task(*statements: str) -> str:
@@ -40,7 +40,7 @@ def fenced(code: str, info: str = "python", marks: str = "```") -> str:
 
 def test_right_programs_have_no_problems() -> None:
     for reply in RECORDED:
-        found = Program(reply.program).problems()
+        found = flaws(reply.program)
         if reply.fails is None:
             assert found == (), reply.about
         elif reply.fails in {*UNPARSABLE, "NameError", "AskEmptyOptions"}:
@@ -104,7 +104,7 @@ def test_no_problem(text: str) -> None:
 
 def test_problems_stand_in_the_order_of_lines() -> None:
     text = "def task():\n    ask('a', 'b', [])\n    say(x)\n    go_to()\n    say(x)\n"
-    assert [p.line for p in Program(text).problems()] == [None, 2, 3, 4, 5]
+    assert [p.line for p in flaws(text)] == [None, 2, 3, 4, 5]
 
 
 @pytest.mark.parametrize(
@@ -118,24 +118,24 @@ def test_problems_stand_in_the_order_of_lines() -> None:
     ],
 )
 def test_a_misspelt_name_is_told_with_the_one_that_may_be_meant(lines: list[str], told: str) -> None:
-    assert [flaw.message for flaw in Program(in_task(*lines)).problems()] == [told]
+    assert [flaw.message for flaw in flaws(in_task(*lines))] == [told]
 
 
 def test_many_undefined_names_are_quickly_told() -> None:
     bound = "".join(f"    name_{n}_bound = 1\n" for n in range(600))
     used = "".join(f"    say(name_{n}_bond)\n" for n in range(600))
-    found = Program(f"def task_program():\n{bound}{used}").problems()
+    found = flaws(f"def task_program():\n{bound}{used}")
     assert len(found) == 600
     assert 0 < sum("did you mean" in flaw.message for flaw in found) <= 10
 
 
 def test_a_ninth_skill_is_known() -> None:
     skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NOTHING, "Wave."))
-    waves = Program(in_task("wave()"))
-    (unknown,) = waves.problems()
+    waves = in_task("wave()")
+    (unknown,) = flaws(waves)
     assert (unknown.line, unknown.kind) == (2, "NameError")
     assert "wave" in unknown.message
-    (lacks,) = waves.problems(skills)
+    (lacks,) = flaws(waves, skills)
     assert "hand" in lacks.message
 
 
@@ -160,9 +160,9 @@ DEEP = {
 
 @pytest.mark.parametrize("text", DEEP.values(), ids=DEEP)
 def test_hostile_source_is_a_problem(text: str) -> None:
-    assert Program(text).problems()
-    assert Program(in_task(text) if "\n" not in text else text).problems()
-    assert program_of(text).problems()
+    assert flaws(text)
+    assert flaws(in_task(text) if "\n" not in text else text)
+    assert flaws(program_of(text).source)
     assert program_of(fenced(text) + fenced(TASK)).source
 
 
@@ -200,9 +200,9 @@ def test_threads_parse_at_the_same_time() -> None:
 
 ODD = r"""
 import re
-from codebotler.core.program import Program, parse_expression
+from codebotler.core.program import flaws, parse_expression
 from codebotler.core.world import World
-Program("def task_program():\n    say('\\d' if 1 is 1 else '')\n").problems()
+flaws("def task_program():\n    say('\\d' if 1 is 1 else '')\n")
 parse_expression(r"'\d'")
 re.compile("[[a] nested")
 """

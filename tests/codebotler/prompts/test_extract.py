@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.program import Program, undefined_names
+from codebotler.core.program import flaws, undefined_names
 from codebotler.core.skills.table import SkillTable
 from codebotler.models.recorded import NAMES, recorded_model
-from codebotler.prompts.extract import program_of
+from codebotler.prompts.extract import extract, program_of
 
 RECORDED = [
     reply for name in NAMES for them in recorded_model(f"recorded:{name}").replies.values() for reply in them
@@ -274,7 +274,7 @@ def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyP
     def work(number: int) -> int:
         read.clear()
         chain = [f"def f{i}():\n    return f{i + 1}()\n" for i in range(number)]
-        assert source(blocks(USES_HELPER, "rooms = f0\n", *chain)).startswith(USES_HELPER)
+        assert extract.function(blocks(USES_HELPER, "rooms = f0\n", *chain)).startswith(USES_HELPER)
         return sum(read)
 
     monkeypatch.setattr("codebotler.prompts.extract.undefined_names", counted)
@@ -299,7 +299,7 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
     ):
         new = reply.replace("hello", "good day")  # which no other test has parsed
         texts.clear()
-        source(new)
+        extract.function(new)
         assert 0 < len(texts) == len(set(texts))
 
 
@@ -323,7 +323,7 @@ def test_cut_off_stays_cut_off(reply: str) -> None:
     if "Dear all" not in reply:  # there, what may be prose is dropped, and the string stays open
         assert program.source.rstrip("\n").endswith(reply.rstrip("`\n").rsplit("\n", 1)[-1])
     if "is_in" not in reply:
-        assert [p.kind for p in program.problems()] == ["SyntaxError"]
+        assert [p.kind for p in flaws(program.source)] == ["SyntaxError"]
 
 
 @given(st.sampled_from([r.program for r in RECORDED if r.fails is None]), st.integers(0, 2000))
@@ -344,11 +344,11 @@ def test_broken_code_in_front_is_no_prose() -> None:
 )
 def test_reply_without_code_is_the_source(reply: str) -> None:
     assert source(reply) == reply
-    assert program_of(reply).problems()
+    assert flaws(program_of(reply).source)
 
 
 @given(st.text(alphabet=st.sampled_from("`~ \n\t#a(=:\"'\0\ud800é"), max_size=60) | st.text())
 def test_any_reply_and_any_source_is_taken(text: str) -> None:
     program = program_of(text)
-    assert isinstance(program.problems(), tuple)
-    assert isinstance(Program(text).problems(), tuple)
+    assert isinstance(flaws(program.source), tuple)
+    assert isinstance(flaws(text), tuple)

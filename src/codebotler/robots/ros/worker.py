@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+import select
 import signal
 import subprocess
 import threading
@@ -22,13 +23,16 @@ Message: TypeAlias = dict[str, Any]
 WORKERS = Path(__file__).with_name("workers")
 READY = 30.0  # seconds within which it must report that it is ready
 LEAVES = 4.0  # seconds that it may take to end by itself
+BEAT = 0.1  # seconds between two signs of life of this process, without which it stops the robot
 LAST_LINES = 5  # of its error output, kept for error messages
 
 
 class RosWorker:
     """A process that runs one of our scripts; when it has ended, `{"is": "ended"}` is received.
 
-    It has a session of its own, so that Ctrl-C does not reach it before the robot was told to stop.
+    It has a session of its own, so that Ctrl-C does not reach it before the robot was told to stop. It cancels
+    the goal if this process gives no sign of life: a process that is suspended, or in which a long call lets
+    no other thread run, hears neither Ctrl-C nor a request to stop.
 
     Args:
         python: the interpreter.
@@ -44,7 +48,7 @@ class RosWorker:
         self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._printed: deque[str] = deque(maxlen=LAST_LINES)
         self._writing = threading.Lock()
-        self._cancel_sent = threading.Event()
+        self._cancel_sent, self._leaves = threading.Event(), threading.Event()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that the user names
                 [str(python), str(WORKERS / script)],
@@ -63,9 +67,10 @@ class RosWorker:
             ) from None
         pipes = (self._process.stdin, self._process.stdout, self._process.stderr)
         self._stdin, self._stdout, self._stderr = cast("tuple[IO[str], IO[str], IO[str]]", pipes)
-        self._readers = [threading.Thread(target=read, daemon=True) for read in (self._listen, self._keep)]
-        for reader in self._readers:
-            reader.start()
+        jobs = (self._listen, self._keep, self._beat)
+        self._threads = [threading.Thread(target=job, daemon=True) for job in jobs]
+        for thread in self._threads:
+            thread.start()
         self.send(start)
         self.about = self._ready(python)
 
@@ -90,6 +95,7 @@ class RosWorker:
 
     def leave(self) -> bool:
         """End it by closing its input, or by force; False if it had to be killed, or failed."""
+        self._leaves.set()
         with self._writing, suppress(OSError):
             self._stdin.close()
         try:
@@ -102,6 +108,7 @@ class RosWorker:
 
     def kill(self) -> None:
         """End it and all its children at once."""
+        self._leaves.set()
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
@@ -142,12 +149,18 @@ class RosWorker:
                 self._messages.put(message)
         self._messages.put({"is": "ended"})
 
+    def _beat(self) -> None:
+        while not self._leaves.wait(BEAT):
+            with suppress(OSError, ValueError):  # a worker that hangs must not make this thread hang as well
+                if select.select([], [self._stdin], [], 0)[1]:
+                    self.send({"do": "alive"})
+
     def _keep(self) -> None:
         self._printed.extend(line.strip() for line in self._stderr if line.strip())
 
     def _close(self) -> None:
-        for reader in self._readers:
-            reader.join(LEAVES)
+        for thread in self._threads:
+            thread.join(LEAVES)
         for pipe in (self._stdin, self._stdout, self._stderr):
             with suppress(OSError):  # of what was not yet written
                 pipe.close()

@@ -189,7 +189,9 @@ class Verifier:
                 wild()
 
     def annotated(self, node: ast.AnnAssign) -> None:
-        """Allow an assignment with an annotation."""
+        """Allow an assignment with an annotation, but not `(name): int`, which binds nothing."""
+        if node.value is None and not node.simple:
+            wild()
         self.value(node.target)
         self.annotation(node.annotation)
         if node.value is not None:

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from typing import IO, Any, Dict
@@ -26,6 +27,7 @@ class Channel:
         os.dup2(2, 1)
         self._in: IO[str] = os.fdopen(os.dup(0), "r", encoding="utf-8")
         self._lock = threading.Lock()
+        self.heard = float("inf")  # when the tool last sent something; infinite while a worker acts upon it
 
     def send(self, what: str, **more: Any) -> None:
         """Write one line; a tool that is gone is noticed at the end of the input."""
@@ -37,9 +39,13 @@ class Channel:
                 return
 
     def lines(self) -> Iterator[Message]:
-        """Incoming messages, until the tool closes its end or dies."""
+        """Incoming messages but for signs of life, until the tool closes its end or dies."""
         for line in iter(self._in.readline, ""):
-            yield json.loads(line)
+            message = json.loads(line)
+            if message.get("do") != "alive":
+                self.heard = float("inf")
+                yield message
+            self.heard = time.monotonic()
 
 
 def serve(make_worker: Callable[[Channel, Message], Any]) -> None:

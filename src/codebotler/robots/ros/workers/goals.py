@@ -11,6 +11,7 @@ from channel import Channel, Message, SetupError
 
 TICK = 0.1  # seconds between two rounds of the watchdog
 ALIVE = 1.0  # seconds between two signs of life
+TOOL_SILENCE = 0.7  # seconds without a sign of life of the tool, after which the robot is stopped
 LAST_WORDS = 1.0  # seconds for a cancelled goal to end when the worker does
 
 
@@ -175,7 +176,12 @@ class SkillWorker:
                 self.channel.send("gone", text=self.graph.why_left())
                 return
             goal = self.goal
-            if goal is not None and goal.sent is not None and not goal.is_over:
+            if goal is None or goal.is_over:
+                continue
+            if now - self.channel.heard > TOOL_SILENCE:
+                why = f"CodeBotler gave no sign of life for {TOOL_SILENCE:g} s, so the robot was stopped"
+                self.end(goal, "lost", text=why)
+            elif goal.sent is not None:
                 self.look_after(goal, goal.sent, now)
 
     def _fault(self, goal: Goal, sent: float, now: float) -> str | None:

@@ -1,0 +1,206 @@
+"""Calls our own functions on text that others wrote, in closed processes with limits.
+
+CPython's compiler needs minutes and gigabytes for some short texts, in one call that nothing interrupts and
+that lets no other thread run, not even the one that stops a robot. Such text is therefore compiled, or read
+by code whose time may grow faster than the text, only in these processes. They never execute it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
+
+from codebotler.simulator.isolated_process import (
+    ONE_AT_A_TIME,
+    IsolatedProcess,
+    LostProcessError,
+    ProtocolError,
+    cause_of_death,
+)
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS
+from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
+from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
+
+MAX_RESULT = 64_000_000  # bytes of JSON
+RESULT, FAILURE = b"+", b"-"  # first byte of an answer
+CODE = f"import sys; sys.path[:] = sys.argv[3:]; from {__name__} import serve; serve(*sys.argv[1:3])"
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+class IsolatedCallError(Exception):
+    """A function failed on a text, or needed more time or memory than a call may use.
+
+    Args:
+        kind: of the failure, such as `TimeoutError` or `MemoryError`.
+        message: one sentence.
+    """
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(f"{kind}: {message}")
+        self.kind, self.message = kind, message
+
+
+class IsolatedFunction(Generic[Arguments, Result]):
+    """A function that is called in a closed process; `isolated` makes one."""
+
+    def __init__(self, function: Callable[Arguments, Result], rehearsal: tuple[Any, ...]) -> None:
+        self.function, self._rehearsal = function, rehearsal
+        self.__doc__, self.__wrapped__ = function.__doc__, function
+        self.__module__, self.__name__ = function.__module__, function.__name__
+
+    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        """Call the function in a closed process, and in a new one if a used one fails.
+
+        Raises:
+            IsolatedCallError: the function failed, or used up its time or memory.
+            EngineError: no process can be started.
+        """
+        call = (self.__name__, pickle.dumps((args, kwargs)))
+        idle = IDLE.setdefault(self.__module__, [])
+        with suppress(IndexError, IsolatedCallError, LostProcessError):
+            return self._call(idle.pop(), call)
+        try:
+            with suppress(LostProcessError):
+                return self._call(ClosedProcess(self.__module__), call)
+            return self._call(ClosedProcess(self.__module__), call)
+        except (LostProcessError, OSError) as error:
+            from codebotler.simulator.worker import EngineError  # noqa: PLC0415 - which these processes lack
+
+            raise EngineError(f"an isolated process was lost twice: {error}") from None
+
+    def rehearse(self) -> None:
+        """Call the function here, so that whatever it imports is imported."""
+        self.function(*self._rehearsal)  # type: ignore[call-arg]  # a rehearsal is a call that fits
+
+    def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> Result:
+        try:
+            result = process.call(*call)
+        except BaseException:  # even an interrupt, since the answer to this call must not reach the next one
+            process.end()
+            raise
+        IDLE[self.__module__].append(process)
+        return result  # type: ignore[no-any-return]  # which came as JSON
+
+
+def isolated(
+    *rehearsal: object,
+) -> Callable[[Callable[Arguments, Result]], IsolatedFunction[Arguments, Result]]:
+    """Have a module's function called in a closed process.
+
+    The process gets pickled arguments, and answers with plain data, as JSON has it: tuples become lists.
+
+    Args:
+        rehearsal: arguments with which each new process calls the function before it is closed.
+    """
+
+    def decorate(function: Callable[Arguments, Result]) -> IsolatedFunction[Arguments, Result]:
+        return IsolatedFunction(function, rehearsal)
+
+    return decorate
+
+
+class ClosedProcess:
+    """A process that calls the isolated functions of one module."""
+
+    def __init__(self, module: str) -> None:
+        flags = ["-S", "-s", "-P", "-W", "ignore", *(["-B"] if sys.dont_write_bytecode else [])]
+        path = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path would follow links
+        ours, theirs = socket.socketpair()
+        with theirs, ONE_AT_A_TIME:
+            self._process = subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
+                [sys.executable, *flags, "-c", CODE, module, str(theirs.fileno()), *path],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                cwd="/",
+                env={"PYTHONHASHSEED": "0", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"},
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+            )
+        self._channel = IsolatedProcess(
+            lambda: self._process.pid, ours, self._process.wait, has_seccomp=False
+        )
+
+    def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - whatever the function returns
+        """Call a function, and return its result."""
+        self._channel.send((name, arguments), at_once=True)
+        try:
+            answer = self._channel.receive_bytes(len(RESULT) + MAX_RESULT)
+        except (TimeoutError, ProtocolError) as silence:
+            raise IsolatedCallError(type(silence).__name__, "the process does not answer") from None
+        self._channel.reset_patience()
+        if not answer:
+            status = self._channel.ended()
+            if status == -signal.SIGKILL:
+                raise LostProcessError("it was killed from outside")
+            _, error = cause_of_death(status)
+            raise IsolatedCallError(error.kind, error.message)
+        data = json.loads(answer[1:])
+        if answer[:1] == FAILURE:
+            raise IsolatedCallError(*data)
+        return data
+
+    def end(self) -> None:
+        """End it, also in the middle of a call."""
+        self._channel.end()
+
+    def forget(self) -> None:
+        """Close its channel in a forked process, whose child it is not."""
+        self._process.returncode = 0
+        self._channel.hang_up()
+
+
+IDLE: dict[str, list[ClosedProcess]] = {}
+"""The processes that wait for a call, by the module whose functions they call."""
+
+
+def forget_all() -> None:
+    """Let go of the processes of the parent, in a forked process."""
+    for processes in IDLE.values():
+        while processes:
+            processes.pop().forget()
+
+
+os.register_at_fork(after_in_child=forget_all)
+
+
+# --- in the closed process
+
+
+def serve(module: str, descriptor: str) -> NoReturn:
+    """Call functions of a module for as long as anybody asks."""
+    import unicodedata as _  # noqa: F401, PLC0415 - for "\N{...}" in a text, which the parser imports too late
+
+    functions = {
+        name: one for name, one in vars(import_module(module)).items() if isinstance(one, IsolatedFunction)
+    }
+    for function in functions.values():
+        function.rehearse()
+    give_up_rights()
+    seccomp = usable_filter()
+    os.dup2(int(descriptor), CHANNEL)
+    os.closerange(CHANNEL + 1, 256)
+    enclose(seccomp, round(time.process_time()) + CPU_SECONDS)
+    while True:
+        name, call = receive_at_once()
+        send_frames([_answer(functions[name], call)])
+
+
+def _answer(function: IsolatedFunction[..., object], call: bytes) -> bytes:
+    try:
+        args, kwargs = pickle.loads(call)  # noqa: S301 - from our own process
+        return RESULT + json.dumps(function.function(*args, **kwargs)).encode()
+    except Exception as error:  # noqa: BLE001 - a function may fail on a text in any way
+        return FAILURE + json.dumps([type(error).__name__, str(error)[:1000]]).encode()
