@@ -30,9 +30,9 @@ LAST_LINES = 5  # of its error output, kept for error messages
 class RosWorker:
     """A process that runs one of our scripts; when it has ended, `{"is": "ended"}` is received.
 
-    It has a session of its own, so that Ctrl-C does not reach it before the robot was told to stop. It cancels
-    the goal if this process gives no sign of life: a process that is suspended, or in which a long call lets
-    no other thread run, hears neither Ctrl-C nor a request to stop.
+    It has a session of its own, so that Ctrl-C does not reach it before the robot was told to stop. It
+    cancels the goal if this process gives no sign of life: a process that is suspended, or in which a long
+    call lets no other thread run, hears neither Ctrl-C nor a request to stop.
 
     Args:
         python: the interpreter.
