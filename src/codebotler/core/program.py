@@ -20,6 +20,7 @@ from codebotler.core.skills.table import Parameter, Skill, SkillTable
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
+MOST_NUMBERS = 5_000  # of a program: their hashes can collide, and the compiler and pyflakes look up each
 MOST_NAMES, LONGEST_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
 ALIKE = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
 GIVEN = ("time", "sys")  # modules that every program finds imported
@@ -109,6 +110,8 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     try:
         tree = parse(source)
         if compiled:
+            if sum(map(_is_number, nodes(tree))) > MOST_NUMBERS:
+                raise ValueError(f"more than {MOST_NUMBERS:,} numbers are written in it")
             with _PARSING:
                 compile(tree, FILE, "exec", dont_inherit=True)
     except SyntaxError as error:
@@ -121,6 +124,20 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     except (ValueError, OverflowError, SystemError) as error:
         return Flaw(None, type(error).__name__, f"the program cannot be read: {error}")
     return tree
+
+
+def _is_number(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, int | float | complex)
+
+
+def literal(node: ast.expr) -> Any:  # noqa: ANN401 - text, bytes, number, truth value, None or lists of them
+    """The value of a literal; a ValueError for others, and for dictionaries and sets, whose keys may collide."""
+    try:
+        if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
+            return ast.literal_eval(node)
+    except (TypeError, SyntaxError, MemoryError, RecursionError) as error:
+        raise ValueError(str(error)) from None
+    raise ValueError("it is a dictionary or a set")
 
 
 def tree_of(source: str) -> ast.Module:
@@ -216,6 +233,10 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
                 self.scope[value.name] = value
             else:
                 super().addBinding(node, value)
+
+        def DICT(self, node: ast.Dict) -> None:  # noqa: N802 - theirs compares each key with each
+            for part in (part for pair in zip(node.keys, node.values, strict=True) for part in pair):
+                self.handleNode(part, node)
 
     return messages, Names
 
@@ -328,8 +349,11 @@ def _mismatch(node: ast.Call, skill: Skill) -> str | None:
 def _wrong_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
     """A value that is written where it is passed, and that a skill does not take."""
     try:
-        value = ast.literal_eval(node)
-    except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):
+        value = literal(node)
+    except ValueError:
+        if isinstance(node, ast.Dict | ast.Set):
+            message = f"{skill.name}: {parameter.name} must be {parameter.words}, not {_literal(node)}"
+            yield Flaw(node.lineno, "TypeError", message)
         return
     if type(value) is tuple or not parameter.type.fits(value):
         is_choice = type(value).__name__ == parameter.type.base and not parameter.type.is_list

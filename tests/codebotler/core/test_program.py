@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -127,6 +128,26 @@ def test_many_undefined_names_are_quickly_told() -> None:
     found = Program(f"def task_program():\n{bound}{used}").problems()
     assert len(found) == 600
     assert 0 < sum("did you mean" in flaw.message for flaw in found) <= 10
+
+
+def test_a_program_with_too_many_numbers_is_not_compiled() -> None:
+    (few,) = Program("wish\n" + in_task(*["x = 7"] * 5_000)).problems()
+    (many,) = Program("wish\n" + in_task(*["x = 7"] * 5_001)).problems()
+    assert ("wish" in few.message, "5,000 numbers" in many.message) == (True, True)
+
+
+@pytest.mark.slow
+def test_keys_that_are_repeated_are_not_compared_with_each_other() -> None:
+    keys = ", ".join(f"'{n}': 'a', '{n}': 'b'" for n in range(5_000))
+    start = time.process_time()
+    assert Program(in_task(f"x = {{{keys}}}")).problems() == ()
+    assert time.process_time() - start < 1.2  # comparing them takes more than two seconds
+
+
+def test_a_dictionary_is_no_value_for_a_skill() -> None:
+    skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NOTHING, "Wave."))
+    (flaw,) = Program(in_task("wave({1: 2})")).problems(skills)
+    assert (flaw.line, flaw.kind, "a dictionary" in flaw.message) == (2, "TypeError", True)
 
 
 def test_a_ninth_skill_is_known() -> None:
