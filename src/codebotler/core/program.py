@@ -110,10 +110,7 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     try:
         tree = parse(source)
         if compiled:
-            if sum(map(_is_number, nodes(tree))) > MOST_NUMBERS:
-                raise ValueError(f"more than {MOST_NUMBERS:,} numbers are written in it")
-            with _PARSING:
-                compile(tree, FILE, "exec", dont_inherit=True)
+            _compile(tree)
     except SyntaxError as error:
         return Flaw(error.lineno or None, type(error).__name__, f"the program does not parse: {error.msg}")
     except UnicodeEncodeError as error:
@@ -126,12 +123,16 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     return tree
 
 
-def _is_number(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and isinstance(node.value, int | float | complex)
+def _compile(tree: ast.Module) -> None:
+    constants = (node.value for node in nodes(tree) if isinstance(node, ast.Constant))
+    if sum(isinstance(constant, int | float | complex) for constant in constants) > MOST_NUMBERS:
+        raise ValueError(f"more than {MOST_NUMBERS:,} numbers are written in it")
+    with _PARSING:
+        compile(tree, FILE, "exec", dont_inherit=True)
 
 
-def literal(node: ast.expr) -> Any:  # noqa: ANN401 - text, bytes, number, truth value, None or lists of them
-    """The value of a literal; a ValueError for others, and for dictionaries and sets, whose keys may collide."""
+def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth values, lists of them
+    """The value of a literal; a ValueError for others, and for dictionaries and sets: keys may collide."""
     try:
         if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
             return ast.literal_eval(node)

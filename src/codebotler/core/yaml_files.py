@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from datetime import date
 from difflib import get_close_matches
@@ -54,13 +55,12 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
         super().ascend_resolver()
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - theirs
-        try:
-            if isinstance(node, yaml.ScalarNode) and node.tag != TEXT and len(node.value) > MAX_NUMBER:
-                raise ValueError
-            return super().construct_object(node, deep)
-        except (ValueError, LookupError, AttributeError, OverflowError):  # no such date, for example
-            problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
-            raise _fault(f"{problem}; put quotes around the text", node) from None
+        is_long = isinstance(node, yaml.ScalarNode) and node.tag != TEXT and len(node.value) > MAX_NUMBER
+        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # no such date, for example
+            if not is_long:
+                return super().construct_object(node, deep)
+        problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
+        raise _fault(f"{problem}; put quotes around the text", node)
 
 
 def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
