@@ -2,3 +2,9 @@
 
 RoboEval's command line shares `obey` and the options.
 """
+
+import sys
+
+if sys.flags.optimize > 1:  # found here, since the commands cannot even be imported
+    sys.stderr.write("Skills need docstrings: leave out -OO, or set PYTHONOPTIMIZE to 0 or 1.\n")
+    raise SystemExit(2)
