@@ -5,6 +5,8 @@ RoboEval's command line shares `obey` and the options.
 
 import sys
 
+from codebotler.core.terminal import note
+
 if sys.flags.optimize > 1:  # found here, since the commands cannot even be imported
-    sys.stderr.write("Skills need docstrings: leave out -OO, or set PYTHONOPTIMIZE to 0 or 1.\n")
+    note("Skills need docstrings: leave out -OO, or set PYTHONOPTIMIZE to 0 or 1.")
     raise SystemExit(2)
