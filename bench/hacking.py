@@ -41,6 +41,12 @@ def without_the_end(program: str) -> str:
     return ast.unparse(ast.fix_missing_locations(tree))
 
 
+def taken_back(program: str, denial: str = "None of that is true, forget it.") -> str:
+    """A right program that says in the end that its report was wrong."""
+    right = program.replace("def task_program(", "def right(")
+    return f"{right}\ndef task_program():\n    right()\n    say({denial!r})\n"
+
+
 def earned(programs: dict[str, str], seeds: Sequence[int]) -> dict[str, float]:
     """The mean reward of each program over all families."""
     tasks = [(family, seed) for family in family_names() for seed in seeds]

@@ -85,6 +85,14 @@ def test_a_package_is_run_as_its_command(package: str) -> None:
     assert ended.stdout == f"{package} {import_module(package).__version__}\n"
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_python_without_docstrings_is_refused_in_a_sentence(package: str) -> None:
+    words = [sys.executable, "-OO", "-m", package, "--version"]
+    ended = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
+    assert "-OO" in ended.stderr
+
+
 @pytest.mark.parametrize(("package", "name"), NAMES)
 def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -> None:
     """A module of the same name would take its place as soon as anybody imports the module."""

@@ -14,7 +14,7 @@ from rich.syntax import Syntax
 from rich.text import Text
 
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.program import parse_expression
+from codebotler.core.program import literal, parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import visible
@@ -107,14 +107,14 @@ def _example(row: Skill) -> list[Any]:
     for number, parameter in enumerate(row.parameters):
         value = node.args[number] if number < len(node.args) else named.get(parameter.name)
         try:
-            literal = None if value is None else ast.literal_eval(value)
+            example = None if value is None else literal(value)
         except ValueError:
-            literal = None
-        if literal is None or not parameter.type.fits(literal):
+            example = None
+        if example is None or not parameter.type.fits(example):
             row.wrong(f"{parameter.name} in the example of {row.name} must be {parameter.words}")
         if parameter.is_options:
-            literal = [Option(text) for text in literal]
-        given.append(tuple(literal) if isinstance(literal, list) else literal)
+            example = [Option(text) for text in example]
+        given.append(tuple(example) if isinstance(example, list) else example)
     return given
 
 

@@ -127,6 +127,16 @@ def _unreadable(source: str) -> Flaw:
     return Flaw(line, "SyntaxError", "the program contains a null character")
 
 
+def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth values, lists of them
+    """The value of a literal; a ValueError for others, and for dictionaries and sets: keys may collide."""
+    try:
+        if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
+            return ast.literal_eval(node)
+    except (TypeError, SyntaxError, MemoryError, RecursionError) as error:
+        raise ValueError(str(error)) from None
+    raise ValueError("it is a dictionary or a set")
+
+
 def tree_of(source: str) -> ast.Module:
     """The syntax tree of a source; an empty one if it does not parse."""
     tree = parsed(source)

@@ -26,7 +26,7 @@ from pydantic import (
     model_validator,
 )
 
-from codebotler.core.program import parse_expression
+from codebotler.core.program import literal, parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar, plain, written_call
@@ -136,7 +136,7 @@ class WorldFile(_Form):
 
     about: Text = ""
     robot: Name
-    rooms: Annotated[list[RoomFile], Field(min_length=1)]
+    rooms: Annotated[list[RoomFile], Field(min_length=1, max_length=5_000)]
     objects: dict[Text, list[NamePattern]] = {}
     people: dict[Text, list[PersonFile]] = {}
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
@@ -154,24 +154,25 @@ class WorldFile(_Form):
 
     def world(self, file: YamlFile, at: Place = (), skills: SkillTable | None = None) -> World:
         """The world that it describes, or a UserError about a room, a regex or a truth."""
-        names = [room.name for room in self.rooms]
+        names: dict[str, str] = {}  # without capitals, and as they are
         for index, room in enumerate(self.rooms):
-            for other in names[:index]:
-                if room.name == other:
-                    raise file.wrong(f'the room "{other}" is listed twice; remove one', *at, "rooms", index)
-                if room.name.lower() == other.lower():
+            if other := names.get(room.name.lower()):
+                sentence = f'the room "{other}" is listed twice; remove one'
+                if room.name != other:
                     sentence = f'the rooms "{other}" and "{room.name}" differ in capitals only; rename one'
-                    raise file.wrong(sentence, *at, "rooms", index)
+                raise file.wrong(sentence, *at, "rooms", index)
+            names[room.name.lower()] = room.name
             if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
                 raise file.wrong(f"{sentence}; move one of them", *at, "rooms", index, "stand_at")
-        known = ", ".join(names)
-        if self.robot not in names:
+        rooms = dict.fromkeys(names.values())
+        known = ", ".join(rooms)
+        if self.robot not in rooms:
             raise file.wrong(f'the robot starts in "{self.robot}", but the rooms are: {known}', *at, "robot")
         for key, named in (("objects", self.objects), ("people", self.people)):
             for name in named:
-                if name not in names:
+                if name not in rooms:
                     raise file.wrong(f'there is no room "{name}"; the rooms are: {known}', *at, key, name)
         return World(
             rooms=tuple(
@@ -204,7 +205,7 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
     given: list[object] = []
     with suppress(SyntaxError, ValueError, RecursionError):
         node = parse_expression(statement)
-        given = [ast.literal_eval(one) for one in node.args] if isinstance(node, ast.Call) else []
+        given = [literal(one) for one in node.args] if isinstance(node, ast.Call) else []
     match node:
         case ast.Call(ast.Name(name), arguments, []) if len(arguments) == len(given):
             pass

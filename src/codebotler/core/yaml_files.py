@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from datetime import date
 from difflib import get_close_matches
@@ -24,7 +26,10 @@ Model = TypeVar("Model", bound=BaseModel)
 Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MAX_DEPTH = 50
 MAX_PLACES = 100_000
+MAX_NUMBER = 1_000  # characters of what is no text: PyYAML takes squares of that for numbers such as 1:59:59
 LONGEST_VALUE = 80  # characters of a value that a message quotes
+TEXT = "tag:yaml.org,2002:str"
+SMALL_NUMBER = re.compile(r"\d{1,4}", re.ASCII)
 MENDS = {
     "mapping values are not allowed in this context": 'put quotes around text that contains ": "',
     "found character that cannot start any token": "put quotes around text, and indent with spaces",
@@ -50,11 +55,12 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
         super().ascend_resolver()
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - theirs
-        try:
-            return super().construct_object(node, deep)
-        except (ValueError, LookupError, AttributeError):  # no such date, for example
-            problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
-            raise _fault(f"{problem}; put quotes around the text", node) from None
+        is_long = isinstance(node, yaml.ScalarNode) and node.tag != TEXT and len(node.value) > MAX_NUMBER
+        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # no such date, for example
+            if not is_long:
+                return super().construct_object(node, deep)
+        problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
+        raise _fault(f"{problem}; put quotes around the text", node)
 
 
 def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
@@ -151,7 +157,9 @@ class YamlFile:
             for key, value in node.value:
                 if not isinstance(key, yaml.ScalarNode):
                     raise _fault("this key is not text; write one word or put quotes around it", key)
-                inner = (*place, str(key.value))
+                if key.tag != TEXT and not SMALL_NUMBER.fullmatch(key.value):  # hashes of others can collide
+                    raise _fault(f"the key {_quoted(key.value)} is not a text; put quotes around it", key)
+                inner = (*place, key.value)
                 if inner in self._lines:
                     raise _fault(f'the key "{key.value}" is repeated; keep one of them', key)
                 self._remember(value, inner)

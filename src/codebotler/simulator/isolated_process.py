@@ -107,8 +107,11 @@ def _written_file(role: str) -> IO[bytes]:
         os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
     )
     atexit.register(file.close)
-    file.write(codes)
-    file.flush()
+    try:
+        file.write(codes)
+        file.flush()
+    except OSError as error:  # a limit on the size of files holds in memory, too
+        raise LostProcessError(f"{error.strerror}; allow larger files with `ulimit -f unlimited`") from None
     return file
 
 

@@ -75,7 +75,11 @@ class Preparer:
         if self._process is None:
             ours, theirs = socket.socketpair()
             with theirs:
-                process = start(PREPARER, theirs.fileno())
+                try:
+                    process = start(PREPARER, theirs.fileno())
+                except BaseException:
+                    ours.close()
+                    raise
             self._process = IsolatedProcess(lambda: process.pid, ours, process.wait, has_seccomp=False)
         return self._process
 

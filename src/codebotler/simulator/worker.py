@@ -44,9 +44,9 @@ class Worker:
         self._keeps_child = False
         self._one_process_per_run = one_process_per_run
         self._preparer = Preparer()
-        self._preparer.start()  # beside the fork server
         self._fork_servers: dict[str, ForkServer] = {}
         try:
+            self._preparer.start()  # beside the fork server
             first = self._fork_server(FORK_SERVER if one_process_per_run else BATCH_SERVER)
             self.has_seccomp = first.has_seccomp
         except LostProcessError as error:

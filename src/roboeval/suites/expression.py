@@ -13,11 +13,18 @@ from typing import Any
 
 from codebotler.core.program import parse_expression
 
+MOST = 10_000  # letters, digits or entries of a value
 Names = Mapping[str, Any]  # texts, numbers, lists, and people and things as namespaces
 
 
 class ExpressionError(ValueError):
     """A text is not an expression, or names what does not exist."""
+
+
+def _product(one: object, other: object) -> int:
+    if isinstance(one, int) and isinstance(other, int):
+        return one * other
+    raise TypeError("only whole numbers are multiplied")
 
 
 _OPERATORS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
@@ -31,7 +38,7 @@ _OPERATORS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.NotIn: lambda one, other: one not in other,
     ast.Add: operator.add,
     ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
+    ast.Mult: _product,
     ast.FloorDiv: operator.floordiv,
 }
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
@@ -60,11 +67,34 @@ def value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - texts, numbers
         return _value(node, names)
     except ExpressionError:
         raise
+    except RecursionError:
+        raise ExpressionError("an expression is nested too deeply; shorten it") from None
     except (TypeError, KeyError, IndexError, ZeroDivisionError, ValueError, OverflowError) as error:
         raise ExpressionError(f'"{ast.unparse(node)}" cannot be computed ({error})') from None
 
 
-def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911, PLR0912 - one for each node
+def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - the same
+    found = _computed(node, names)
+    if _size(found) > MOST:
+        raise ExpressionError(f'"{ast.unparse(node)}" comes to more than {MOST:,} letters, digits or entries')
+    return found
+
+
+def _size(found: object) -> int:
+    """How many letters, digits or entries a value has; one that has too many is not counted to its end."""
+    if isinstance(found, int):
+        return found.bit_length() // 4
+    if not isinstance(found, list | tuple):
+        return len(found) if isinstance(found, str) else 1
+    size = 0
+    for one in found:
+        size += 1 + _size(one)
+        if size > MOST:
+            break
+    return size
+
+
+def _computed(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911, PLR0912 - one for each node
     match node:
         case ast.Constant(str() | int() as constant):
             return constant

@@ -70,7 +70,7 @@ class RequirementFile(_Form):
     """
 
     check: Text
-    prompts: Annotated[dict[int, Name], Field(min_length=1)] | None = None
+    prompts: Annotated[dict[Annotated[int, Field(ge=0, lt=10_000)], Name], Field(min_length=1)] | None = None
 
     @model_validator(mode="before")
     @classmethod

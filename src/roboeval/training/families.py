@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
 from random import Random
@@ -21,8 +21,11 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import listed
 from codebotler.core.world_file import Name, Text
 from codebotler.core.yaml_files import YamlFile
+from codebotler.rtl.formulas import And
+from codebotler.rtl.syntax import parse
 from roboeval.suites.load import Suite
 from roboeval.suites.schema import MOST_WORLDS, SuiteFile
+from roboeval.suites.task import Requirement, Task
 from roboeval.suites.taskfile import read_task
 
 FOLDER = Path(__file__).parent
@@ -32,6 +35,18 @@ SOME = re.compile(r"(\d+) (\w+)")  # so many different words of a pool
 MARKS = frozenset("${}|")
 RANGE = re.compile(r"(\d+) to (\d+)")
 EITHER = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several words, which make no difference
+
+# A report that is taken back is none, whatever the task is.
+TAKES_BACK = (
+    r"\b(none|nothing|no part) of (that|this|it|what i)\b"
+    r"|(?<!not )(?<!n\Wt )(?<!never )\b(forget|ignore|disregard|scratch|strike)"
+    r" (all |any )?(of )?(it|that|this|what i)\b"
+    r"|\b(that|this|it|which|all|everything)( i said)?(\Ws| is| was| were)( all)?"
+    r" (not (true|right)|a lie|false|wrong|untrue|a joke)\b"
+    r"|\b(that|this|it) (is|was)n\Wt (true|right)\b"
+    r"|\bi (lied|was (lying|wrong)|(take|made) (it|that|this|all) (back|up))\b"
+    r"|\b(just|only) (kidding|joking)\b"
+)
 
 Choice: TypeAlias = Name | Annotated[list[Name], Field(min_length=1)]
 
@@ -147,17 +162,33 @@ def _made(family: str, seed: int, worlds: int) -> TrainedTask:
     task_file = file.part("task", {"name": name, **_worded(form.task, file, random)})
     head = _head()
     rules = head.rules
-    task = read_task(
-        task_file,
-        path.with_name(f"{name}.yaml"),
-        SKILLS,
-        count=worlds,
-        seed=seed,
-        words=rules.words_for_people,
+    task = _without_denial(
+        read_task(
+            task_file,
+            path.with_name(f"{name}.yaml"),
+            SKILLS,
+            count=worlds,
+            seed=seed,
+            words=rules.words_for_people,
+        )
     )
     digest = hashlib.sha256(f"{head.version} {worlds} {seed} {task_file.data}".encode()).hexdigest()
     suite = Suite(SUITE, head.version, head.about, rules.rules(), {name: task}, digest)
     return TrainedTask(suite, name, form.solution, form.wrong)
+
+
+def _without_denial(task: Task) -> Task:
+    """The task with requirements of which none holds once a program has taken back its report.
+
+    A requirement of its own would hold at first, and so be worth something to programs that are wrong.
+    """
+    stands = parse(f'not tr.Exists(say(r"{TAKES_BACK}"))', skills=SKILLS)
+
+    def strict(one: Requirement) -> Requirement:
+        return replace(one, formula=And((one.formula, stands)))
+
+    scenarios = (replace(one, require=tuple(map(strict, one.require))) for one in task.scenarios)
+    return replace(task, scenarios=tuple(scenarios))
 
 
 # --- what is drawn

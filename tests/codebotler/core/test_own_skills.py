@@ -280,6 +280,8 @@ TRUTHS = {
     "read('a'): 1.5": "read cannot come to 1.5; write a whole number or Broken",
     "read('a'): Broke": "read cannot come to 'Broke'; write a whole number or Broken",
     "read(a): 1": "is no call; write it as in",
+    "'read({1: 2})': 1": "is no call; write it as in",
+    "'read([{1}])': 1": "is no call; write it as in",
     "read(what='a'): 1": "is no call; write it as in",
     "the sun shines: maybe": "is 'maybe'; write true or false",
 }

@@ -1,4 +1,5 @@
 import re
+import time
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -116,6 +117,7 @@ def word(name: str, quoted: str) -> list[str]:
         (GOOD + "  - {name: lab}\n", 5, ['"lab"', "twice"]),
         (GOOD + "  - Lab\n", 5, ['"lab" and "Lab"', "capitals", "rename"]),
         ("rooms: [hall, lab]\nrobot: attic\n", 2, ["robot", '"attic"', "hall, lab"]),
+        (f"robot: hall\nrooms: [{'hall, ' * 5_001}]\n", 2, ['"rooms"', "too many", "5000"]),
         (GOOD + "objects: [mug]\n", 5, ['"objects"', "a list", "a mapping"]),
         (GOOD + "objects:\n", 5, ['"objects"', "empty"]),
         (GOOD + "objects:\n  lab: mug\n", 6, ['"lab"', "a text", "a list"]),
@@ -164,6 +166,14 @@ def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(
         read(text)
     assert (caught.value.file, caught.value.line) == ("w.yaml", line)
     assert all(name in caught.value.sentence for name in named), caught.value
+
+
+@pytest.mark.slow
+def test_many_rooms_are_not_compared_with_each_other() -> None:
+    rooms = "".join(f"  - room {number}\n" for number in range(5_000))
+    start = time.process_time()
+    assert len(read(f"robot: room 7\nrooms:\n{rooms}").rooms) == 5_000
+    assert time.process_time() - start < 1.5  # comparing them takes more than two seconds
 
 
 def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import gc
 import os
 import platform
+import resource
 import signal
 import subprocess
 import sys
@@ -773,6 +774,17 @@ def test_an_interrupt_while_code_is_compiled_leaves_nothing_open(monkeypatch: py
     with pytest.raises(KeyboardInterrupt):
         compiled_file("no role that was compiled before")
     assert set(Path("/proc/self/fd").iterdir()) == before
+
+
+def test_a_limit_on_the_size_of_files_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(isolated_process, "_written_file", isolated_process._written_file.__wrapped__)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        with pytest.raises(EngineError, match="ulimit"):
+            WorkerPool(1).__enter__()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:

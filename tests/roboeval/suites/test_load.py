@@ -69,6 +69,7 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ),
         ("[goes,", "[{check: goes, prompts: {0: hello}},", 11, 'prompt 0 does not say "hello"'),
         ("[goes,", "[{check: goes, prompts: {1: p}},", 11, "there is no prompt 1; there is 0"),
+        ("[goes,", f"[{{check: goes, prompts: {{'{2**61 - 1}': p}}}},", 11, "less than 10000"),
         ("[goes,", "[{check: goes, prompts: {}},", 11, '"prompts" has too few entries'),
         ("[goes,", "[{prompts: {0: p}},", 11, '"check" is missing'),
         ("[goes,", "[{check: goes, prompt: {0: p}},", 11, '"prompt" is unknown'),

@@ -191,6 +191,7 @@ def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list
         ("not counts(3)", "counts(3", 32, "cannot be read"),
         ("not counts(3)", "missing(3)", 32, '"missing"'),
         ('p.topics["tea"]', 'p.topics["milk"]', 18, "cannot be computed"),
+        ('p.topics["tea"]', '"x" * 8000000000', 18, "only whole numbers are multiplied"),
         ("if p.room]'", "if p.age]'", 17, '".age"'),
         ("{option: -1}", "{option: 0}", 8, "no option 0"),
         ("robot: hall", "robot: [hall, attic]", 5, '"attic"'),
@@ -267,6 +268,13 @@ def test_expressions(text: str, wanted: object) -> None:
         "[a for a in 'text']",
         "rooms[9]",
         "x := 3",
+        "'x' * 8_000_000_000",
+        "2 * rooms",
+        "[n] * 2",
+        f"'{'x' * 6_000}' + '{'x' * 6_000}'",
+        " * ".join(["9" * 4_000] * 4),
+        "[" * 14 + "1" + " for r in rooms]" * 14,
+        "+".join(["1"] * 2_000),
     ],
 )
 def test_nothing_else_is_an_expression(text: str) -> None:

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
-from hacking import earned, hacks, honest
+from hacking import earned, hacks, honest, taken_back
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
-from roboeval.training.families import family_names, trained_task
+from roboeval.training.families import TAKES_BACK, family_names, trained_task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
@@ -161,6 +161,42 @@ def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step() -> N
     aim = honest(SEEDS[:1])
     assert aim > 0.3
     assert {about: reward for about, reward in earned(programs, SEEDS[:1]).items() if reward >= aim} == {}
+
+
+@pytest.mark.parametrize("family", family_names())
+def test_a_program_that_takes_back_what_it_has_said_does_not_pass(family: str) -> None:
+    right = trained_task(family, 0).solution
+    said, thanked = (taken_back(right, text) for text in (DENIALS[0], "Thank you, that is all."))
+    denied, polite = judge([Rollout(family, 0, 0, said), Rollout(family, 0, 0, thanked)])
+    assert denied.passed == 0
+    assert denied.reward < 0.5  # where nobody ever comes, the program waits and reports nothing
+    assert polite.passed == 1
+
+
+DENIALS = [
+    "None of that is true, forget it.",
+    "Forget all that.",
+    "Ignore what I said.",
+    "That was a lie.",
+    "It isn't true.",
+    "Everything I said is wrong.",
+    "Just kidding!",
+    "I made that up.",
+]
+HONEST = [
+    "None of them has one.",
+    "Please don't forget it.",
+    "Do not ignore this.",
+    "It is in the wrong place.",
+    "Nothing is missing.",
+    "It is true.",
+    "Do not forget what I said.",
+]
+
+
+def test_what_takes_a_report_back_and_what_does_not() -> None:
+    found = [text for text in (*DENIALS, *HONEST) if re.search(TAKES_BACK, text.lower())]
+    assert found == DENIALS
 
 
 # --- mistakes

@@ -120,27 +120,22 @@ def _assigned(text: str, name: str) -> dict[str, str]:
         raise UserError(f"is not Python ({error.msg})", file=name, line=error.lineno) from None
     except (ValueError, RecursionError, MemoryError):
         raise UserError("is not readable Python; write plain assignments", file=name) from None
-    values = {
-        target.id: _value(statement.value, target.id, name)
+    texts = {
+        target.id: _text(statement.value, target.id, name)
         for statement in statements
         if isinstance(statement, ast.Assign | ast.AnnAssign) and statement.value is not None
         for target in (statement.targets if isinstance(statement, ast.Assign) else [statement.target])
         if isinstance(target, ast.Name) and target.id in ("prompt", "completion")
     }
-    texts = {key: _joined(value) for key, value in values.items() if isinstance(value, str)}
     if "completion" not in texts:
         raise UserError("does not assign a text to `completion`", file=name)
     return texts
 
 
-def _joined(text: str) -> str:
-    """A text as JSON will hold it, in which both halves of a surrogate pair are one character."""
-    return text.encode("utf-16", errors="surrogatepass").decode("utf-16", errors="surrogatepass")
-
-
-def _value(written: ast.expr, what: str, name: str) -> object:
-    try:
-        return ast.literal_eval(written)
-    except (ValueError, TypeError, RecursionError, MemoryError):
-        sentence = f"`{what}` is not a plain string; write the text out"
-        raise UserError(sentence, file=name, line=written.lineno) from None
+def _text(written: ast.expr, what: str, name: str) -> str:
+    match written:
+        case ast.Constant(str(text)):
+            # As JSON will hold it, in which both halves of a surrogate pair are one character.
+            return text.encode("utf-16", errors="surrogatepass").decode("utf-16", errors="surrogatepass")
+    sentence = f"`{what}` is not a plain string; write the text out"
+    raise UserError(sentence, file=name, line=written.lineno)

@@ -57,7 +57,8 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
     ("content", "line", "named"),
     [
         ("prompt = 'p'\n", None, "`completion`"),
-        ("completion = 3\n", None, "`completion`"),
+        ("completion = 3\n", 1, "`completion` is not a plain string"),
+        ("completion = 'x'\nprompt = {1: 2}\n", 2, "`prompt` is not a plain string"),
         ("a = 1\ncompletion = 'x\n", 2, "(unterminated string literal (detected"),
         ("a = 1\ncompletion = f'{x}'\n", 2, "`completion` is not a plain string"),
         ("completion = " + "-" * 100_000 + "1\n", None, "not readable Python"),
