@@ -3,7 +3,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 
 import pytest
 
@@ -128,6 +127,16 @@ def test_many_undefined_names_are_quickly_told() -> None:
     found = flaws(f"def task_program():\n{bound}{used}")
     assert len(found) == 600
     assert 0 < sum("did you mean" in flaw.message for flaw in found) <= 10
+
+
+def test_a_ninth_skill_is_known() -> None:
+    skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NOTHING, "Wave."))
+    waves = in_task("wave()")
+    (unknown,) = flaws(waves)
+    assert (unknown.line, unknown.kind) == (2, "NameError")
+    assert "wave" in unknown.message
+    (lacks,) = flaws(waves, skills)
+    assert "hand" in lacks.message
 
 
 DEEP = {
