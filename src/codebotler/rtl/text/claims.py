@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
-from codebotler.rtl.text.clauses import clauses, completed, sentences
+from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
 from codebotler.rtl.text.matcher import Matcher
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
@@ -194,4 +194,4 @@ class Claim(Matcher):
 def _polarities(text: str) -> tuple[tuple[str, Polarity], ...]:
     """The clauses of a text, each with its polarity."""
     parts = [clause for sentence in sentences(text) for clause in clauses(sentence, lists=True)]
-    return tuple((clause, polarity(clause)) for clause in completed(parts))
+    return tuple((clause, polarity(clause)) for clause in complete_clauses(parts))

@@ -143,8 +143,8 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     return [*_with_subjects(whole), *rejected]
 
 
-def completed(parts: Iterable[str]) -> Iterator[str]:
-    """The clauses of a text, with the word that some leave out: `bread is missing, butter is not missing`."""
+def complete_clauses(parts: Iterable[str]) -> Iterator[str]:
+    """Yield the clauses of a text, with the word that some leave out: `it is not missing` for `it is not`."""
     names_lack = False
     for part in parts:
         is_unfinished = names_lack and _UNFINISHED.search(part) is not None
@@ -218,7 +218,7 @@ def _gathered(parts: Sequence[_Part]) -> Iterator[str]:
             done.append(" ".join(names))  # "Good day, how are you?" asks nothing of the day
             done.append(part.text)
         else:
-            end = _end_of_list(done, waiting, part)
+            end = _find_end_of_list(done, waiting, part)
             if end:
                 done[-1:] = [" ".join([*done[-1:], *names[:end]])]
             done.append(" ".join([*names[end:], part.text]))
@@ -229,8 +229,8 @@ def _gathered(parts: Sequence[_Part]) -> Iterator[str]:
     yield from done or [" ".join(names)]
 
 
-def _end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part) -> int:
-    """How many of the names before a clause belong to the clause before them, or are a clause of their own.
+def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part) -> int:
+    """Count the names before a clause that belong to the clause before them, or are a clause of their own.
 
     A list ends at a contrast, or where the next clause cannot begin with it. Otherwise, if a list is what the
     clause before ends with, it ends with `and` and one more name: `he has tea and milk, sugar is missing`.
