@@ -82,6 +82,7 @@ UNITS = (
     *FILLERS,
     "a has b, no got, ",
     "a has b, ",
+    "a and b, c is missing but not d, ",
     "chocolate 1 ",
     "he is, ",
     "a: b",

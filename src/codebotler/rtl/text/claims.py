@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
-from codebotler.rtl.text.clauses import clauses, sentences
+from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
 from codebotler.rtl.text.matcher import Matcher
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
@@ -193,5 +193,5 @@ class Claim(Matcher):
 @lru_cache(maxsize=1024)  # several checks read the same text, and programs say what others said
 def _polarities(text: str) -> tuple[tuple[str, Polarity], ...]:
     """The clauses of a text, each with its polarity."""
-    parts = (clause for sentence in sentences(text) for clause in clauses(sentence, lists=True))
-    return tuple((clause, polarity(clause)) for clause in parts)
+    parts = [clause for sentence in sentences(text) for clause in clauses(sentence, lists=True)]
+    return tuple((clause, polarity(clause)) for clause in complete_clauses(parts))

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 from codebotler.rtl.text.polarity import denies_something
 
 _HALF_DAY = re.compile(r"(?<![^\W\d])([ap])\.\s?m\.?", re.IGNORECASE)  # a digit may touch it
 _END = re.compile(r"(?<=\?)(?!\?)|[!;\n]+|\.(?!\d)")
 _JOINT = re.compile(
-    r",(?!\d)|(?<!\d),|\b(?:and|(?<!anything )but|while|whereas|however|although|though)\b", re.IGNORECASE
+    r"(,(?!\d)|(?<!\d),|\b(?:and|(?<!anything )but|while|whereas|however|although|though)\b"
+    r"|(?<=, )(?:only|yet(?! to\b)|except(?=[^,]{0,40}\b(?:is|are|was|were|has|have)\b))\b)",
+    re.IGNORECASE,
 )
+_DASH = re.compile(r"(?<=[^\W\d]) [-\u2013\u2014] ")
 _FEW = r"(?:\w[\w']*+\W++){0,2}(?:\w[\w']*+\W*+)?"
 _ITEM = re.compile(rf"\W*+(?:(?:in|at|(?:as )?for|from)\s+(?:\w[\w']*+\W++)?)?{_FEW}", re.IGNORECASE)
 _PLACE = re.compile(r"\W*(?:in|at|(?:as )?for|from)\b", re.IGNORECASE)
 _VERB = re.compile(
     r"\b(?:is|are|was|were|am|be|has|have|had|will|would|can|could|should|might|does|do|did|says?|said|wants?|yes"
-    r"|accept\w*|agree\w*|join\w*|com(?:es?|ing)|lik(?:es?|ing)|needs?|buy|gave|gives?|please)\b|\w['\u2019](?:re|ll|ve|m|d)\b",
+    r"|accept\w*|agree\w*|join\w*|com(?:es?|ing)|lik(?:es?|ing)|needs?|buy|gave|gives?|please)\b|\w['\u2019](?:re|ll|ve|m|d|t)\b",
     re.IGNORECASE,
 )
 _TAG = re.compile(
@@ -31,7 +36,9 @@ _PROPOSES = re.compile(
 )
 _ASIDE = re.compile(
     r",\s{1,3}(?:which|who|(?:I am|I['\u2019]m) (?:afraid|sorry)|unfortunately|sadly|luckily)\b"
-    r"[^,;:\d]{0,60},",
+    r"[^,;:\d]{0,60},"
+    r"|,?\s{1,3}(?:however|though)\b,?(?=\s{1,3}(?:is|are|was|were|has|have|had|does|did|do|will|would|can"
+    r"|could|declin|refus|accept|agree|lack|said|says|wants?)(?:\b|ed|es?|s|n['\u2019]t))",
     re.IGNORECASE,
 )
 _THERE = re.compile(r"\s*(?:there|it)\b", re.IGNORECASE)
@@ -46,17 +53,22 @@ _INVERTED = re.compile(
     re.IGNORECASE,
 )
 _IN_VAIN = re.compile(r"\bwould\s+(?:like|love|have\s+(?:liked|loved))\s+to(?=\W{1,3}but\b)", re.IGNORECASE)
-# A list ends where what is missing begins, which has no subject of its own.
-_LIST = re.compile(
-    r"(?:(?:,| and| or)\s{1,3}(?!(?:no|not|but|and|or)\b)\w[\w']*"
-    r"(?: (?!(?:is|are|was|were|do|does|did|has|have|had|will|would|can|could|wants?|joins?|comes?)"
-    r"\b)\w[\w']*)?){1,9}"
-    r"(?=,?\s{1,3}(?:but|and)\s{1,3}(?:no|not|lacks?|(?:does|do|did|has|have|is|are)(?: not|n['\u2019]t))\b)",
+_SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
+_NO_SUBJECT = re.compile(
+    r"\s*(?:(?:no|not|neither) \w|(?:lacks?|is|are|was|were|does|do|did|has|have|had)(?:\b|n['\u2019]t))",
     re.IGNORECASE,
 )
-_LISTED = re.compile(r",?\s{1,3}(?:and|or)\s{1,3}|,\s{1,3}", re.IGNORECASE)
-_SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
-
+_SINGULAR = re.compile(r"\b(?:(is|was|has|does)|are|were|have|do)(?:\b|n['\u2019]t)", re.IGNORECASE)
+# After such a word a clause lists nothing: `Bob is in`, `butter is missing`, `Alice has accepted`.
+_STATES = r"(?:there|here|in|out|gone|(?:un)?available|absent|yes|no|not|too|\w+(?:ed|ing))\b"
+NEAR = 40  # characters at the end of a clause, in which such a word is looked for
+_STATE = re.compile(rf"\b{_STATES}\W*$", re.IGNORECASE)
+_LACK = re.compile(r"\b(?:missing|lacking|absent|unavailable|gone)\b", re.IGNORECASE)
+_UNFINISHED = re.compile(
+    r"\b(?:is|are|was|were)(?: not|n['\u2019]t)?\W*$"
+    rf"|^\W*(?:so|neither|nor) (?:is|are|was|were)\b|^\W*not (?!{_STATES})",
+    re.IGNORECASE,
+)
 
 # "Butter? No." is one sentence.
 _ANSWERED = re.compile(r"(?<![^.!?;\n] )\b(\w[\w' ]{0,30})\?\s+(yes|no|none)\b", re.IGNORECASE)
@@ -77,7 +89,7 @@ _SEARCHED = re.compile(
     r"\b(?:look|search|check|hunt|visit|inspect)\w*\b|\bwas in\b|\b(?:is|was) done\b", re.IGNORECASE
 )
 _IN_VAIN_THERE = re.compile(
-    r"\W*(?:but )?(?:(?:there (?:is|was|were)|i|we|it|you)\s+)?"
+    r"\W*(?:but )?(?:(?:there (?:is|was|were)|i|we|it|you)\s+)?(?:found\s+)?"
     r"(?:could ?n[o'\u2019]t|did ?n[o'\u2019]t|no|nothing|none)\b"
     r"(?!.*\b(?:rooms?|offices?|labs?)\b)",
     re.IGNORECASE,
@@ -101,47 +113,70 @@ def sentences(text: str) -> list[str]:
     return [part for part in _END.split(text) if part.strip().strip("?")]
 
 
+class _Part(NamedTuple):
+    joint: str  # the comma or word before it, in lower case
+    text: str
+
+
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     """The clauses of a sentence, divided by commas and words such as `but`; those that ask end with `?`.
 
-    With `lists`, a few words without a verb belong to the next full clause, or else to the one before:
-    `Alice and Bob are in` is one clause.
+    With `lists`, a few words without a verb belong to the full clause before or after them:
+    `Alice and Bob are in` is one clause, and `he has bread and butter, but cheese is missing` is two.
     """
     sentence = _ASIDE.sub(" ", _TAG.sub("", sentence))
     if _PROPOSES.match(sentence):  # "How about 75 degrees?" is no question
         sentence = sentence.rstrip("? ")
-    if lists:
-        sentence = _with_whole_lists(sentence)
+    if lists and not sentence.rstrip().endswith("?"):
+        sentence = _DASH.sub(", ", sentence)
     rejected = [f"not {match[1]}" for match in _INSTEAD.finditer(sentence)]
     sentence = _with_exception(_INSTEAD.sub(" ", sentence))
-    parts = _with_subjects([clause for part in _at_colon(sentence) for clause in _divided(part)])
+    parts = [part for half in _at_colon(sentence) for part in _divided(half)]
     if sentence.rstrip().endswith("?"):
-        parts = [f"{part}?" if _INVERTED.match(part) and part[-1] != "?" else part for part in parts]
-    return [*(_gathered(_with_results(parts)) if lists else parts), *rejected]
+        parts = [
+            part._replace(text=f"{part.text}?")
+            if _INVERTED.match(part.text) and part.text[-1] != "?"
+            else part
+            for part in parts
+        ]
+    whole = _with_results(_gathered(parts)) if lists else [part.text for part in parts]
+    return [*_with_subjects(whole), *rejected]
 
 
-def _with_whole_lists(sentence: str) -> str:
-    """The sentence, in which `cheese and butter` is one item in `has cheese and butter but no bread`."""
-    return _LIST.sub(lambda match: _LISTED.sub(" plus ", match[0]), sentence)
+def complete_clauses(parts: Iterable[str]) -> Iterator[str]:
+    """Yield the clauses of a text, with the word that some leave out: `it is not missing` for `it is not`."""
+    names_lack = False
+    for part in parts:
+        is_unfinished = names_lack and _UNFINISHED.search(part) is not None
+        yield f"{part} missing" if is_unfinished else part
+        names_lack = is_unfinished or _LACK.search(part) is not None
 
 
-def _divided(sentence: str) -> list[str]:
+def _divided(sentence: str) -> Iterator[_Part]:
+    joint = ""
     # "She would love to, but is busy" does not affirm.
-    return [part for part in _JOINT.split(_IN_VAIN.sub("might", sentence)) if part.strip()]
+    for at, piece in enumerate(_JOINT.split(_IN_VAIN.sub("might", sentence))):
+        if at % 2:
+            joint = piece.lower() if joint in ("", ",") else joint  # in ", but" the word counts
+        elif piece.strip():
+            yield _Part(joint, piece)
+            joint = ""
 
 
 def _with_exception(sentence: str) -> str:
-    """The sentence, with a clause for who is excepted: `all come, not Bob` for `all but Bob come`."""
+    """The sentence, with a clause for who is excepted: `all come, without Bob` for `all but Bob come`."""
     match = _EXCEPT.search(sentence)
-    if match is None or (match["but"] and _VERB.search(match["what"])):
+    if match is None:
+        return sentence
+    if match["but"] and _VERB.search(match["what"]) and not _is_item(match["whom"] + match["rest"]):
         return sentence
     rule = f"{sentence[: match.start()]}{match['of']}{match['what']}{match['rest']}".rstrip(" .")
-    excepted = f"{match['whom']} does" if denies_something(rule) else f"not {match['whom']}"
+    excepted = f"{match['whom']} does" if denies_something(rule) else f"without {match['whom']}"
     return f"{rule}, {excepted}"
 
 
-def _with_results(parts: list[str]) -> list[str]:
-    """The parts, with what was not found behind where it was sought, as in `I looked, but found none`."""
+def _with_results(parts: Iterable[str]) -> list[str]:
+    """The clauses, with what was not found behind where it was sought, as in `I looked, but found none`."""
     whole: list[str] = []
     for part in parts:
         if whole and _SEARCHED.search(whole[-1]) and _IN_VAIN_THERE.match(part):
@@ -159,7 +194,7 @@ def _at_colon(sentence: str) -> list[str]:
     return [sentence]
 
 
-def _with_subjects(parts: list[str]) -> list[str]:
+def _with_subjects(parts: Iterable[str]) -> list[str]:
     """The parts, with the subject `room 3` before `no stapler` in `room 3 has paper, but no stapler`."""
     whole: list[str] = []
     for part in parts:
@@ -168,34 +203,59 @@ def _with_subjects(parts: list[str]) -> list[str]:
     return whole
 
 
-def _gathered(parts: list[str]) -> Iterator[str]:
-    waiting: list[str] = []
+def _gathered(parts: Sequence[_Part]) -> Iterator[str]:
+    waiting: list[_Part] = []
     done: list[str] = []
     for number, part in enumerate(parts, start=1):
-        if _ASKED.search(part) and number < len(parts):  # what follows tells the answer
-            waiting.append(_WHETHER.sub(" ", part))
+        if _ASKED.search(part.text) and number < len(parts):  # what follows tells the answer
+            waiting.append(_Part(part.joint, _WHETHER.sub(" ", part.text)))
             continue
-        if _is_item(part):
+        if _is_item(part.text):
             waiting.append(part)
             continue
-        if waiting and part.endswith("?") and _INVERTED.match(part):
-            done.append(" ".join(waiting))  # "Good day, how are you?" asks nothing of the day
-            done.append(part)
-        elif done and _SUBJECT.match(part) and not _belong(waiting, part):
-            done[-1] = " ".join([done[-1], *waiting])  # the names before it belong to the clause before
-            done.append(part)
+        names = [name.text for name in waiting]
+        if waiting and part.text.endswith("?") and _INVERTED.match(part.text):
+            done.append(" ".join(names))  # "Good day, how are you?" asks nothing of the day
+            done.append(part.text)
         else:
-            done.append(" ".join([*waiting, part]))
+            end = _find_end_of_list(done, waiting, part)
+            if end:
+                done[-1:] = [" ".join([*done[-1:], *names[:end]])]
+            done.append(" ".join([*names[end:], part.text]))
         waiting = []
+    names = [name.text for name in waiting]
     if done:
-        done[-1] = " ".join([done[-1], *waiting])
-    yield from done or [" ".join(waiting)]
+        done[-1] = " ".join([done[-1], *names])
+    yield from done or [" ".join(names)]
 
 
-def _belong(waiting: list[str], part: str) -> bool:
+def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part) -> int:
+    """Count the names before a clause that belong to the clause before them, or are a clause of their own.
+
+    A list ends at a contrast, or where the next clause cannot begin with it. Otherwise, if a list is what the
+    clause before ends with, it ends with `and` and one more name: `he has tea and milk, sugar is missing`.
+    """
+    if not waiting or _belong(waiting, part.text):
+        return 0
+    joints = [name.joint for name in (*waiting, part)]
+    contrasts = [at for at, joint in enumerate(joints) if at and joint not in (",", "and")]
+    if contrasts and (done or not (_PLACE.match(waiting[0].text) or joints[-1] in ("however", "though"))):
+        return contrasts[-1]
+    may_list = bool(done) and _STATE.search(done[-1][-NEAR:]) is None
+    has_no_subject = _NO_SUBJECT.match(part.text) is not None and (may_list or joints[-1] == "and")
+    if done and (has_no_subject or _SUBJECT.match(part.text)):
+        return len(waiting)
+    ends = [at for at, pair in enumerate(pairwise(joints), start=1) if pair == ("and", ",")]
+    verb = _SINGULAR.search(part.text)
+    if joints[-1] == "and" and verb and verb[1]:  # "tea and milk and sugar is missing"
+        ends.append(ends[-1] if ends else len(waiting))
+    return ends[-1] if may_list and ends else 0
+
+
+def _belong(waiting: Sequence[_Part], part: str) -> bool:
     """Whether the words before a clause with a subject belong to it: `in room 3, there is one`."""
-    asked = any(map(_ASKED.search, waiting))
-    return asked or (bool(waiting) and bool(_PLACE.match(waiting[-1])) and bool(_THERE.match(part)))
+    asked = any(_ASKED.search(name.text) for name in waiting)
+    return asked or (bool(_PLACE.match(waiting[-1].text)) and bool(_THERE.match(part)))
 
 
 def _is_item(part: str) -> bool:

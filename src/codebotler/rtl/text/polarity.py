@@ -27,6 +27,7 @@ _DENIAL = re.compile(
     r"\b(?:no|not|none|nobody|nothing|noone|never|neither|nor|nowhere|without|cannot|cant|dont|doesnt|wont"
     r"|isnt|declin\w*|refus\w*|reject\w*|turn(?:s|ed|ing) (?:\w+ ){0,4}down|unable|unavailable|absent|missing"
     r"|lack\w*|in vain|negative|busy|alone|empty|other plans|(?:run|ran|is|are|was|were) out"
+    r"|(?:is|are|was|were|all) (?:all )?gone|sold out"
     r"|(?:will|ha(?:s|ve) to) pass)\b"
     r"|['\u2019](?:s|re|m) out of\b"
     r"|n['\u2019]t\b",

@@ -22,6 +22,14 @@ def test_claims_are_read_as_meant() -> None:
         expect(one, is_read=reading(one["message"], one["about"]) == meant)
 
 
+def test_contrasts_are_read_as_meant() -> None:
+    states = {"there": "affirms", "missing": "denies", "open": "open"}
+    for one in WORDINGS["contrasts"]:
+        meant = {about: states[state] for state in states for about in one.get(state, [])}
+        read = {about: reading(one["message"], about) for about in meant}
+        expect(one, is_read=read == meant)
+
+
 def reading(message: str, about: str) -> str:
     """What a message says of something."""
     affirmed, denied = (Claim(re.escape(about), denied=which).matches(message) for which in (False, True))
@@ -50,9 +58,10 @@ def expect(one: dict[str, Any], *, is_read: bool) -> None:
 
 def test_few_are_read_otherwise() -> None:
     misread = {kind: sum("misread" in one for one in told) for kind, told in WORDINGS.items()}
-    assert misread == {"claims": 22, "numbers": 14, "times": 2}
+    assert misread == {"claims": 21, "numbers": 14, "times": 2, "contrasts": 3}
     assert {kind: len(told) for kind, told in WORDINGS.items()} == {
         "claims": 150,
         "numbers": 100,
         "times": 50,
+        "contrasts": 115,
     }
