@@ -17,7 +17,7 @@ from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import Failures, Missing, Summary
-from roboeval.evaluation.explanation import NOT_RECORDED
+from roboeval.evaluation.explanation import instruction_shown
 from roboeval.evaluation.failures import label_of, plural_of
 from roboeval.evaluation.runs.completions import by_hand, how_many
 
@@ -164,7 +164,12 @@ def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
     head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
     if prompt["gone"] == prompt["completions"]:
         return [head, Text(ALL_GONE, "yellow")]
-    return [head, *(Text(visible(text), "italic") for text in prompt["instructions"] or [NOT_RECORDED])]
+    known = [(None, text) for text in prompt["instructions"]]
+    lines = [head]
+    for origin, text in known or [instruction_shown(None, prompt["suite_instruction"])]:
+        lines += [] if origin is None else [Text(origin, "dim")]
+        lines += [] if text is None else [Text(visible(text), "italic")]
+    return lines
 
 
 def kind_view(failure: Mapping[str, Any]) -> Text:

@@ -246,10 +246,11 @@ def tasks_to_judge(
 def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
     """The suite with the worlds in which a run was judged, if other ones were drawn then."""
     path = run.head(evaluation_key(suite, ablated=ablated))
+    drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():
         return suite
     match load_head(path):
-        case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0:
+        case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0 and (worlds, seed) != drawn:
             return suite.with_worlds(worlds, seed).with_house_rules(suite.house)
     return suite
 
