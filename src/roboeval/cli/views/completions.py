@@ -13,7 +13,6 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
-from roboeval.cli.views.results import kind_view, prompt_lines
 from roboeval.evaluation.explanation import (
     GONE,
     LOWERED,
@@ -24,10 +23,12 @@ from roboeval.evaluation.explanation import (
     instruction_shown,
     shown_lines,
 )
+from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import by_hand, name_of
 from roboeval.suites.task import world_title
 
 EXPLANATION = 2_000
+ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
 
 
@@ -143,3 +144,22 @@ def _ending(world: Mapping[str, Any]) -> Text:
     allowed = " (allowed here)" if world["satisfied"] else ""
     told = ", ".join(filter(None, [visible(world["error"]["kind"]), shortened(error_sentence(world))]))
     return text.append(f"{allowed}: {told}")
+
+
+def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
+    """The head of a prompt: its score, and its instruction."""
+    score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
+    head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
+    if prompt["gone"] == prompt["completions"]:
+        return [head, Text(ALL_GONE, "yellow")]
+    known: list[tuple[str | None, str | None]] = [(None, text) for text in prompt["instructions"]]
+    lines = [head]
+    for origin, text in known or [instruction_shown(None, prompt["suite_instruction"])]:
+        lines += [] if origin is None else [Text(origin, "dim")]
+        lines += [] if text is None else [Text(visible(text), "italic")]
+    return lines
+
+
+def kind_view(failure: Mapping[str, Any]) -> Text:
+    """A failure's class and kind."""
+    return Text.assemble((f"{visible(label_of(failure['class']))}: {visible(failure['kind'])}", "red"))

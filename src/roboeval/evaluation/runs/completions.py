@@ -12,7 +12,6 @@ from typing import Any, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.core.words import counted
-from codebotler.models.recorded import recorded_model
 from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
 
@@ -178,30 +177,6 @@ def name_of(key: Key) -> str:
 def how_many(count: int) -> str:
     """A number of completions: `1 completion`, `2,000 completions`."""
     return counted(count, "completion")
-
-
-def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
-    """Every reply that a recorded model has for a suite's prompts, as completions.
-
-    Raises:
-        UserError: there is no such model or suite, or the model knows none of its instructions.
-    """
-    model = recorded_model(name, None if suite.folder is None else suite.folder / "solutions")
-    found = False
-    for task in suite.tasks.values():
-        for prompt, instruction in enumerate(task.prompts):
-            for index, reply in enumerate(model.replies.get(instruction, ())):
-                found = True
-                yield Completion(
-                    task=task.name,
-                    prompt=prompt,
-                    index=index,
-                    instruction=instruction,
-                    model=model.name,
-                    program=reply.program,
-                )
-    if not found:
-        raise UserError(f'{name} knows no instruction of the suite "{suite.name}"')
 
 
 def by_hand(models: Collection[str | None]) -> str:
