@@ -8,7 +8,7 @@ from contextlib import closing, contextmanager
 from functools import partial
 from inspect import Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
 import typer
 
@@ -242,13 +242,18 @@ def open_run(
     return Opened(*_opened(read, run, suite_name, ablated=ablated, rules=rules))
 
 
-def open_judged(
-    run: Path, suite_name: str, *, ablated: bool, rules: Path | None = None
+def open_completion(
+    run: Path, name: str, suite_name: str, *, ablated: bool, rules: Path | None = None
 ) -> tuple[JudgedRun, str]:
-    """Read a judged run as `open_run` does, but without its table."""
+    """Read a judged run as `open_run` does, but only the task of one completion, without a table."""
     from roboeval.evaluation.runs.judged import read_judged
+    from roboeval.evaluation.runs.selection import parse_selection
 
-    return _opened(read_judged, run, suite_name, ablated=ablated, rules=rules)
+    def read(run: Run, key: str, suite: Suite, **how: Any) -> JudgedRun:  # noqa: ANN401 - as it is called
+        task = parse_selection(name, suite).key[0]
+        return read_judged(run, key, suite, task=task, **how)
+
+    return _opened(read, run, suite_name, ablated=ablated, rules=rules)
 
 
 def _opened(

@@ -20,8 +20,8 @@ from roboeval.cli.options import (
     load,
     named,
     note_houses,
+    open_completion,
     open_current,
-    open_judged,
     open_run,
     task_names,
     unfinished_of,
@@ -63,8 +63,8 @@ def show(
         fail(f"--k applies to a whole run; leave out {what} or --k")
     if what and ablation:
         note("ablation: only common sense was required")
-    if names_completion(what):
-        judged, again = open_judged(run, suite, ablated=ablation, rules=rules)
+    if what and names_completion(what):
+        judged, again = open_completion(run, what, suite, ablated=ablation, rules=rules)
         show_completion(
             judged, parse_selection(what, judged.known_suite), suite, in_full=in_full, as_json=json
         )

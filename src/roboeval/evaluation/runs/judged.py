@@ -88,19 +88,29 @@ def unwatched(lines: Iterator[Line], _total: int) -> Iterable[Line]:
     return lines
 
 
-def read_judged(run: Run, key: str, suite: Suite | None = None, *, watch: Watch = unwatched) -> JudgedRun:
-    """Read an evaluation of a run without making its table, which is quicker; raise what is wrong."""
-    about, completions = read_written(run, None)
+def read_judged(
+    run: Run, key: str, suite: Suite | None = None, *, task: str, watch: Watch = unwatched
+) -> JudgedRun:
+    """Read what an evaluation of a run says of one task, without its table; raise what is wrong."""
+
+    def wanted(line: bytes) -> bool:
+        return name in line or b"\\u" in line  # an escape may be a letter of it
+
+    name = json.dumps(task, ensure_ascii=False).encode()
+    about, completions = read_written(run, None, wanted)
+    completions = {key: one for key, one in completions.items() if one.task == task}
     passed, stale = [], []
 
     def add(row: JudgedRow) -> None:
+        if row.task != task:
+            return
         written = completions.get(row.key)
         if row.passed:
             passed.append(row.key)
         if written is None or written.program_sha256 != row.program_sha256:
             stale.append(row.key)
 
-    head, places = read_rows(run, key, completions, add, watch=watch)
+    head, places = read_rows(run, key, completions, add, watch=watch, wanted=wanted)
     return JudgedRun(
         run=run,
         key=key,
@@ -108,7 +118,7 @@ def read_judged(run: Run, key: str, suite: Suite | None = None, *, watch: Watch 
         head=head,
         about=about,
         completions=completions,
-        places=places,
+        places={key: place for key, place in places.items() if key[0] == task},
         passed=passed,
         stale=stale,
     )
@@ -123,13 +133,16 @@ def read_rows(
     faults: list[UserError] | None = None,
     see: Callable[[bytes], None] | None = None,
     watch: Watch = unwatched,
+    wanted: Callable[[bytes], bool] = bool,
 ) -> tuple[Mapping[str, Any], Mapping[Key, tuple[int, int]]]:
     """Add each row of an evaluation; return its head, and where each row is in the file."""
     head = {} if key is None else _head(run.head(key), faults)
     tasks = selected_tasks(head)
     total = sum(tasks is None or task in tasks for task, _, _ in completions)
     places: dict[Key, tuple[int, int]] = {}
-    lines = iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults)
+    lines = (
+        iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults, wanted=wanted)
+    )
     for line in watch(lines, total):
         add(line.row)
         places[line.row.key] = line.at, line.size
@@ -137,11 +150,11 @@ def read_rows(
 
 
 def read_written(
-    run: Run, faults: list[UserError] | None
+    run: Run, faults: list[UserError] | None, wanted: Callable[[bytes], bool] = bool
 ) -> tuple[Mapping[str, Any], Mapping[Key, Completion]]:
     """How a run's completions were asked for, and they themselves."""
     about = _head(run.about, faults) if run.about.exists() else {}
-    completions = read_completions(run.completions, growing=True, faults=faults)
+    completions = read_completions(run.completions, growing=True, faults=faults, wanted=wanted)
     return about, {(sys.intern(one.task), one.prompt, one.index): one for one in completions}
 
 

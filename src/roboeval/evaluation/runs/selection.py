@@ -52,6 +52,6 @@ def parse_selection(text: str | None, suite: Suite) -> Selection:
     return selection
 
 
-def names_completion(text: str | None) -> bool:
+def names_completion(text: str) -> bool:
     """Whether a selection has all three parts."""
-    return (text or "").removesuffix("/").count("/") == 2  # noqa: PLR2004 - between three parts
+    return text.removesuffix("/").count("/") == 2  # noqa: PLR2004 - between three parts

@@ -49,6 +49,6 @@ def test_a_selection_without_rows_is_an_error(selection: Selection, named: str) 
 
 def test_only_all_three_parts_name_a_completion() -> None:
     named = "Visit/0/1", "Visit/0/1/"
-    others = None, "", "Visit", "Visit/0", "Visit/0/", "Visit/0/1/2"
+    others = "", "Visit", "Visit/0", "Visit/0/", "Visit/0/1/2"
     assert all(map(names_completion, named))
     assert not any(map(names_completion, others))
