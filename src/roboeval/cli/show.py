@@ -63,7 +63,8 @@ def show(
         fail(f"--k applies to a whole run; leave out {what} or --k")
     if what and ablation:
         note("ablation: only common sense was required")
-    if what and names_completion(what):
+    is_one = what is not None and names_completion(what)
+    if what and is_one:
         judged, again = open_completion(run, what, suite, ablated=ablation, rules=rules)
         show_completion(
             judged, parse_selection(what, judged.known_suite), suite, in_full=in_full, as_json=json
@@ -82,7 +83,7 @@ def show(
             show_part(judged, selection.task, selection.prompt, as_json=json)
     if (complaint := complaint_of(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
-    if (unfinished := unfinished_of(judged)) is not None:
+    if not is_one and (unfinished := unfinished_of(judged)) is not None:
         note(f"{unfinished}; `{again}` continues")
 
 
