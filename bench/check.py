@@ -24,7 +24,8 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))

@@ -19,7 +19,8 @@ from pathlib import Path
 from codebotler.core.files import to_line
 from codebotler.simulator.pool import cores
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.runs.completions import read_completions, recorded_completions
+from roboeval.evaluation.runs.completions import read_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 ORIGINAL = 0.354  # seconds a run

@@ -29,7 +29,7 @@ from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled
 from roboeval.evaluation.engines import Local, Work
-from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))

@@ -18,7 +18,8 @@ from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import Engine, Local, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import RayCluster
-from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 ROUNDS = 3

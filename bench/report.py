@@ -19,10 +19,11 @@ import polars as pl
 
 from codebotler.core.files import to_line, to_text
 from roboeval.evaluation.judge import evaluate, head
-from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.rows import Row
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.report.runs import JudgedRun, named_apart
 from roboeval.report.writing import headline, sections, write_report
 from roboeval.suites.load import Suite, load_suite

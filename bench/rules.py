@@ -41,7 +41,7 @@ from codebotler.simulator.rules import finds, resolve_room
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge
-from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.mutation.mutants import drawn, mutants, originals
 from roboeval.mutation.operator import Context
 from roboeval.suites.load import Suite, Task, load_suite

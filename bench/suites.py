@@ -13,7 +13,7 @@ from functools import partial
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.judge import judge
-from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 ROUNDS = 3

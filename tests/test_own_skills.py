@@ -21,7 +21,8 @@ from codebotler.missions.store import missions
 from codebotler.simulator.sampled_robot import RoomMap
 from roboeval.cli.app import app as roboeval
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 from roboeval.suites.solutions import solutions
 

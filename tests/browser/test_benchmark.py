@@ -136,10 +136,12 @@ def test_the_page_tells_what_show_tells(served: PageServer, real: Path, opened: 
     expect(page.locator(".instruction")).to_have_text(shown["instruction"])
     program = "\n".join(page.locator(".program .line .text").all_inner_texts())
     assert program == shown["program"].rstrip("\n")
-    for number, world in enumerate(shown["worlds"]):
-        article = page.locator(".world-of").nth(number)
-        expect(article.locator("h2")).to_have_text(f"World {number + 1} of 4: {world['world']}")
+    worlds = sorted(enumerate(shown["worlds"], 1), key=lambda one: one[1]["satisfied"])
+    for place, (number, world) in enumerate(worlds):
+        article = page.locator(".world-of").nth(place)
+        expect(article.locator("h2")).to_have_text(f"World {number} of 4: {world['world']}")
         expect(article.locator(".state")).to_have_text("satisfied" if world["satisfied"] else "not satisfied")
+        expect(article.locator(".scenes")).to_have_count(0 if world["satisfied"] else 1)
         for check in world["failed_checks"]:
             expect(article.locator(".failed-check")).to_contain_text(check["check"])
             expect(article.locator(".failed-check")).to_contain_text(check["explanation"])

@@ -15,7 +15,7 @@ from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, without_other_traces
 from roboeval.evaluation.runs.rows import JudgedRow, Row, RowData, judged_row, key_of
-from roboeval.evaluation.runs.table import TableBuilder
+from roboeval.evaluation.runs.table import TableBuilder, keys_where
 from roboeval.suites.load import Suite
 
 VERDICT = {
@@ -86,6 +86,7 @@ def results_of(
         builder.add(row)
         if row.failure is not None:
             failed[row.key] = without_other_traces(row, row.failure.world)
+    table = builder.table()
     return Results(
         run=Run(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",
@@ -93,7 +94,9 @@ def results_of(
         head=head,
         about={},
         completions=written,
-        table=builder.table(),
+        table=table,
+        passed=keys_where(table, "passed"),
+        stale=keys_where(table, "stale"),
         failed=failed,
         places={row.key: (0, 0) for row in judged},
     )

@@ -12,7 +12,8 @@ import pytest
 from codebotler.models.recorded import Solution, recorded_model
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, Task, load_suite
 
 TASKS = list(load_suite("paper").tasks.values())

@@ -17,6 +17,7 @@ from codebotler.rtl.wording import done_with
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20
+MARK = "❱"
 
 
 def steps_of(trace: Trace, room: Callable[[str], str | None] | None = None) -> list[dict[str, Any]]:
@@ -46,7 +47,7 @@ def _asks(kind: str) -> bool:
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """The steps room by room; a long trace keeps its ends and the steps that explanations name."""
+    """The steps room by room; the needed ones, which explanations name, are marked and never left out."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
@@ -57,7 +58,9 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
         if is_shown:
             for step in some:
                 indent = 0 if step["kind"] == "goto" else 4
-                table.add_row(Text(str(step["step"]), "dim"), Padding(step_text(step), (0, 0, 0, indent)))
+                number, is_needed = str(step["step"]), step["step"] in needed
+                mark = Text(f"{MARK} {number}", "bold red") if is_needed else Text(number, "dim")
+                table.add_row(mark, Padding(step_text(step), (0, 0, 0, indent)))
         else:
             table.add_row(Text(), Text(f"... {len(some):,} more{_repeating(steps, some)} ...", "dim"))
     return table

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import polars as pl
 
-from codebotler.core.errors import UserError
-from codebotler.core.terminal import visible
 from roboeval.analysis.counts import completions_of, prompt_scores
-from roboeval.evaluation.explanation import reason
+from roboeval.evaluation.explanation import reason, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, Completion, Key
 from roboeval.evaluation.runs.results import Results
-from roboeval.suites.load import Suite
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:
@@ -76,10 +72,11 @@ def _reason(results: Results, key: Key) -> dict[str, Any]:
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
-    ((_, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
+    ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
     return {
         "prompt": prompt,
         "instructions": _different(written, "instruction"),
+        "suite_instruction": suite_instruction(results.suite, task, prompt),
         "models": _different(written, "model"),
         "completions": n,
         "gone": n - len(written),
@@ -104,41 +101,3 @@ def _failure_kinds(of_prompt: pl.DataFrame) -> list[dict[str, Any]]:
         {"class": name, "kind": kind, "count": count, "example": example}
         for name, kind, count, example in counted.iter_rows()
     ]
-
-
-# --- which part of a run
-
-
-@dataclass(frozen=True)
-class Selection:
-    """A part of a run: all of it, a task, a prompt or one completion; what is None is not narrowed."""
-
-    task: str | None = None
-    prompt: int | None = None
-    index: int | None = None
-
-    def __str__(self) -> str:
-        return "/".join(str(part) for part in (self.task, self.prompt, self.index) if part is not None)
-
-    def expect_judged(self, results: Results) -> None:
-        """Raise UserError if nothing of this part was judged."""
-        wanted = self.task, self.prompt, self.index
-        if not any(all(w in {None, h} for w, h in zip(wanted, key, strict=True)) for key in results.places):
-            what = f"completion {self}" if self.index is not None else f"completion of {self}"
-            raise UserError(f"no {what if self.task else 'completion'} has been judged in this run")
-
-
-def parse_selection(text: str | None, suite: Suite) -> Selection:
-    """Read TASK, TASK/PROMPT or TASK/PROMPT/INDEX, or nothing for the whole run."""
-    if not text:
-        return Selection()
-    name, *numbers = text.removesuffix("/").split("/")
-    if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
-        raise UserError(f'"{visible(text)}" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX')
-    if name not in suite.tasks:
-        name = next((task for task in suite.tasks if task.lower() == name.lower()), name)
-    task = suite.task(name)
-    selection = Selection(name, *map(int, numbers))
-    if selection.prompt is not None and selection.prompt >= len(task.prompts):
-        raise UserError(f"{name} has prompts 0 to {len(task.prompts) - 1}, so {selection} selects nothing")
-    return selection

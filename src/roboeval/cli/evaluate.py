@@ -36,8 +36,9 @@ from roboeval.cli.show import house_of, print_summary
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import Key
-    from roboeval.evaluation.runs.folder import Run, Source
+    from roboeval.evaluation.runs.folder import Run
     from roboeval.evaluation.runs.rows import JudgedRow
+    from roboeval.evaluation.runs.source import Source
     from roboeval.evaluation.runs.table import TableBuilder
     from roboeval.suites.load import Suite
 
@@ -131,7 +132,7 @@ def _name_next_command(
 
 def opened_source(text: str, suite: Suite) -> Source:
     """Completions that a user names; note which files were left aside."""
-    from roboeval.evaluation.runs.folder import open_source
+    from roboeval.evaluation.runs.source import open_source
 
     source = open_source(text, suite)
     if source.left_aside is not None:

@@ -91,7 +91,7 @@ def wanted_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
     """The programs of a user's sources by task, with repetitions."""
     from roboeval.evaluation.runs.completions import name_of
-    from roboeval.evaluation.runs.folder import open_source
+    from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original
 
     found: defaultdict[str, list[Original]] = defaultdict(list)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from functools import partial
 from inspect import Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
 import typer
 
@@ -17,8 +18,11 @@ from roboeval.cli.output import fail, note, watched
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.judged import JudgedRun
     from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
+
+    Judged = TypeVar("Judged", bound=JudgedRun)
 
 
 # --- what a shell completes
@@ -232,20 +236,35 @@ def open_run(
 
     The completions are taken over from `beside`, another evaluation of the same run.
     """
+    from roboeval.evaluation.runs.results import read_results
+
+    read = partial(read_results, beside=beside, see=see)
+    return Opened(*_opened(read, run, suite_name, ablated=ablated, rules=rules))
+
+
+def open_completion(
+    run: Path, name: str, suite_name: str, *, ablated: bool, rules: Path | None = None
+) -> tuple[JudgedRun, str]:
+    """Read a judged run as `open_run` does, but only the task of one completion, without a table."""
+    from roboeval.evaluation.runs.judged import read_judged
+    from roboeval.evaluation.runs.selection import parse_selection
+
+    def read(run: Run, key: str, suite: Suite, **how: Any) -> JudgedRun:  # noqa: ANN401 - as it is called
+        task = parse_selection(name, suite).key[0]
+        return read_judged(run, key, suite, task=task, **how)
+
+    return _opened(read, run, suite_name, ablated=ablated, rules=rules)
+
+
+def _opened(
+    read: Callable[..., Judged], run: Path, suite_name: str, *, ablated: bool, rules: Path | None
+) -> tuple[Judged, str]:
     from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
-    from roboeval.evaluation.runs.results import read_results
 
     again = command("evaluate", run, suite=suite_name, ablated=ablated, rules=rules)
     folder, key, suite = evaluation_of(run, load(suite_name, rules), ablated=ablated, again=again)
-    results = read_results(
-        folder,
-        key,
-        suite,
-        beside=beside,
-        see=see,
-        watch=lambda lines, total: watched(lines, "reading", total),
-    )
+    results = read(folder, key, suite, watch=lambda lines, total: watched(lines, "reading", total))
     if suite.house is not None and rules is not None:
         judged_by = results.head.get("house_rules") or {}
         if judged_by.get(suite.house.name) != suite.house.digest:
@@ -255,8 +274,7 @@ def open_run(
     if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     more = _to_go_on(results, suite)
-    again = command("evaluate", run, *more, suite=suite_name, ablated=ablated, rules=rules)
-    return Opened(results, again)
+    return results, command("evaluate", run, *more, suite=suite_name, ablated=ablated, rules=rules)
 
 
 def open_current(
@@ -284,7 +302,7 @@ def open_current(
     return opened
 
 
-def complaint_of(results: Results) -> str | None:
+def complaint_of(results: JudgedRun) -> str | None:
     """A sentence about rows that judge other programs than stand in the run now; None without such rows."""
     from roboeval.evaluation.runs.completions import name_of
 
@@ -295,7 +313,7 @@ def complaint_of(results: Results) -> str | None:
     return f"{name_of(stale[0])} {judge} another program than stands in {results.run.completions} now"
 
 
-def unfinished_of(results: Results) -> str | None:
+def unfinished_of(results: JudgedRun) -> str | None:
     """A clause about completions that are not judged yet; None without such completions."""
     from roboeval.evaluation.runs.completions import how_many
 
@@ -303,7 +321,7 @@ def unfinished_of(results: Results) -> str | None:
     return None if count >= total else f"{count:,} of {how_many(total)} judged"
 
 
-def _to_go_on(results: Results, suite: Suite) -> list[str]:
+def _to_go_on(results: JudgedRun, suite: Suite) -> list[str]:
     """Options with which a command goes on with an evaluation."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 

@@ -20,6 +20,7 @@ from roboeval.cli.options import (
     load,
     named,
     note_houses,
+    open_completion,
     open_current,
     open_run,
     task_names,
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
     from roboeval.analysis.summary import Summary
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.judged import JudgedRun
     from roboeval.evaluation.runs.results import Results
+    from roboeval.evaluation.runs.selection import Selection
     from roboeval.suites.load import Suite
 
 
@@ -48,38 +51,39 @@ def show(
     ablation: AblationOption = False,
     rules: RulesOption = None,
     k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
+    in_full: Annotated[
+        bool, typer.Option("--all", help="Of a completion, show satisfied worlds in full, too.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
-    from roboeval.analysis.counts import tally_of
-    from roboeval.analysis.summary import summary
-    from roboeval.analysis.tasks import parse_selection
+    from roboeval.evaluation.runs.selection import names_completion, parse_selection
 
-    results, again = open_run(run, suite, ablated=ablation, rules=rules)
-    selection = parse_selection(what, results.known_suite)
-    if selection.task is None:
-        ks = sorted({1, *(k or [])})
-        counted = summary(tally_of(results.table), results.known_suite, results.scope, k=ks, ablated=ablation)
-        house = (
-            None
-            if rules is None
-            else house_of(results.run, results.known_suite, results.table, ablated=ablation)
+    if what and k:
+        fail(f"--k applies to a whole run; leave out {what} or --k")
+    if what and ablation:
+        note("ablation: only common sense was required")
+    is_one = what is not None and names_completion(what)
+    if what and is_one:
+        judged, again = open_completion(run, what, suite, ablated=ablation, rules=rules)
+        show_completion(
+            judged, parse_selection(what, judged.known_suite), suite, in_full=in_full, as_json=json
         )
-        print_summary(counted, title=str(run), as_json=json, stale=results.stale, house=house)
-        if rules is None:
-            note_houses([results.run], suite)
+    elif in_full:
+        fail("--all applies to one completion; name it as TASK/PROMPT/INDEX, or leave out --all")
     else:
-        if k:
-            fail(f"--k applies to a whole run; leave out {selection} or --k")
-        if ablation:
-            note("ablation: only common sense was required")
-        selection.expect_judged(results)
-        show_part(results, selection.task, selection.prompt, selection.index, as_json=json)
-        if selection.prompt is not None and selection.index is not None:
-            _note_nearest(results, (selection.task, selection.prompt, selection.index), suite)
-    if (complaint := complaint_of(results)) is not None:
+        judged, again = open_run(run, suite, ablated=ablation, rules=rules)
+        selection = parse_selection(what, judged.known_suite)
+        if selection.task is None:
+            show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
+            if rules is None:
+                note_houses([judged.run], suite)
+        else:
+            selection.expect_judged(judged)
+            show_part(judged, selection.task, selection.prompt, as_json=json)
+    if (complaint := complaint_of(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
-    if (unfinished := unfinished_of(results)) is not None:
+    if not is_one and (unfinished := unfinished_of(judged)) is not None:
         note(f"{unfinished}; `{again}` continues")
 
 
@@ -121,35 +125,49 @@ def print_summary(
             print_rich(house_view(house))
 
 
-def show_part(results: Results, task: str, prompt: int | None, index: int | None, *, as_json: bool) -> None:
-    """Print a task, a prompt or a completion."""
-    from roboeval.analysis.tasks import prompt_data, task_data
-    from roboeval.cli.views.completions import completion_view, prompt_view
-    from roboeval.cli.views.results import task_view
-    from roboeval.evaluation.explanation import completion_data
+def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_json: bool) -> None:
+    """Print the tables of a run."""
+    from roboeval.analysis.counts import tally_of
+    from roboeval.analysis.summary import summary
 
-    if prompt is None:
-        data, view = task_data(results, task), task_view
-    elif index is None:
-        data, view = prompt_data(results, task, prompt), prompt_view
-    else:
-        key = task, prompt, index
-        completion = None if key in results.stale else results.completions.get(key)
-        data = completion_data(results.row(key), completion, results.suite, ablated=results.is_ablated)
-        view = completion_view
+    ablated, suite = results.is_ablated, results.known_suite
+    counted = summary(tally_of(results.table), suite, results.scope, k=sorted({1, *k}), ablated=ablated)
+    house = house_of(results.run, suite, results.table, ablated=ablated) if has_rules else None
+    print_summary(counted, title=title, as_json=as_json, stale=results.stale, house=house)
+
+
+def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool) -> None:
+    """Print a task or a prompt."""
+    from roboeval.analysis.tasks import prompt_data, task_data
+    from roboeval.cli.views.completions import prompt_view
+    from roboeval.cli.views.results import task_view
+
+    data = task_data(results, task) if prompt is None else prompt_data(results, task, prompt)
     if as_json:
         print_json({**data, "ablation": results.is_ablated})
     else:
-        print_rich(view(data))
+        print_rich(task_view(data) if prompt is None else prompt_view(data))
 
 
-def _note_nearest(results: Results, key: Key, suite: str) -> None:
-    """Note the command that shows the program nearest to one that fails."""
+def show_completion(
+    judged: JudgedRun, selection: Selection, suite: str, *, in_full: bool, as_json: bool
+) -> None:
+    """Print a completion, and the command that shows the program nearest to one that fails."""
     from codebotler.core.words import counted
     from roboeval.analysis.cluster import nearest_fix
+    from roboeval.cli.views.completions import completion_view
+    from roboeval.evaluation.explanation import completion_data
 
-    if key in results.failed and (fix := nearest_fix(results, key)) is not None:
-        again = command("show", results.run.path, fix.name, suite=suite, ablated=results.is_ablated)
+    selection.expect_judged(judged)
+    key = selection.key
+    written = None if key in judged.stale else judged.completions.get(key)
+    data = completion_data(judged.row(key), written, judged.suite, ablated=judged.is_ablated)
+    if as_json:
+        print_json({**data, "ablation": judged.is_ablated})
+    else:
+        print_rich(completion_view(data, in_full=in_full))
+    if not data["passed"] and (fix := nearest_fix(judged, key)) is not None:
+        again = command("show", judged.run.path, fix.name, suite=suite, ablated=judged.is_ablated)
         note(f"the nearest program that passes differs in {counted(fix.changed, 'line')}: `{again}`")
 
 

@@ -18,10 +18,12 @@ from codebotler.core.words import counted
 from codebotler.core.world import World
 from codebotler.rtl import explain
 from codebotler.simulator.rules import resolve_room
+from roboeval.evaluation.remarks import remarks_on
 from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.suites.load import Scenario, Suite
 
 NOT_RECORDED = "instruction not recorded"
+OF_SUITE = "this is the suite's text of the prompt:"
 GONE = "the judged program is no longer in this run"
 CHANGED = "the suite has changed since this was judged"
 CUT = "the trace was too long to keep, so this cannot be explained"
@@ -54,12 +56,31 @@ def completion_data(
     return {
         **{key: row[key] for key in (*KEY, "passed", "failure")},
         **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
+        "suite_instruction": suite_instruction(suite, row["task"], row["prompt"]),
         "lowered": suite is not None and suite.rules.literals == "lowercase",
         "worlds": [
-            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), patience)
+            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), patience, suite)
             for number, verdict in enumerate(row["verdicts"])
         ],
     }
+
+
+def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None:
+    """What a suite says in a prompt, whatever a model was given; None if it has no such prompt."""
+    prompts = () if suite is None or task not in suite.tasks else suite.tasks[task].prompts
+    return prompts[prompt] if prompt < len(prompts) else None
+
+
+def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
+    """A line on where the instruction is from, if that needs saying, and the instruction, if it is known."""
+    if recorded is not None or of_suite is None:
+        return NOT_RECORDED if recorded is None else None, recorded
+    return f"{NOT_RECORDED}; {OF_SUITE}", of_suite
+
+
+def failing_first(worlds: Iterable[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
+    """The worlds with their numbers, from 1: those that fail, of which the first decided, and the others."""
+    return sorted(enumerate(worlds, 1), key=lambda one: bool(one[1]["satisfied"]))
 
 
 class Patience:
@@ -104,13 +125,17 @@ def located(trace: Trace, world: World) -> Trace:
     return tuple(events)
 
 
-def _world_data(verdict: Mapping[str, Any], scenario: Scenario | None, patience: Patience) -> dict[str, Any]:
+def _world_data(
+    verdict: Mapping[str, Any], scenario: Scenario | None, patience: Patience, suite: Suite | None
+) -> dict[str, Any]:
     trace, cut = _trace(verdict, scenario), verdict.get("cut")
+    world, rules = None if scenario is None else scenario.world, None if suite is None else suite.rules
     names = [] if scenario is None else [room.name for room in scenario.world.rooms]
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
         "steps": steps_of(trace, None if scenario is None else cache(partial(resolve_room, names))),
         **({} if cut is None else {"cut": cut}),
+        "remarks": remarks_on(verdict, trace, world, rules),
         "failed_checks": [
             {"check": check, **_explained(check, scenario, trace, patience, cut)}
             for check in verdict["failed_checks"]
@@ -164,6 +189,7 @@ class _Capitals:
             **world,
             "error": error if is_rule else error and {**error, "message": self._sentence(error["message"])},
             "steps": [self._step(step) for step in world["steps"]],
+            "remarks": [*map(self._sentence, world["remarks"])],
             "failed_checks": [
                 {**check, "explanation": self._sentence(check["explanation"])}
                 for check in world["failed_checks"]

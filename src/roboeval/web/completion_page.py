@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 from urllib.parse import quote
 
@@ -17,7 +18,14 @@ from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.cluster import Fix, nearest_fix
-from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, as_written, cut_told, error_sentence
+from roboeval.evaluation.explanation import (
+    LOWERED,
+    as_written,
+    cut_told,
+    error_sentence,
+    failing_first,
+    instruction_shown,
+)
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import Key, by_hand, name_of
 from roboeval.suites.task import describe_person, world_title
@@ -91,9 +99,11 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: 
             html.a(text, href=f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}")
     if data["stale"]:
         PlainText("p", CHANGED, "trouble")
-    instruction = data["instruction"]
-    text = NOT_RECORDED if instruction is None else shortened(instruction, MOST_INSTRUCTION)
-    PlainText("p", text, "instruction")
+    origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
+    if origin is not None:
+        PlainText("p", origin[0].upper() + origin[1:], "quiet")
+    if instruction is not None:
+        PlainText("p", shortened(instruction, MOST_INSTRUCTION), "instruction")
 
 
 def _draw_program(data: Mapping[str, Any]) -> None:
@@ -117,27 +127,43 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
             PlainText("p", LOWERED, "quiet")
         if not judged:
             PlainText("p", "It has not been judged yet.", "quiet")
-        for number, data in enumerate(judged, 1):
+        for number, data in failing_first(judged):
+            head = partial(_draw_world_head, data, number, len(judged))
+            draw = partial(_draw_world, data, worlds.get(data["world"]), f"world-{number}-step-")
             with ui.element("article").classes("pane world-of").props(f"aria-labelledby=h-world-{number}"):
-                with ui.element("div").classes("head"):
-                    title = world_title(number, f" of {len(judged)}", shortened(data["world"], 300))
-                    PlainText("h2", title).props(f"id=h-world-{number}")
-                    state = ("satisfied", "done") if data["satisfied"] else ("not satisfied", "failed")
-                    PlainText("small", state[0], f"state state-{state[1]}")
-                _draw_world(data, worlds.get(data["world"]), f"world-{number}-step-")
+                if data["satisfied"]:
+                    _draw_folded(head, draw)
+                else:
+                    with ui.element("div").classes("head"):
+                        head()
+                    draw()
 
 
-def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
-    """Draw what happened in a world; its steps have the `anchor` and their number as an id."""
-    steps, cut = data["steps"], data.get("cut")
-    wrong = {check["step"] for check in data["failed_checks"]} - {None}
+def _draw_world_head(data: Mapping[str, Any], number: int, of: int) -> None:
+    title = world_title(number, f" of {of}", shortened(data["world"], 300))
+    PlainText("h2", title).props(f"id=h-world-{number}")
+    state = ("satisfied", "done") if data["satisfied"] else ("not satisfied", "failed")
+    PlainText("small", state[0], f"state state-{state[1]}")
+
+
+def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
+    """Draw the error that ended a run, its failed checks, and what else explains it."""
     if data["error"] is not None:
-        allowed = " A program may wait for ever in this world, so this is allowed." * data["satisfied"]
+        allowed = ". A program may wait for ever in this world, so this is allowed." * data["satisfied"]
         told = f"{shortened(data['error']['kind'])}: {shortened(error_sentence(data))}{allowed}"
         PlainText("p", told, "quiet" if data["satisfied"] else "trouble")
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
             _draw_check(check, anchor)
+    for remark in data["remarks"]:
+        PlainText("p", shortened(remark, MOST_SENTENCE), "quiet")
+
+
+def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
+    """Draw what happened in a world; its steps have the `anchor` and their number as an id."""
+    _draw_reasons(data, anchor)
+    steps, cut = data["steps"], data.get("cut")
+    wrong = {check["step"] for check in data["failed_checks"]} - {None}
     if not steps and cut is None:
         PlainText("p", "The robot did nothing.", "quiet")
     elif steps and "place" in steps[0]:
@@ -150,9 +176,10 @@ def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> No
         PlainText("p", f"{cut_told(cut)}.", "quiet")
     if steps:
         kept = "Every step" if cut is None else "Every step that was kept"
-        _draw_folded(f"{kept}, {len(steps):,} in all", lambda: _draw_steps(steps))
+        title = f"{kept}, {len(steps):,} in all"
+        _draw_folded(partial(PlainText, "span", title), partial(_draw_steps, steps))
     if world is not None:
-        _draw_folded("The world", lambda: _draw_rooms(world))
+        _draw_folded(partial(PlainText, "span", "The world"), partial(_draw_rooms, world))
 
 
 def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
@@ -164,10 +191,11 @@ def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
             html.a(f"step {check['step']}", href=f"#{anchor}{check['step']}")
 
 
-def _draw_folded(title: str, draw: Callable[[], None]) -> None:
-    """Something that is drawn when it is unfolded for the first time."""
+def _draw_folded(head: Callable[[], object], draw: Callable[[], None]) -> None:
+    """Draw a head, and below it what is drawn only when it is unfolded for the first time."""
     with html.details() as details:
-        PlainText("summary", title)
+        with ui.element("summary"):
+            head()
         inside = ui.element("div").classes("unfolded")
 
     def unfold() -> None:

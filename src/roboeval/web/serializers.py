@@ -13,7 +13,7 @@ from typing import Any
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
-from roboeval.evaluation.explanation import GONE, completion_data
+from roboeval.evaluation.explanation import GONE, completion_data, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, name_of
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
@@ -153,11 +153,9 @@ def run_details(run: Snapshot) -> dict[str, Any]:
 def _prompt_data(
     prompt: Mapping[str, Any], suite: Suite | None, shares: Mapping[tuple[str, int], float]
 ) -> dict[str, Any]:
-    task = None if suite is None else suite.tasks.get(prompt["task"])
-    instructions = dict(enumerate(task.prompts)) if task is not None else {}
     return {
         "prompt": prompt["prompt"],
-        "instruction": instructions.get(prompt["prompt"]),
+        "instruction": suite_instruction(suite, prompt["task"], prompt["prompt"]),
         "completions": prompt["written"],
         "judged": prompt["judged"],
         "passed": prompt["counted"],
@@ -185,6 +183,7 @@ def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     more = {"evaluation": results.key, "stale": row["stale"], "note": GONE if row["stale"] else None}
     if row["passed"] is None:
         known = {name: getattr(completion, name, None) for name in ("model", "instruction", "program")}
+        known["suite_instruction"] = suite_instruction(run.suite, row["task"], row["prompt"])
         return {**entry_data(row), **known, **more, "worlds": []}
     judged = results.row(key)
     try:

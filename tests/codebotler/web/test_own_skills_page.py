@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pageserver import PageServer
-from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import load_suite
 
 SETS = Path(__file__).parents[3] / "examples" / "skills"

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from made_results import results_of, table_of
 from roboeval.analysis.counts import tally_of
 from roboeval.analysis.summary import summary
-from roboeval.analysis.tasks import Selection, parse_selection, task_data
+from roboeval.analysis.tasks import task_data
 from roboeval.cli.views.results import summary_view, task_view
+from roboeval.evaluation.explanation import NOT_RECORDED, OF_SUITE
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import Scope
@@ -33,6 +33,7 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
     assert data["prompts"][0] == {
         "prompt": 0,
         "instructions": ["Visit her."],
+        "suite_instruction": SUITE.tasks["Visit"].prompts[0],
         "models": [],
         "completions": 2,
         "gone": 0,
@@ -45,11 +46,11 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
     assert "  1  Python error: NameError  such as Visit/0/1\n" in text
 
 
-def test_an_instruction_that_nobody_recorded_is_never_taken_from_the_suite() -> None:
+def test_text_of_the_suite_is_marked_where_the_instruction_was_not_recorded() -> None:
     completions = [Completion(task="Visit", prompt=prompt, index=0, program="") for prompt in range(2)]
     text = printed(task_view(task_data(results(*completions), "Visit")))
-    assert text.count("instruction not recorded") == 2
-    assert "Go to Alice." not in text
+    for instruction in SUITE.tasks["Visit"].prompts:
+        assert f"{NOT_RECORDED}; {OF_SUITE}\n{instruction}\n" in text
 
 
 @pytest.mark.parametrize("colour", [False, True])
@@ -70,40 +71,3 @@ def test_what_a_model_wrote_is_text(*, colour: bool) -> None:
 def test_visible_keeps_what_can_be_seen() -> None:
     assert visible("naïve 日本 → [x]") == "naïve 日本 → [x]"
     assert visible("a\tb\u200b\x9b") == r"a\tb\u200b\x9b"
-
-
-def test_a_selection_is_read() -> None:
-    assert parse_selection(None, SUITE) == Selection()
-    assert parse_selection("Visit", SUITE) == Selection("Visit")
-    assert parse_selection("visit/1/", SUITE) == Selection("Visit", 1)
-    assert parse_selection("Visit/1/007", SUITE) == Selection("Visit", 1, 7)
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("Dance", ['"small"', '"Dance"', "Visit, Wait"]),
-        ("Visit/2", ["Visit/2", "0 to 1"]),
-        ("Visit/-1", ['"Visit/-1"', "TASK/PROMPT/INDEX"]),
-        ("Visit/0/x", ['"Visit/0/x"', "TASK/PROMPT/INDEX"]),
-        ("Visit//0", ['"Visit//0"', "TASK/PROMPT/INDEX"]),
-        ("Visit/0/0/0", ['"Visit/0/0/0"', "TASK/PROMPT/INDEX"]),
-        ("Visit/\u0661", ['"Visit/\u0661"', "TASK/PROMPT/INDEX"]),
-    ],
-)
-def test_a_wrong_selection_is_explained(text: str, named: list[str]) -> None:
-    with pytest.raises(UserError) as error:
-        parse_selection(text, SUITE)
-    assert all(name in error.value.sentence for name in named), error.value
-
-
-@pytest.mark.parametrize(
-    ("selection", "named"),
-    [
-        (Selection("Wait"), "no completion of Wait "),
-        (Selection("Visit", 0, 9), "no completion Visit/0/9 "),
-    ],
-)
-def test_a_selection_without_rows_is_an_error(selection: Selection, named: str) -> None:
-    with pytest.raises(UserError, match=named):
-        selection.expect_judged(results_of(ROWS))

@@ -7,7 +7,7 @@ import pytest
 
 from check import CAUGHT, LOST, LOST_IN_A_TASK, Source, rates, real, rejections, truths
 from codebotler.simulator.pool import WorkerPool
-from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite
 
 EVERY = 8

@@ -21,7 +21,7 @@ from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
-from roboeval.evaluation.explanation import LOWERED, as_written, completion_data
+from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, OF_SUITE, as_written, completion_data
 from roboeval.evaluation.judge import judge, judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
@@ -86,8 +86,10 @@ def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
-def completion_view(row: RowData, written: Completion | None, suite: Suite) -> RenderableType:
-    return view_of_completion(completion_data(row, written, suite))
+def completion_view(
+    row: RowData, written: Completion | None, suite: Suite, *, in_full: bool = False
+) -> RenderableType:
+    return view_of_completion(completion_data(row, written, suite), in_full=in_full)
 
 
 def results(rows: Sequence[RowData], written: Sequence[Completion], *, ablated: bool = False) -> Results:
@@ -115,8 +117,9 @@ def test_a_prompt_groups_equal_programs_and_gives_reasons() -> None:
 
 def test_a_prompt_is_shown_line_by_line() -> None:
     text = printed(prompt_view(prompt_data(results(ROWS, THREE), "Visit", 0)), 160)
+    unrecorded = f"{NOT_RECORDED}; {OF_SUITE}"
     assert text.startswith(
-        "Visit/0  2 of 4 passed (pass@1 0.50)\ninstruction not recorded\n\n  0  x2  passed\n"
+        f"Visit/0  2 of 4 passed (pass@1 0.50)\n{unrecorded}\nVisit Amy.\n\n  0  x2  passed\n"
     )
     assert '  2  failed check: Location in "amy is in"\n     greets("amy"): ' in text
     assert (
@@ -146,27 +149,64 @@ def test_a_completion_is_shown_world_by_world() -> None:
     assert "  1 go_to('office')\n  2 say('hello')\n" in text
     story = """World 1 of 1: amy is in
 not satisfied, finished
-   in start
-1      looked for "amy": not found
-2  start → office
-3      looked for "amy": found
-4      asked "lunch?" [yes | 5 (no text)] → yes
-5  office → "moon"  failed: there is no such room
-6  office → lab  (asked for "the lab, please")
-7      picked up "mug"
-8      put down "mug"
-9      wave "amy"
+     in start
+  1      looked for "amy": not found
+❱ 2  start → office
+  3      looked for "amy": found
+  4      asked "lunch?" [yes | 5 (no text)] → yes
+  5  office → "moon"  failed: there is no such room
+  6  office → lab  (asked for "the lab, please")
+  7      picked up "mug"
+  8      put down "mug"
+  9      wave "amy"
   failed greets("amy"): the robot"""
     assert story in text
 
 
 def test_the_line_of_an_error_is_marked_and_that_of_an_allowed_timeout_is_not() -> None:
     waits = failed(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", line=1)
-    text = printed(completion_view(row(completion(), LOST, waits), completion(), SUITE))
+    text = printed(completion_view(row(completion(), LOST, waits), completion(), SUITE, in_full=True))
     assert "  1 x = 1\n❱ 2 y = 2\n" in text
     assert 'not satisfied, robot-error: GoToInvalidLocation, line 2: there is no room "moon"' in text
     assert "\n  the robot did nothing" in text
     assert "satisfied, timeout (allowed here): TimeoutError, line 1: 1,000 skill calls" in text
+
+
+TWICE = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WAITING, ()), TASK.scenarios[0]))})
+
+
+def test_world_that_decided_comes_first_and_satisfied_ones_are_lines() -> None:
+    waits = failed(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", GOTO, line=1)
+    verdicts = [judge(o, s) for o, s in zip((waits, MUTE), TWICE.tasks["Visit"].scenarios, strict=True)]
+    judged = row_of(completion(), judgement(verdicts))
+    text = printed(completion_view(judged, completion(), TWICE), 120)
+    short = "World 1 of 2: nobody comes  satisfied, timeout (allowed here), 1 step\n--all shows"
+    assert text.index("World 2 of 2: amy is in\nnot satisfied") < text.index(short)
+    assert re.search(r"❱ 3 +said", text)
+    full = printed(completion_view(judged, completion(), TWICE, in_full=True), 120)
+    assert full.index("World 2 of 2") < full.index(
+        "World 1 of 2: nobody comes\nsatisfied, timeout (allowed here)"
+    )
+    assert "--all" not in full
+    worlds = completion_data(judged, completion(), TWICE)["worlds"]
+    assert [world["world"] for world in worlds] == ["nobody comes", "amy is in"]
+
+
+def test_remarks_are_shown_with_their_world() -> None:
+    waits = failed(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", *[GOTO] * 9, line=1)
+    judged = row(completion(), waits)
+    (world,) = completion_data(judged, completion(), SUITE)["worlds"]
+    assert world["remarks"]
+    assert f"  {world['remarks'][0]}" in printed(completion_view(judged, completion(), SUITE), 160)
+
+
+@pytest.mark.parametrize(("recorded", "prompt"), [(None, 0), ("Visit her.", 0), (None, 7)])
+def test_text_of_the_suite_is_a_field_of_its_own(recorded: str | None, prompt: int) -> None:
+    written = completion(instruction=recorded)
+    data = completion_data({**row(written, FINE), "prompt": prompt}, written, SUITE)
+    assert data["instruction"] == recorded
+    assert data["suite_instruction"] == ("Visit Amy." if prompt == 0 else None)
+    assert completion_data(row(written, FINE), written, None)["suite_instruction"] is None
 
 
 def test_an_error_without_a_message_is_told_by_its_kind_and_line() -> None:
@@ -186,10 +226,11 @@ def test_lines_keep_their_numbers_whatever_ends_them() -> None:
 
 
 @pytest.mark.parametrize("written", [None, completion(program="")])
-def test_what_was_not_recorded_is_said_and_not_taken_from_the_suite(written: Completion | None) -> None:
+def test_what_was_not_recorded_is_said_and_the_text_of_the_suite_is_marked(
+    written: Completion | None,
+) -> None:
     text = printed(completion_view(row(completion(), FINE), written, SUITE))
-    assert ("instruction not recorded" in text) == (written is not None)
-    assert "Visit Amy." not in text
+    assert (f"{NOT_RECORDED}; {OF_SUITE}\nVisit Amy." in text) == (written is not None)
     assert ("no longer in this run" in text) == (written is None)
 
 
@@ -274,7 +315,7 @@ def test_a_step_that_an_explanation_names_is_never_left_out() -> None:
     trace = (*[Event("check", f"n{i}", found=False) for i in range(500)], Event("say", "hm"), *[GOTO] * 100)
     verdict = judge(Outcome(Status.FINISHED, trace), suite.tasks["Visit"].scenarios[0])
     text = printed(completion_view(row_of(completion(), judgement([verdict])), completion(), suite))
-    assert '\n     ... 488 more ...\n501      said "hm"\n     ... 94 more ...\n' in text
+    assert '\n       ... 488 more ...\n❱ 501      said "hm"\n       ... 94 more ...\n' in text
 
 
 def test_a_long_text_is_shortened() -> None:
@@ -367,6 +408,7 @@ def test_texts_have_the_capitals_of_the_program_where_they_are_clear(
         return {
             "error": {"kind": "GoToInvalidLocation", "message": f'there is no room "{text}"'},
             "steps": [{"step": 1, "kind": "say", "text": text}],
+            "remarks": [f'it repeated: say "{text}"'],
             "failed_checks": [{"check": "polite", "explanation": f'it said "{text}", no more', "step": 1}],
         }
 
@@ -375,7 +417,7 @@ def test_texts_have_the_capitals_of_the_program_where_they_are_clear(
 
 def test_the_name_of_a_rule_keeps_its_own_letters() -> None:
     error = {"kind": "RuleViolation", "message": 'the rule "no-office" forbids going to "office": No'}
-    world = {"error": error, "steps": [], "failed_checks": []}
+    world = {"error": error, "steps": [], "remarks": [], "failed_checks": []}
     assert as_written([world], "say('No')") == [world]
 
 

@@ -32,8 +32,9 @@ from codebotler.core.errors import UserError
 from codebotler.prompts import prompt_for
 from roboeval.evaluation import inspect as inspecting
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 from viewing import chromium
 

@@ -24,7 +24,7 @@ from roboeval.evaluation import engines
 from roboeval.evaluation.engines import Local, Work, own_worker
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.processes import Processes
-from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import load_suite
 
 

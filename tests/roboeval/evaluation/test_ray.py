@@ -26,8 +26,8 @@ from roboeval.evaluation import ray as rayengine
 from roboeval.evaluation.engines import Local, RunPrograms, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import VERSIONS, RayCluster, run_shard
-from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.evaluation.runs.rows import Row
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite
 
 # Read when Ray is imported.

@@ -26,7 +26,7 @@ from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate, is_met
 from roboeval.evaluation.rewards import Share, batches, first_alike, reward, total
-from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 from small_suite import a_suite
 

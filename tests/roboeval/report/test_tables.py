@@ -12,8 +12,9 @@ from made_up_runs import HOSTILE, UNCHECKED, made_up, unfinished, usual
 from roboeval.analysis.resample import accepted_after
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.failures import CLASSES
-from roboeval.evaluation.runs.folder import Run, open_source
+from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import read_results
+from roboeval.evaluation.runs.source import open_source
 from roboeval.report import paper
 from roboeval.report.cost import rejection_sampling, retries_sheet
 from roboeval.report.failures import all_causes, beside_notes, causes_sheet

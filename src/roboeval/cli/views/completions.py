@@ -12,20 +12,24 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible
-from roboeval.cli.views.results import kind_view, prompt_lines
+from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
     GONE,
     LOWERED,
-    NOT_RECORDED,
     as_written,
     cut_told,
     error_sentence,
+    failing_first,
+    instruction_shown,
     shown_lines,
 )
+from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import by_hand, name_of
 from roboeval.suites.task import world_title
 
 EXPLANATION = 2_000
+ALL_GONE = "the judged programs are no longer in this run"
+ALL_STEPS = "--all shows what the robot did in satisfied worlds."
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
@@ -53,8 +57,13 @@ def _program_line(program: Mapping[str, Any]) -> Text:
     return text.append(f"\n{why}" if why else "")
 
 
-def completion_view(data: Mapping[str, Any]) -> RenderableType:
-    """One completion: its program, and each world with every step and failed check (`completion_data`)."""
+def completion_view(data: Mapping[str, Any], *, in_full: bool = False) -> RenderableType:
+    """One completion, as `completion_data` says: its program, and what the robot did in each world.
+
+    Args:
+        data: the completion.
+        in_full: whether satisfied worlds are more than a line each.
+    """
     lines = {world["line"] for world in data["worlds"] if not world["satisfied"]}
     parts: list[RenderableType] = [_completion_head(data)]
     if data["program"] is not None:
@@ -64,8 +73,15 @@ def completion_view(data: Mapping[str, Any]) -> RenderableType:
         worlds = as_written(worlds, data["program"])
     if worlds != data["worlds"]:
         parts += [Text(), Text(LOWERED, "dim")]
-    for number, world in enumerate(worlds, 1):
-        parts += [Text(), *_world(world, world_title(number, f" of {len(worlds)}", visible(world["world"])))]
+    satisfied = []
+    for number, world in failing_first(worlds):
+        title = Text(world_title(number, f" of {len(worlds)}", visible(world["world"])), "bold")
+        if in_full or not world["satisfied"]:
+            parts += [Text(), title, _ending(world), *_world(world)]
+        else:
+            satisfied.append(_satisfied(world, title))
+    if satisfied:
+        parts += [Text(), *satisfied, Text(ALL_STEPS, "dim")]
     return Group(*parts)
 
 
@@ -77,8 +93,10 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
         head.append(f"\nwritten by {visible(data['model'])}{by_hand([data['model']])}", "dim")
     if data["program"] is None:
         return head.append(f"\n{GONE}", "yellow")
-    told = NOT_RECORDED if data["instruction"] is None else visible(data["instruction"])
-    return head.append(f"\n{told}", "italic")
+    origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
+    if origin is not None:
+        head.append(f"\n{origin}", "dim")
+    return head if instruction is None else head.append(f"\n{visible(instruction)}", "italic")
 
 
 def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
@@ -95,9 +113,9 @@ def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
     return [syntax, Text(f"... {left:,} more lines", "dim")] if left else [syntax]
 
 
-def _world(world: Mapping[str, Any], title: str) -> list[RenderableType]:
+def _world(world: Mapping[str, Any]) -> list[RenderableType]:
     cut = world.get("cut")
-    parts: list[RenderableType] = [Text(title, "bold"), _ending(world)]
+    parts: list[RenderableType] = []
     if world["steps"] or cut is None:
         parts.append(storyboard(world["steps"], {check["step"] for check in world["failed_checks"]}))
     if cut is not None:
@@ -107,7 +125,15 @@ def _world(world: Mapping[str, Any], title: str) -> list[RenderableType]:
             ("failed ", "red"), visible(check["check"]), f": {shortened(check['explanation'], EXPLANATION)}"
         )
         parts.append(Padding(text, (0, 0, 0, 2)))
+    parts += [Padding(Text(shortened(one, EXPLANATION)), (0, 0, 0, 2)) for one in world["remarks"]]
     return parts
+
+
+def _satisfied(world: Mapping[str, Any], title: Text) -> Text:
+    """A world that is satisfied, in one line."""
+    ending = f", {world['status']} (allowed here)" if world["error"] else ""
+    steps = len(world["steps"]) + world.get("cut", {}).get("events", 0)
+    return Text.assemble(title, "  ", ("satisfied", "green"), f"{ending}, {counted(steps, 'step')}")
 
 
 def _ending(world: Mapping[str, Any]) -> Text:
@@ -118,3 +144,22 @@ def _ending(world: Mapping[str, Any]) -> Text:
     allowed = " (allowed here)" if world["satisfied"] else ""
     told = ", ".join(filter(None, [visible(world["error"]["kind"]), shortened(error_sentence(world))]))
     return text.append(f"{allowed}: {told}")
+
+
+def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
+    """The head of a prompt: its score, and its instruction."""
+    score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
+    head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
+    if prompt["gone"] == prompt["completions"]:
+        return [head, Text(ALL_GONE, "yellow")]
+    known: list[tuple[str | None, str | None]] = [(None, text) for text in prompt["instructions"]]
+    lines = [head]
+    for origin, text in known or [instruction_shown(None, prompt["suite_instruction"])]:
+        lines += [] if origin is None else [Text(origin, "dim")]
+        lines += [] if text is None else [Text(visible(text), "italic")]
+    return lines
+
+
+def kind_view(failure: Mapping[str, Any]) -> Text:
+    """A failure's class and kind."""
+    return Text.assemble((f"{visible(label_of(failure['class']))}: {visible(failure['kind'])}", "red"))

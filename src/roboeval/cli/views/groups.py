@@ -15,7 +15,8 @@ from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found
-from roboeval.cli.views.results import kind_view, ruled
+from roboeval.cli.views.completions import kind_view
+from roboeval.cli.views.results import ruled
 from roboeval.evaluation.explanation import GONE
 from roboeval.evaluation.runs.completions import how_many, name_of
 

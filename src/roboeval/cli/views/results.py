@@ -17,15 +17,14 @@ from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import Failures, Missing, Summary
-from roboeval.evaluation.explanation import NOT_RECORDED
-from roboeval.evaluation.failures import label_of, plural_of
+from roboeval.cli.views.completions import kind_view, prompt_lines
+from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import by_hand, how_many
 
 if TYPE_CHECKING:
     from roboeval.analysis.broken_rules import BrokenRules
 
 FEW = 3  # tasks that are named; of more, their number is told
-ALL_GONE = "the judged programs are no longer in this run"
 
 
 def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
@@ -156,17 +155,3 @@ def task_view(data: Mapping[str, Any]) -> RenderableType:
             table.add_row(f"  {failure['count']:,}", kind_view(failure), example)
         parts.append(table)
     return Group(*parts)
-
-
-def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
-    """The head of a prompt: its score, and its instruction."""
-    score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
-    head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
-    if prompt["gone"] == prompt["completions"]:
-        return [head, Text(ALL_GONE, "yellow")]
-    return [head, *(Text(visible(text), "italic") for text in prompt["instructions"] or [NOT_RECORDED])]
-
-
-def kind_view(failure: Mapping[str, Any]) -> Text:
-    """A failure's class and kind."""
-    return Text.assemble((f"{visible(label_of(failure['class']))}: {visible(failure['kind'])}", "red"))

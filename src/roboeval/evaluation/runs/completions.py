@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -12,7 +12,6 @@ from typing import Any, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.core.words import counted
-from codebotler.models.recorded import recorded_model
 from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
 
@@ -100,6 +99,7 @@ def read_completions(
     growing: bool = False,
     name: Path | str | None = None,
     faults: list[UserError] | None = None,
+    wanted: Callable[[bytes], bool] = bool,
 ) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
 
@@ -109,6 +109,7 @@ def read_completions(
         growing: whether it stands in a run, where a torn last line is passed over.
         name: what sentences call the file; its path by default.
         faults: gets what is wrong with lines, which are then left out, rather than that it is raised.
+        wanted: whether a line counts; others are passed over, whatever is in them.
 
     Raises:
         UserError: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
@@ -119,14 +120,18 @@ def read_completions(
     try:
         for number, line in read_lines(path, name=name):
             try:
-                if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
+                if (
+                    wanted(line)
+                    and line.strip()
+                    and (completion := _completion(line, suite, growing=growing)) is not None
+                ):
                     _expect_new(completion.key, seen, number)
                     yield completion
             except UserError as error:
                 add_or_raise(UserError(error.sentence, file=name, line=number), faults)
     except UserError as error:
         add_or_raise(error, faults)
-    if not seen and faults is None:
+    if not seen and faults is None and wanted is bool:
         raise UserError("there is no completion in it", file=name)
 
 
@@ -178,30 +183,6 @@ def name_of(key: Key) -> str:
 def how_many(count: int) -> str:
     """A number of completions: `1 completion`, `2,000 completions`."""
     return counted(count, "completion")
-
-
-def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
-    """Every reply that a recorded model has for a suite's prompts, as completions.
-
-    Raises:
-        UserError: there is no such model or suite, or the model knows none of its instructions.
-    """
-    model = recorded_model(name, None if suite.folder is None else suite.folder / "solutions")
-    found = False
-    for task in suite.tasks.values():
-        for prompt, instruction in enumerate(task.prompts):
-            for index, reply in enumerate(model.replies.get(instruction, ())):
-                found = True
-                yield Completion(
-                    task=task.name,
-                    prompt=prompt,
-                    index=index,
-                    instruction=instruction,
-                    model=model.name,
-                    program=reply.program,
-                )
-    if not found:
-        raise UserError(f'{name} knows no instruction of the suite "{suite.name}"')
 
 
 def by_hand(models: Collection[str | None]) -> str:

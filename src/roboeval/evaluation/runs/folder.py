@@ -15,50 +15,10 @@ from typing import Any
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text, sync_folder, to_line, to_text, write_whole, written_whole
-from roboeval.evaluation.runs.completions import (
-    COMPLETIONS,
-    EXAMPLE,
-    Completion,
-    read_completions,
-    recorded_completions,
-)
-from roboeval.evaluation.runs.published import passed_over, published_completions
+from roboeval.evaluation.runs.completions import COMPLETIONS, Completion, read_completions
 from roboeval.suites.load import ABLATED, Suite
 
 RULES = "-rules-"  # between a suite and house rules, in the name of an evaluation
-
-
-@dataclass(frozen=True)
-class Source:
-    """Completions that somebody names."""
-
-    completions: Sequence[Completion]  # each known to the suite
-    run: Run | None = None  # in which they stand
-    left_aside: str | None = None  # a warning about files that are none
-
-    def of(self, tasks: frozenset[str] | None) -> list[Completion]:
-        """Those of some tasks, or all."""
-        return [one for one in self.completions if tasks is None or one.task in tasks]
-
-
-def open_source(text: str, suite: Suite) -> Source:
-    """Read a run folder, a .jsonl file or pipe, a folder or zip of published .py, or `recorded:NAME`."""
-    if not text:
-        raise UserError("the argument is empty; name a run, a .jsonl, or a folder or zip of .py")
-    path = Path(text)
-    if text.partition(":")[0] == "recorded" and not path.exists():
-        return Source([*recorded_completions(text, suite)])
-    if not path.exists():
-        raise UserError(
-            "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
-        )
-    if (path / COMPLETIONS).is_file():
-        return Source([*Run(path).read(suite)], Run(path))
-    if path.is_dir() or path.suffix == ".zip":
-        return Source([*published_completions(path, suite)], left_aside=passed_over(path))
-    if path.suffix == ".py":
-        raise UserError(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
-    return Source([*read_completions(path, suite)])
 
 
 @dataclass(frozen=True)
@@ -246,10 +206,11 @@ def tasks_to_judge(
 def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
     """The suite with the worlds in which a run was judged, if other ones were drawn then."""
     path = run.head(evaluation_key(suite, ablated=ablated))
+    drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():
         return suite
     match load_head(path):
-        case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0:
+        case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0 and (worlds, seed) != drawn:
             return suite.with_worlds(worlds, seed).with_house_rules(suite.house)
     return suite
 

@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import polars as pl
 
 from codebotler.core.errors import UserError
-from roboeval.evaluation.runs.completions import KEY, Completion, Key, read_completions
-from roboeval.evaluation.runs.folder import Run, evaluation_of, load_head
-from roboeval.evaluation.runs.rows import (
-    JudgedRow,
-    Line,
-    Row,
-    RowData,
-    add_or_raise,
-    read_checks,
-    read_lines_of,
-)
-from roboeval.evaluation.runs.scope import Scope
-from roboeval.evaluation.runs.table import Price, TableBuilder, with_cost
+from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.folder import Run, evaluation_of
+from roboeval.evaluation.runs.judged import JudgedRun, Watch, read_rows, read_written, unwatched
+from roboeval.evaluation.runs.rows import JudgedRow, RowData, add_or_raise, read_checks
+from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
 
@@ -63,86 +53,17 @@ def load_results(
     return table if price is None else with_cost(table, Price(*price))
 
 
-@dataclass(frozen=True, eq=False)
-class Results:
-    """One evaluation of a run."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Results(JudgedRun):
+    """One evaluation of a run, with its table."""
 
-    run: Run
-    key: str | None
-    suite: Suite | None  # None if it is not at hand
-    head: Mapping[str, Any]  # KEY.json: by what was judged
-    about: Mapping[str, Any]  # run.json: how the completions were asked for
-    completions: Mapping[Key, Completion]  # those in the run now, in order
     table: pl.DataFrame  # as `load_results` gives it
     failed: Mapping[Key, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
-    places: Mapping[Key, tuple[int, int]] = field(repr=False)  # first byte and size of each row in the file
-    faults: tuple[UserError, ...] = ()
-
-    @property
-    def known_suite(self) -> Suite:
-        """Its suite, where it was read with one."""
-        assert self.suite is not None, "only pages show runs whose suite is not at hand"
-        return self.suite
-
-    @property
-    def tasks(self) -> frozenset[str] | None:
-        """The tasks that were selected; None for all."""
-        return selected_tasks(self.head)
-
-    @property
-    def scope(self) -> Scope:
-        """What there is to judge."""
-        return Scope.of(self.completions.values(), self.tasks)
-
-    @property
-    def is_ablated(self) -> bool:
-        """Whether common sense only was required."""
-        return (self.key or "").endswith(ABLATED)
-
-    @property
-    def passed(self) -> list[Key]:
-        """The completions that passed."""
-        return self._keys(pl.col("passed"))
-
-    @property
-    def stale(self) -> list[Key]:
-        """The completions whose verdicts are on other programs than stand in the run now."""
-        return self._keys(pl.col("stale"))
-
-    def _keys(self, condition: pl.Expr) -> list[Key]:
-        rows = self.table.filter(condition, pl.col("world_number") == 0)
-        return [*rows.select(KEY).iter_rows()]
-
-    @property
-    def programs(self) -> Mapping[Key, str]:
-        """The programs that were judged, but those that have changed or are gone since."""
-        stale = set(self.stale)
-        return {key: c.program for key, c in self.completions.items() if key not in stale}
 
     def failed_row(self, key: Key) -> RowData:
         """The row of a completion that failed, without traces of worlds that did not decide."""
         row: RowData = json.loads(self.failed[key])
         return row
-
-    def row(self, key: Key) -> Row:
-        """Read a row again, with all its traces; raises UserError if the file was written anew."""
-        at, size = self.places[key]
-        path = self.run.rows(self.key or "")
-        try:
-            with path.open("rb") as file:
-                file.seek(at)
-                row: Row = json.loads(file.read(size))
-            if (row["task"], row["prompt"], row["index"]) == key:
-                return row
-        except (OSError, ValueError, LookupError, TypeError, RecursionError):
-            pass
-        raise UserError("was replaced meanwhile; try again", file=path)
-
-
-def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
-    """The tasks that a KEY.json names; None for all."""
-    tasks = head.get("tasks")
-    return None if tasks is None else frozenset(tasks)
 
 
 def read_results(
@@ -154,22 +75,20 @@ def read_results(
     keep_failed: bool = True,  # may take much memory
     faults: list[UserError] | None = None,
     see: Callable[[bytes], None] | None = None,  # gets the line of each row
-    watch: Callable[[Iterator[Line], int], Iterable[Line]] = lambda lines, _: lines,  # gets the total, too
+    watch: Watch = unwatched,
 ) -> Results:
     """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
-    head = {} if key is None else _head(run.head(key), faults)
-    tasks = selected_tasks(head)
-    about, completions = (beside.about, beside.completions) if beside else _completions(run, faults)
-    total = sum(tasks is None or task in tasks for task, _, _ in completions)
+    about, completions = (beside.about, beside.completions) if beside else read_written(run, faults)
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
-    places: dict[Key, tuple[int, int]] = {}
     failed: dict[Key, bytes] = {}
-    lines = iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults)
-    for line in watch(lines, total):
-        builder.add(line.row)
-        places[line.row.key] = line.at, line.size
-        if keep_failed and line.row.failure is not None:
-            failed[line.row.key] = without_other_traces(line.row, line.row.failure.world)
+
+    def add(row: JudgedRow) -> None:
+        builder.add(row)
+        if keep_failed and row.failure is not None:
+            failed[row.key] = without_other_traces(row, row.failure.world)
+
+    head, places = read_rows(run, key, completions, add, faults=faults, see=see, watch=watch)
+    table = builder.table()
     return Results(
         run=run,
         key=key,
@@ -177,28 +96,13 @@ def read_results(
         head=head,
         about=about,
         completions=completions,
-        table=builder.table(),
-        failed=failed,
         places=places,
+        passed=keys_where(table, "passed"),
+        stale=keys_where(table, "stale"),
         faults=tuple(faults or ()),
+        table=table,
+        failed=failed,
     )
-
-
-def _completions(
-    run: Run, faults: list[UserError] | None
-) -> tuple[Mapping[str, Any], Mapping[Key, Completion]]:
-    """How a run's completions were asked for, and they themselves."""
-    about = _head(run.about, faults) if run.about.exists() else {}
-    completions = read_completions(run.completions, growing=True, faults=faults)
-    return about, {(sys.intern(one.task), one.prompt, one.index): one for one in completions}
-
-
-def _head(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
-    try:
-        return load_head(path)
-    except UserError as error:
-        add_or_raise(error, faults)
-        return {}
 
 
 def without_other_traces(row: JudgedRow, world: int) -> bytes:

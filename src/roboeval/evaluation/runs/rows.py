@@ -197,14 +197,18 @@ def read_lines_of(
     seal: Seal | None = None,
     see: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
+    wanted: Callable[[bytes], bool] = bool,
 ) -> Iterator[Line]:
-    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
+    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised.
+
+    Lines that are not `wanted` are passed over, whatever is in them.
+    """
     seal = seal or Seal()
     at, is_told = 0, False
     for number, line in read_lines(path, limit=LONGEST_LINE):
         seal.add(line)
         try:
-            if line.strip():
+            if line.strip() and wanted(line):
                 row = judged_row(line, check_kinds=not is_sealed(head))
                 if see is not None:
                     see(line)

@@ -12,7 +12,7 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
-from roboeval.evaluation.runs.completions import Completion, Key
+from roboeval.evaluation.runs.completions import KEY, Completion, Key
 from roboeval.evaluation.runs.rows import JudgedRow
 
 Tokens = TypeVar("Tokens", float, pl.Expr)
@@ -80,6 +80,11 @@ class Price(NamedTuple):
 def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
     """A table whose `cost` is what the tokens of a completion cost at a price."""
     return table.with_columns(cost=price.of(pl.col("input_tokens"), pl.col("output_tokens")))
+
+
+def keys_where(table: pl.DataFrame, column: str) -> list[Key]:
+    """The completions for which a column about them is true."""
+    return [*table.filter(pl.col(column), pl.col("world_number") == 0).select(KEY).iter_rows()]
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, Appender, to_line, write_whole
 from roboeval.evaluation.runs.completions import read_completions
-from roboeval.evaluation.runs.folder import Run, open_source
+from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.source import open_source
 from roboeval.suites.load import Suite
 
 ROW = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": "x = 1"}

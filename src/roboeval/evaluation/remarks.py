@@ -1,0 +1,122 @@
+"""Remarks on a run in a world: what it repeated until a limit, and questions that got others' answers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from codebotler.core.trace import Event, Status, Trace
+from codebotler.core.words import counted, listed
+from codebotler.core.world import Answer, Person, World
+from codebotler.rtl.wording import done_to, few, named, quoted, room_name, verb
+from codebotler.simulator.rules import Rules, choose, finds
+
+FEWEST_TIMES = 3  # that steps must be repeated to be a cycle
+LONGEST_CYCLE = 100  # steps
+
+
+def remarks_on(
+    verdict: Mapping[str, Any], trace: Trace, world: World | None, rules: Rules | None
+) -> list[str]:
+    """Return sentences that explain a run beside its failed checks; events of the trace have their places."""
+    remarks = []
+    is_whole = verdict.get("cut") is None
+    if verdict["status"] == Status.TIMEOUT and is_whole and (cycle := cycle_at_end(trace)) is not None:
+        remarks.append(cycle.sentence)
+    if not verdict["satisfied"] and world is not None and rules is not None:
+        remarks += misplaced_questions(trace, world, rules)
+    return remarks
+
+
+# --- cycles
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Steps at the end of a trace that were repeated."""
+
+    first: int  # the number of the first step, from 1
+    steps: Trace  # of one turn
+    times: int
+
+    @property
+    def sentence(self) -> str:
+        """What was repeated, from which step on, and how often."""
+        those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
+        deeds = ", ".join(few([*map(_deed, self.steps)]))
+        return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
+
+
+def cycle_at_end(trace: Trace) -> Cycle | None:
+    """Return the cycle that covers most of a trace's end, the shortest of equal ones; None without any."""
+    numbers: dict[Event, int] = {}
+    each = [numbers.setdefault(event, len(numbers)) for event in trace]
+    most, found = 0, None
+    for length in range(1, min(LONGEST_CYCLE, len(each) // FEWEST_TIMES) + 1):
+        start = len(each) - length
+        while start > 0 and each[start - 1] == each[start - 1 + length]:
+            start -= 1
+        covered = len(each) - start
+        if covered >= FEWEST_TIMES * length and covered > most:
+            most, found = covered, Cycle(start + 1, trace[start : start + length], covered // length)
+    return found
+
+
+def _deed(event: Event) -> str:
+    deed = done_to(event, verb(event.kind).base)
+    if event.found is not None:
+        return f"{deed} ({verb(event.kind).results[event.found]})"
+    return deed if event.answer is None else f"{deed} (answer {quoted(event.answer)})"
+
+
+# --- answers in a fixed order
+
+
+def misplaced_questions(trace: Trace, world: World, rules: Rules) -> Iterator[str]:
+    """Yield a sentence for each room where a question got the answer to another, which does not fit."""
+    for room in world.rooms:
+        match room.people:
+            case [Person(answers=[_, _, *_], after_looks=0) as person]:
+                pass
+            case _:  # rows do not say who of several people was asked
+                continue
+        asked = [e for e in trace if e.options and e.place == room.name and not _has_topic(e, person, rules)]
+        for number, question in enumerate(asked):
+            own = person.answers[min(number, len(person.answers) - 1)]
+            others = [answer for answer in person.answers if answer != own]
+            if not _fits(own, question, rules) and any(_fits(each, question, rules) for each in others):
+                yield _misplaced(room.name, person, number, question)
+                break
+
+
+def _has_topic(question: Event, person: Person, rules: Rules) -> bool:
+    return any(finds(question.text, topic, rules.matching) for topic, _ in person.topics)
+
+
+def _fits(answer: Answer, question: Event, rules: Rules) -> bool:
+    """Whether an option says the answer, rather than a yes or a no to it."""
+    chosen = choose(answer, question.text, question.options, rules)
+    return chosen is not None and (
+        isinstance(answer, int) or finds(question.options[chosen].text, answer, rules.matching)
+    )
+
+
+def _misplaced(room: str, person: Person, number: int, question: Event) -> str:
+    given = [f"the {_ordinal(n)} gets {_answer(answer)}" for n, answer in enumerate(person.answers, 1)]
+    own = _answer(person.answers[min(number, len(person.answers) - 1)])
+    return (
+        f"In {room_name(room)}, questions are answered in a fixed order: {listed(few(given))}; "
+        f"the {_ordinal(number + 1)} was {quoted(question.text)}, none of whose options fits {own}."
+    )
+
+
+def _answer(answer: Answer) -> str:
+    if isinstance(answer, int):
+        return "the last option" if answer == -1 else f"option {answer}"
+    return "the first option" if answer == ".*" else named(answer)
+
+
+def _ordinal(number: int) -> str:
+    ending = "th" if number // 10 % 10 == 1 else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{ending}"

@@ -1,0 +1,57 @@
+"""The part of a run that a user names: a task, a prompt or one completion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import visible
+from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.judged import JudgedRun
+from roboeval.suites.load import Suite
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A part of a run: all of it, a task, a prompt or one completion; what is None is not narrowed."""
+
+    task: str | None = None
+    prompt: int | None = None
+    index: int | None = None
+
+    def __str__(self) -> str:
+        return "/".join(str(part) for part in (self.task, self.prompt, self.index) if part is not None)
+
+    @property
+    def key(self) -> Key:
+        """The completion that it is, where it has all three parts."""
+        assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - one thing
+        return self.task, self.prompt, self.index
+
+    def expect_judged(self, judged: JudgedRun) -> None:
+        """Raise UserError if nothing of this part was judged."""
+        wanted = self.task, self.prompt, self.index
+        if not any(all(w in {None, h} for w, h in zip(wanted, key, strict=True)) for key in judged.places):
+            what = f"completion {self}" if self.index is not None else f"completion of {self}"
+            raise UserError(f"no {what if self.task else 'completion'} has been judged in this run")
+
+
+def parse_selection(text: str | None, suite: Suite) -> Selection:
+    """Read TASK, TASK/PROMPT or TASK/PROMPT/INDEX, or nothing for the whole run."""
+    if not text:
+        return Selection()
+    name, *numbers = text.removesuffix("/").split("/")
+    if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
+        raise UserError(f'"{visible(text)}" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX')
+    if name not in suite.tasks:
+        name = next((task for task in suite.tasks if task.lower() == name.lower()), name)
+    task = suite.task(name)
+    selection = Selection(name, *map(int, numbers))
+    if selection.prompt is not None and selection.prompt >= len(task.prompts):
+        raise UserError(f"{name} has prompts 0 to {len(task.prompts) - 1}, so {selection} selects nothing")
+    return selection
+
+
+def names_completion(text: str) -> bool:
+    """Whether a selection has all three parts."""
+    return text.removesuffix("/").count("/") == 2  # noqa: PLR2004 - between three parts
