@@ -7,6 +7,7 @@ by code whose time may grow faster than the text, only in these processes. They 
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import pickle
@@ -166,6 +167,13 @@ IDLE: dict[str, list[ClosedProcess]] = {}
 """The processes that wait for a call, by the module whose functions they call."""
 
 
+def end_all() -> None:
+    """End the processes that wait; nobody may be calling."""
+    for processes in IDLE.values():
+        while processes:
+            processes.pop().end()
+
+
 def forget_all() -> None:
     """Let go of the processes of the parent, in a forked process."""
     for processes in IDLE.values():
@@ -173,6 +181,7 @@ def forget_all() -> None:
             processes.pop().forget()
 
 
+atexit.register(end_all)
 os.register_at_fork(after_in_child=forget_all)
 
 

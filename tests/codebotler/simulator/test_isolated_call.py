@@ -1,0 +1,164 @@
+"""Functions called in closed processes: what comes back, what is out of reach, and how a call fails."""
+
+import ast
+import builtins
+import os
+import signal
+import symtable
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import closed_functions as closed
+from codebotler.checking.check import check
+from codebotler.core import program as programs
+from codebotler.core.program import FILE, LONGEST
+from codebotler.prompts.extract import program_in, program_of
+from codebotler.simulator.isolated_call import IsolatedCallError, end_all
+from roboeval.mutation.program_tree import changed, read
+from roboeval.training.rollouts import Rollout, judge
+
+TASK = "def task_program():\n    say('hello')\n"
+ENDLESS = str(10**12)
+
+
+def test_function_gets_its_arguments_and_returns_plain_data() -> None:
+    assert closed.echo("half \ud800 a character\0", times=2) == ["half \ud800 a character\0"] * 2
+
+
+def test_process_is_used_again_and_is_another_one() -> None:
+    first = closed.process_number("")
+    assert first == closed.process_number("") != os.getpid()
+
+
+def test_function_reaches_no_file_no_socket_and_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    end_all()  # so that a new process is started, with this environment
+    monkeypatch.setenv("SOME_API_KEY", "secret")
+    assert closed.reach(__file__) == []
+
+
+@pytest.mark.parametrize(
+    ("call", "kind"),
+    [
+        (lambda: closed.fill(str(10**9)), "MemoryError"),
+        (lambda: closed.fail("a"), "KeyError"),
+        (lambda: closed.end("a"), "Crash"),
+    ],
+)
+def test_failure_is_one_of_the_call_and_the_next_one_succeeds(call: Callable[[], Any], kind: str) -> None:
+    with pytest.raises(IsolatedCallError) as error:
+        call()
+    assert error.value.kind == kind
+    assert closed.echo("a") == ["a"]
+
+
+@pytest.mark.slow
+def test_call_that_computes_for_too_long_ends() -> None:
+    with pytest.raises(IsolatedCallError) as error:
+        closed.compute(ENDLESS)
+    assert error.value.kind == "TimeoutError"
+
+
+def test_used_process_that_was_killed_is_replaced() -> None:
+    number = closed.process_number("")
+    os.kill(number, signal.SIGKILL)
+    assert closed.process_number("") != number
+
+
+def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
+    closed.echo("warm")
+
+    def call() -> None:
+        threading.Timer(0.2, signal.raise_signal, [signal.SIGINT]).start()
+        closed.compute(ENDLESS)
+
+    with pytest.raises(KeyboardInterrupt):
+        call()
+    assert closed.echo("a") == ["a"]
+
+
+def test_threads_call_at_the_same_time() -> None:
+    found: dict[int, list[str]] = {}
+
+    def call(number: int) -> None:
+        found[number] = closed.echo(str(number))
+
+    threads = [threading.Thread(target=call, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == {number: [str(number)] for number in range(4)}
+
+
+def test_forked_process_has_processes_of_its_own() -> None:
+    closed.echo("warm")
+    pid = os.fork()
+    if pid == 0:
+        os._exit(0 if closed.echo("in the child") == ["in the child"] else 1)
+    assert closed.echo("in the parent") == ["in the parent"]
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+
+
+# --- text that others wrote
+
+
+@pytest.fixture(name="no_compiler")
+def no_compiler_(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process in which nobody may compile a program, or look for its names."""
+    real = builtins.compile
+
+    def parse_only(source: Any, filename: str, mode: str, flags: int = 0, *args: Any, **more: Any) -> Any:  # noqa: ANN401 - as the builtin
+        assert filename != FILE or flags & ast.PyCF_ONLY_AST, "a program is compiled in this process"
+        return real(source, filename, mode, flags, *args, **more)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("a program is read in this process by what may take long")
+
+    monkeypatch.setattr(builtins, "compile", parse_only)
+    monkeypatch.setattr(symtable, "symtable", refuse)
+    monkeypatch.setattr(programs, "_pyflakes", refuse)
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_programs_of_others_are_never_compiled_in_this_process() -> None:
+    assert not check(TASK).problems
+    assert [problem.line for problem in check(TASK + "return\n").problems] == [3]
+    assert program_of(f"Here:\n```\n{TASK}```\n").source == TASK
+    assert program_in(TASK) == TASK
+    tree = read(TASK)
+    assert tree is not None
+    assert changed(tree, {}) == "def task_program():\n    say('hello')"
+    (whole, cut) = judge([Rollout("CountRooms", 0, 0, one) for one in (TASK, TASK + "return\n")])
+    assert (whole.parses, cut.parses) == (1.0, 0.0)
+
+
+def test_program_that_is_too_long_is_not_read() -> None:
+    long = TASK + "# " + "x" * LONGEST
+    assert [problem.kind for problem in check(long).problems] == ["MemoryError"]
+
+
+def nested_returns(depth: int = 4, returns: int = 30) -> str:
+    """A short program whose compiled code is enormous, since each `return` has a copy of each `finally`."""
+    lines, pad = ["def task_program():"], "    "
+    for _ in range(depth):
+        lines += [f"{pad}try:", *[f"{pad}    if x: return 1"] * returns, f"{pad}finally:"]
+        pad += "    "
+    return "\n".join([*lines, f"{pad}pass", ""])
+
+
+def redefinitions(count: int = 2_700) -> str:
+    """A program that pyflakes reads in quadratic time."""
+    return "if 1:\n" + "    def f(): pass\n" * count
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", [nested_returns(), redefinitions()], ids=["returns", "definitions"])
+def test_program_that_takes_long_to_compile_or_to_read_is_a_problem(program: str) -> None:
+    before = time.process_time()
+    assert check(program).problems
+    assert program_of(f"```\n{program}```\n").source
+    assert time.process_time() - before < 2  # here; the closed processes take their five seconds each
