@@ -140,10 +140,10 @@ def _for_people(step: dict[str, Any]) -> dict[str, Any]:
     return {**step, **names}
 
 
-def _sample(sample: Sample, found: Check) -> Iterator[RenderableType]:
+def _sample(sample: Sample) -> Iterator[RenderableType]:
     where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
     yield Text.assemble(("what the robot would do", "bold"), where)
-    steps = steps_of(sample.outcome.trace, found.room_map.room)
+    steps = steps_of(sample.outcome.trace, has_places=True)
     yield storyboard([_for_people(step) for step in steps], set())
     if sample.outcome.error is not None:
         told = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
