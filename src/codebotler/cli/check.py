@@ -55,7 +55,7 @@ def check_view(found: Check, program: str, name: str, *, shows_all: bool = False
     parts += [Text(), _rooms(found), *_in_vain(found)]
     kinds = _kinds(found)
     for sample in kinds if shows_all else kinds[:1]:
-        parts += [Text(), *_sample(sample, found)]
+        parts += [Text(), *_sample(sample)]
     if len(kinds) > 1 and not shows_all:
         parts += [Text(), Text(f"this is 1 of {len(kinds)} different courses; --all shows them", "dim")]
     return Group(*parts)

@@ -110,7 +110,8 @@ class CutTrace(_Part, frozen=True):
     sha256: str
 
 
-Numbered: TypeAlias = tuple[tuple[int, str], ...]  # what is so from an event on, or of it
+Numbered: TypeAlias = tuple[tuple[int, str], ...]  # by the numbers of events
+PerhapsNumbered: TypeAlias = tuple[tuple[int, str | None], ...]
 
 
 class WorldVerdict(_Part, frozen=True):
@@ -128,8 +129,8 @@ class WorldVerdict(_Part, frozen=True):
     trace: tuple[msgspec.Raw, ...]
     places: Numbered | msgspec.UnsetType = msgspec.UNSET
     holding: Numbered | msgspec.UnsetType = msgspec.UNSET
-    to: Numbered | msgspec.UnsetType = msgspec.UNSET
-    destinations: tuple[tuple[int, str | None], ...] | msgspec.UnsetType = msgspec.UNSET
+    to: PerhapsNumbered | msgspec.UnsetType = msgspec.UNSET
+    destinations: PerhapsNumbered | msgspec.UnsetType = msgspec.UNSET
     cut: CutTrace | msgspec.UnsetType = msgspec.UNSET
 
     @property

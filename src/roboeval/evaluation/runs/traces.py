@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from codebotler.core.trace import Event, Trace, trace_from
@@ -22,36 +22,38 @@ def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
       may be one more than there are events.
     - `holding`: `[number, thing]`, from which event on it holds what; nothing at first, and where the thing
       is empty.
-    - `to`: `[number, person]`, whom a question is for.
+    - `to`: `[number, person]`, whom a question is for, and those of its kind from then on; null for nobody.
     - `destinations`: `[number, room]`, where a drive led, if not to the place of the next event; null if it
       failed.
     """
+    places = [event.place for event in trace]
+    places += [event.destination or event.place for event in trace[-1:]]  # where the robot is at the end
+    drives = [number for number, event in enumerate(trace, 1) if event.kind == DRIVE]
+    led = [(number, trace[number - 1].destination) for number in drives]
     found = {
-        "places": _changes(_places(trace), None),
+        "places": _changes(places, None),
         "holding": _changes([event.holding for event in trace], ""),
-        "to": [[number, event.to] for number, event in enumerate(trace, 1) if event.to is not None],
-        "destinations": [
-            [number, event.destination]
-            for number, (event, after) in enumerate(zip(trace, _places(trace)[1:], strict=True), 1)
-            if event.kind == DRIVE and event.destination != after
-        ],
+        "to": _changes_by_kind(trace),
+        "destinations": [[number, room] for number, room in led if room != places[number]],
     }
     return {name: data for name, data in found.items() if data or name == "places"}
 
 
-def _places(trace: Trace) -> list[str]:
-    """Where each event happened, and where the last of them led."""
-    end = [event.destination or event.place for event in trace[-1:]]
-    return [*(event.place for event in trace), *end]
-
-
-def _changes(values: Iterable[str], value: str | None) -> list[list[Any]]:
+def _changes(values: Sequence[str], first: str | None) -> list[list[Any]]:
     """The values that are others than the one before, with their numbers."""
+    changes = enumerate(zip([first, *values], values, strict=False), 1)
+    return [[number, new] for number, (old, new) in changes if new != old]
+
+
+def _changes_by_kind(trace: Trace) -> list[list[Any]]:
+    """Whom questions are for, where it is somebody else than for the last event of the same kind."""
+    kinds = {event.kind for event in trace if event.to is not None}
+    last: dict[str, str | None] = {}
     changes: list[list[Any]] = []
-    for number, new in enumerate(values, 1):
-        if new != value:
-            value = new
-            changes.append([number, value])
+    for number, event in enumerate(trace, 1):
+        if event.kind in kinds and event.to != last.get(event.kind):
+            last[event.kind] = event.to
+            changes.append([number, event.to])
     return changes
 
 
@@ -72,13 +74,16 @@ def trace_of(verdict: Mapping[str, Any]) -> Trace:
         return trace
     places, holding, to, destinations = (dict(verdict.get(name, ())) for name in CIRCUMSTANCES)
     here, held, events = "", "", []
+    asked: dict[str, str | None] = {}  # by the kind of event
     for number, event in enumerate(trace, 1):
         here, held = places.get(number, here), holding.get(number, held)
+        if number in to:
+            asked[event.kind] = to[number]
         seen = event.kind, event.text, event.options, event.answer, event.found
         led = None
         if event.kind == DRIVE:
             led = destinations.get(number, places.get(number + 1, here))
-        events.append(Event(*seen, here, 0.0, held, to.get(number), event.more, led))
+        events.append(Event(*seen, here, 0.0, held, asked.get(event.kind), event.more, led))
     return tuple(events)
 
 

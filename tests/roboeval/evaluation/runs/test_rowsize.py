@@ -55,7 +55,7 @@ def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
 def test_circumstances_are_bounded_with_their_events() -> None:
     rooms = [f"room {n} " + "x" * 300 for n in range(1_000)]
     drives = [
-        Event("goto", "x", place=here, holding="y" * (n % 2), to="z" * 900, destination=there)
+        Event("goto", "x", place=here, holding="y" * (n % 2), to=f"{n} " + "z" * 900, destination=there)
         for n, (here, there) in enumerate(pairwise(rooms))
     ]
     one = row([tuple(drives), LOUD])

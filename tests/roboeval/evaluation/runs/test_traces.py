@@ -13,7 +13,7 @@ rooms = st.sampled_from(["hall", "lab"])
 events = st.one_of(
     st.builds(Event, st.just("goto"), rooms, place=rooms, destination=st.none() | rooms),
     st.builds(Event, st.just("say"), st.just("hi"), place=rooms, holding=st.sampled_from(["", "mug", "pen"])),
-    st.builds(Event, st.just("ask"), st.just("q"), place=rooms, to=st.sampled_from(["", "amy"])),
+    st.builds(Event, st.sampled_from(["ask", "bid"]), rooms, to=st.sampled_from([None, "", "amy"])),
 )
 traces = st.lists(events, max_size=6).map(tuple)
 
@@ -43,14 +43,17 @@ def test_only_what_changes_is_written() -> None:
         Event("say", "hi", place="lab", holding="mug"),
         Event("ask", "q", place="lab", holding="mug", to="amy"),
         Event("goto", "hall", place="lab", destination="hall"),
+        Event("ask", "q", place="hall", to="amy"),
+        Event("ask", "q", place="hall", to="bob"),
     )
     assert circumstances(trace) == {
         "places": [[1, "hall"], [5, "lab"], [8, "hall"]],
         "holding": [[5, "mug"], [7, ""]],
-        "to": [[6, "amy"]],
+        "to": [[6, "amy"], [9, "bob"]],
         "destinations": [[3, None]],
     }
     assert circumstances(()) == {"places": []}
+    assert circumstances(trace[3:4]) == {"places": [[1, "hall"], [2, "lab"]]}
 
 
 def test_which_formulas_need_them() -> None:
