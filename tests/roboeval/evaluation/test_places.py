@@ -20,6 +20,7 @@ from codebotler.core.trace import Outcome
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
 from codebotler.rtl.semantics import visible
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.worker import Worker
 from made_results import results_of
@@ -30,7 +31,8 @@ from roboeval.evaluation.explanation import CHANGED, completion_data
 from roboeval.evaluation.judge import is_met, judged, row_line, run_in_worlds
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import judged_row
-from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances
+from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, trace_of
+from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 
 ROOMS = ("office", "bob's office", "lab", "lab 1", "kitchen")
@@ -242,6 +244,20 @@ def test_events_within_skills_of_a_users_own(worker: Worker) -> None:
     (world_shown,) = completion_data(row, None, suite)["worlds"]
     drive = next(step for step in world_shown["steps"] if step["kind"] == "goto")
     assert (drive["place"], drive["to"]) == ("office", "kitchen")
+
+
+def test_runs_that_a_rule_ends(worker: Worker) -> None:
+    rule = Rule("quiet", "Be quiet in the office.", parse('not tr.Exists(at("office", say(".*")))'))
+    formula = 'tr.Last(at("kitchen", goto("office")))'
+    suite = replace(suite_of(OFFICES, STRICT, formula), house=HouseRules("", (rule,), "0"))
+    program = "def task_program():\n    pick('mug')\n    go_to('office')\n    say('hi')\n"
+    outcome, row = judge(worker, suite, program)
+    (verdict,) = row["verdicts"]
+    assert (verdict["status"], verdict["error"]["kind"]) == ("robot-error", "RuleViolation")
+    assert trace_of(verdict) == outcome.trace
+    assert visible(trace_of(verdict)) == visible(outcome.trace)
+    assert (verdict["places"], verdict["holding"]) == ([[1, "kitchen"], [3, "office"]], [[2, "mug"]])
+    assert expect_agreement(worker, suite, program) == [True]
 
 
 PROGRAM = (

@@ -1,6 +1,7 @@
 """The circumstances of events come back from a row as they were."""
 
 import json
+from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,7 +23,7 @@ def seen(trace: Trace) -> list[tuple[object, ...]]:
     return [(e.kind, e.text, e.place, e.holding, e.to, e.destination) for e in trace]
 
 
-def written(trace: Trace) -> dict[str, list[object]]:
+def written(trace: Trace) -> dict[str, Any]:
     return {"trace": [*trace_data(trace)], **circumstances(trace)}
 
 
@@ -57,7 +58,7 @@ def test_only_what_changes_is_written() -> None:
 
 
 def test_which_formulas_need_them() -> None:
-    old = {"trace": []}
+    old: dict[str, Any] = {"trace": []}
     for text in ('at("lab", say("x"))', 'holding("mug", say("x"))', 'to("amy", ask("x", "y"))'):
         for formula in (f"tr.Exists({text})", f'not tr.AfterFirst({text}).Exists(say("x"))'):
             assert not can_judge(parse(formula), old)
