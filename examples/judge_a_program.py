@@ -1,8 +1,8 @@
 """Judge a program in every world of a task, and say why it fails where it does."""
 
-from codebotler.core.trace import trace_from
 from codebotler.rtl import explain
 from roboeval import Completion, evaluate, load_suite
+from roboeval.evaluation.runs.traces import trace_of
 
 PROGRAM = """
 def task_program():
@@ -21,5 +21,5 @@ for scenario, verdict in zip(suite.tasks["SayGoodDay"].scenarios, row["verdicts"
     print(f"- {verdict['world']}: {'satisfied' if verdict['satisfied'] else 'not satisfied'}")
     for requirement in scenario.require:
         if requirement.text in verdict["failed_checks"]:
-            why = explain(requirement.formula, trace_from(verdict["trace"]))
+            why = explain(requirement.formula, trace_of(verdict))
             print(f"    {requirement.text}: {why.sentence if why else ''}")

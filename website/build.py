@@ -40,6 +40,7 @@ MODULES = {
         "roboeval",
         "roboeval.suites.load",
         "roboeval.evaluation.runs.completions",
+        "roboeval.evaluation.runs.traces",
         "roboeval.analysis.metrics",
         "roboeval.training.families",
         "roboeval.training.prompts",

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
+from codebotler.core.errors import RobotError
 from codebotler.core.files import to_line
+from codebotler.core.trace import Event, Trace
+from codebotler.core.world import World
+from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.judge import row_line
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.folder import Run
@@ -26,6 +32,7 @@ VERDICT = {
     "line": None,
     "failed_checks": [],
     "trace": [],
+    "places": [],
 }
 
 
@@ -47,6 +54,19 @@ def _whole(row: RowData, program: str) -> dict[str, Any]:
     verdicts += [{**VERDICT, "satisfied": failure is None}] * (least - len(verdicts))
     made = Completion(task="T", prompt=0, index=0, program=program).program_sha256
     return {"program_sha256": made, **row, "failure": failure, "verdicts": verdicts}
+
+
+def as_driven(world: World, *events: Event) -> Trace:
+    """Events with the places where they happen, as the drives among them lead."""
+    robot, driven = SimulatedRobot(world), []
+    for event in events:
+        if event.kind == "goto":
+            with suppress(RobotError):
+                robot.drive(event.text)
+            driven.append(robot.events[-1])
+        else:
+            driven.append(replace(event, place=robot.room))
+    return tuple(driven)
 
 
 def table_of(rows: Iterable[RowData]) -> pl.DataFrame:

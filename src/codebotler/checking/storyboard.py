@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, Literal
 
@@ -20,17 +20,17 @@ MOST_OPTIONS = 20
 MARK = "❱"
 
 
-def steps_of(trace: Trace, room: Callable[[str], str | None] | None = None) -> list[dict[str, Any]]:
-    """The events of a trace, counted from 1; with their places if `room` finds the room of a drive."""
-    return [_step_data(number, event, room) for number, event in enumerate(trace, 1)]
+def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
+    """The events of a trace, counted from 1; with their places if the trace has them."""
+    return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
 
 
-def _step_data(number: int, event: Event, room: Callable[[str], str | None] | None) -> dict[str, Any]:
+def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]:
     data: dict[str, Any] = {"step": number, "kind": event.kind, "text": event.text}
-    if room is not None:
+    if has_places:
         data["place"] = event.place
         if event.kind == "goto":
-            data["to"] = room(event.text)
+            data["to"] = event.destination
     if event.found is not None:
         data["found"] = event.found
     if event.more:

@@ -54,7 +54,7 @@ def check_view(found: Check, program: str, name: str, *, shows_all: bool = False
     parts += [Text(), _rooms(found), *_in_vain(found)]
     kinds = _kinds(found)
     for sample in kinds if shows_all else kinds[:1]:
-        parts += [Text(), *_sample(sample, found)]
+        parts += [Text(), *_sample(sample)]
     if len(kinds) > 1 and not shows_all:
         parts += [Text(), Text(f"this is 1 of {len(kinds)} different courses; --all shows them", "dim")]
     return Group(*parts)
@@ -139,10 +139,10 @@ def _for_people(step: dict[str, Any]) -> dict[str, Any]:
     return {**step, **names}
 
 
-def _sample(sample: Sample, found: Check) -> Iterator[RenderableType]:
+def _sample(sample: Sample) -> Iterator[RenderableType]:
     where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
     yield Text.assemble(("what the robot would do", "bold"), where)
-    steps = steps_of(sample.outcome.trace, found.room_map.room)
+    steps = steps_of(sample.outcome.trace, has_places=True)
     yield storyboard([_for_people(step) for step in steps], set())
     if sample.outcome.error is not None:
         told = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"

@@ -50,9 +50,10 @@ class Event:
         found: what a look, or another skill that answers yes or no, has returned; None for other kinds.
         place: the room where it happened, as the world names it (for a drive, the room where it started).
         time: simulated seconds since the start of the run.
-        holding: what the robot held when it began; empty for nothing. Rows of evaluations do not keep it.
-        to: whom a question was for, as the program said; None for other kinds. Rows do not keep it either.
+        holding: what the robot held when it began; empty for nothing.
+        to: whom a question was for, as the program said; None for other kinds.
         more: what else a skill with several arguments was given, as texts.
+        destination: the room where a drive ended; None for a drive that failed, and for other kinds.
     """
 
     kind: str
@@ -65,6 +66,7 @@ class Event:
     holding: str = field(default="", compare=False)
     to: str | None = field(default=None, compare=False)
     more: tuple[str, ...] = ()
+    destination: str | None = field(default=None, compare=False)
 
     def __init__(  # noqa: PLR0917 - as the generated one would have it
         self,
@@ -78,11 +80,13 @@ class Event:
         holding: str = "",
         to: str | None = None,
         more: tuple[str, ...] = (),
+        destination: str | None = None,
     ) -> None:
         values = self.__dict__  # by far the quickest way to fill what is frozen, and a trace has many events
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
         values["holding"], values["to"], values["more"] = holding, to, more
+        values["destination"] = destination
 
 
 def attempted(
@@ -156,7 +160,7 @@ def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
 
 
 def trace_from(data: Iterable[object]) -> Trace:
-    """The trace that `trace_data` gave as data, without places and times; a UserError if it is none."""
+    """The trace that `trace_data` gave as data, with nothing else known of it; a UserError if it is none."""
     return tuple(map(_event_from, data))
 
 

@@ -162,9 +162,9 @@ class SimulatedRobot:
         """Drive to the first room whose name is found in the request."""
         room = resolve_room(self.rooms, location, self.rules.matching)
         if self.rules.events == "as-requested":
-            self.record("goto", location)
+            self.record("goto", location, destination=room)
         elif room is not None:
-            self.record("goto", room)
+            self.record("goto", room, destination=room)
         if room is None:
             raise no_room(location)
         self.room = room
@@ -304,6 +304,8 @@ class SimulatedRobot:
             if not is_tried:
                 at = len(self.events)
                 self.events.append(event)
+            if row.is_drive:
+                event = self.events[at] = replace(event, destination=self.room)
             if event.options:
                 chosen = next(n for n, option in enumerate(event.options) if option.text == result)
                 self.events[at] = replace(event, answer=event.options[chosen].text)
@@ -326,10 +328,13 @@ class SimulatedRobot:
         *,
         found: bool | None = None,
         to: str | None = None,
+        destination: str | None = None,
     ) -> None:
         """Add an event that happens here and now; the text loses the spaces at its ends."""
-        held = self.held or ""
-        self.events.append(Event(kind, text.strip(), options, None, found, self.room, self.now, held, to))
+        given = text.strip(), options, None, found
+        self.events.append(
+            Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
+        )
 
     def repeat(self, events: Sequence[Event]) -> None:
         """Add events that happened here before, and happen again now."""

@@ -264,8 +264,8 @@ class SampledRobot(SimulatedRobot):
 
     def drive(self, location: str) -> None:
         """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
-        self.record("goto", location)
         room = self.room_map.room(location)
+        self.record("goto", location, destination=room)
         if room is None:
             raise no_room(location)
         self.room = room

@@ -171,7 +171,7 @@ def _strip(sample: Sample, check: Check) -> Strip:
     else:
         ending = "Done."
     world = shortened(supposed(sample.facts), MOST_WORLD)
-    shown = scenes(steps_of(sample.outcome.trace, check.room_map.room), check.room_map.start)
+    shown = scenes(steps_of(sample.outcome.trace, has_places=True), check.room_map.start)
     return Strip(world, shown, ending, error is None or sample.in_vain)
 
 

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 
 import polars as pl
 
-from codebotler.simulator.rules import resolve_room
 from roboeval.analysis.counts import completions_of, prompt_scores, task_scores
 from roboeval.analysis.metrics import Estimate, by_formula, mean_of
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import RowData
+from roboeval.evaluation.runs.traces import has_circumstances, trace_of
 from roboeval.suites.load import Suite
 
 REPORTS = "report-back"
@@ -41,21 +41,22 @@ def coming_back(results: Results) -> pl.DataFrame:
 
     A row for each kind of task that was judged, none where no task asks for a report: whether the task ends
     with `reports`, how many `completions` there are, their `pass@1`, how many `failed`, how many of these
-    left the room where they started and `never_returned`, and how many went to a room that does not exist
-    (`lost`).
+    left the room where they started and `never_returned` (null where an earlier version judged some of
+    them, and kept no places), and how many went to a room that does not exist (`lost`).
     """
     suite = results.known_suite
     reports = pl.col("task").is_in([name for name, task in suite.tasks.items() if REPORTS in task.abilities])
     table = results.table.with_columns(reports=reports)
     scores = prompt_scores(table).group_by(reports=reports)
     counts = scores.agg("pass@1", completions=pl.col("n").sum(), failed=(pl.col("n") - pl.col("c")).sum())
-    away = [key for key in results.failed if never_returned(results.failed_row(key), suite)]
-    gone = pl.DataFrame(away, schema={name: table.schema[name] for name in KEY}, orient="row")
+    away = [(*key, never_returned(results.failed_row(key))) for key in results.failed]
+    keys = {name: table.schema[name] for name in KEY}
+    gone = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
     found = (
         completions_of(table)
-        .join(gone.with_columns(away=True), on=KEY, how="left")
+        .join(gone, on=KEY, how="left")
         .group_by("reports")
-        .agg(never_returned=pl.col("away").sum(), lost=(pl.col("failure_kind") == LOST).sum())
+        .agg(never_returned=_number(pl.col("away")), lost=(pl.col("failure_kind") == LOST).sum())
         .join(counts.with_columns(_mean("pass@1")), on="reports")
         .select("reports", "completions", "failed", "never_returned", "lost", "pass@1")
         .sort("reports", descending=True)
@@ -67,19 +68,27 @@ def _mean(lists: str) -> pl.Expr:
     return pl.col(lists).map_elements(lambda values: mean_of([values]), return_dtype=pl.Float64)
 
 
-def never_returned(row: RowData, suite: Suite) -> bool:
-    """Whether, in the world that decided, the robot left its first room for good; False if nobody knows."""
-    task = suite.tasks.get(row["task"])
-    number = row["failure"]["world"]
-    scenarios = () if task is None else task.scenarios
-    if number >= len(scenarios) or "cut" in row["verdicts"][number]:
+def _number(condition: pl.Expr) -> pl.Expr:
+    """How often a condition holds for completions that failed; null where it is null for one of them."""
+    of_failed = condition.filter(pl.col("failure_class").is_not_null())
+    return pl.when(~of_failed.is_null().any()).then(of_failed.sum())
+
+
+def never_returned(row: RowData) -> bool | None:
+    """Whether, in the world that decided, the robot left its first room for good.
+
+    False if the trace was too long to be kept; None if an earlier version judged it, and kept no places.
+    """
+    verdict = row["verdicts"][row["failure"]["world"]]
+    if "cut" in verdict:
         return False
-    world = scenarios[number].world
-    rooms = [room.name for room in world.rooms]
-    drives = [text for kind, text, *_ in row["verdicts"][number]["trace"] if kind == "goto"]
-    visited = [goal for text in drives if (goal := resolve_room(rooms, text)) is not None]
-    left = next((at for at, goal in enumerate(visited) if goal != world.robot), None)
-    return left is not None and world.robot not in visited[left:]
+    if not has_circumstances(verdict):
+        return None
+    trace = trace_of(verdict)
+    start = trace[0].place if trace else ""
+    visited = [event.destination for event in trace if event.destination is not None]
+    left = next((at for at, room in enumerate(visited) if room != start), None)
+    return left is not None and start not in visited[left:]
 
 
 def spread(table: pl.DataFrame) -> pl.DataFrame:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import polars as pl
 
-from codebotler.core.trace import Trace, trace_from
 from codebotler.rtl import Formula, Inconclusive, holds, parse
 from roboeval.analysis.counts import completions_of
 from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.rows import key_of
+from roboeval.evaluation.runs.traces import can_judge, trace_of
 
 BATCH = 100  # rows that a process looks through at a time
 SMALL = 20  # batches for which other processes are not worth their start
@@ -37,7 +37,13 @@ class Found:
 
     key: Key
     worlds: tuple[tuple[int, str], ...]
-    undecided: tuple[tuple[int, str], ...] = ()  # whose trace was too long to be kept
+    cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be kept
+    earlier: tuple[tuple[int, str], ...] = ()  # undecided: an earlier version kept no places
+
+    @property
+    def undecided(self) -> tuple[tuple[int, str], ...]:
+        """The worlds in which nobody knows whether it does that."""
+        return tuple(sorted((*self.cut, *self.earlier)))
 
 
 class Search:
@@ -98,13 +104,15 @@ def look_through(lines: Sequence[bytes], question: Question) -> list[Found]:
 
 def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) -> Found:
     """Answer for one row."""
-    worlds, undecided = [], []
+    worlds, cut, earlier = [], [], []
     for number, verdict in _asked(row, question):
         if formula is not None and "cut" in verdict:
-            undecided.append((number, verdict["world"]))
-        elif formula is None or _holds(formula, verdict["trace"]) != question.negated:
+            cut.append((number, verdict["world"]))
+        elif formula is not None and not can_judge(formula, verdict):
+            earlier.append((number, verdict["world"]))
+        elif formula is None or _holds(formula, verdict) != question.negated:
             worlds.append((number, verdict["world"]))
-    return Found(key_of(row), tuple(worlds), tuple(undecided))
+    return Found(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
 
 
 def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Mapping[str, Any]]]:
@@ -116,17 +124,8 @@ def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Ma
             yield number, verdict
 
 
-def _holds(formula: Formula, data: Iterable[object]) -> bool:
+def _holds(formula: Formula, verdict: Mapping[str, Any]) -> bool:
     try:
-        return holds(formula, _driven(trace_from(data)))
+        return holds(formula, trace_of(verdict))
     except Inconclusive:
         return False
-
-
-def _driven(trace: Trace) -> Trace:
-    """The trace with each event where the last drive was to lead; before the first nobody knows."""
-    here, events = "", []
-    for event in trace:
-        events.append(replace(event, place=here))
-        here = event.text if event.kind == "goto" else here
-    return tuple(events)

@@ -70,8 +70,10 @@ def find(
     shown = together if json else together[:most]
     told = list(watched(clusters(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
-    if undecided:
-        note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")
+    if cut := sum(bool(one.cut) for one in every):
+        note(f"undecided, since their traces were too long to keep: {how_many(cut)}")
+    if earlier := sum(bool(one.earlier) for one in every):
+        note(f"undecided, since an earlier version kept no places: {how_many(earlier)}; evaluate with --redo")
     total, passed = looked_at(results.table, task), {*results.passed}
     if json:
         data = {

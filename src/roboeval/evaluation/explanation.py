@@ -5,27 +5,26 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import VIOLATION
 from codebotler.core.program import parsed
 from codebotler.core.terminal import shortened
-from codebotler.core.trace import Event, Trace, trace_from
+from codebotler.core.trace import Event, Trace
 from codebotler.core.words import counted
-from codebotler.core.world import World
 from codebotler.rtl import explain
-from codebotler.simulator.rules import resolve_room
 from roboeval.evaluation.remarks import remarks_on
 from roboeval.evaluation.runs.completions import KEY, Completion
+from roboeval.evaluation.runs.traces import can_judge, has_circumstances, trace_of
 from roboeval.suites.load import Scenario, Suite
 
 NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "this is the suite's text of the prompt:"
 GONE = "the judged program is no longer in this run"
 CHANGED = "the suite has changed since this was judged"
+EARLIER = "judged by an earlier version, which kept no places; evaluate again with --redo"
 CUT = "the trace was too long to keep, so this cannot be explained"
 TOO_LONG = "the traces of this program are too long to explain this as well"
 
@@ -44,7 +43,7 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
     if why["check"] is None:
         return {"passed": False, "failure": why, **told, "explanation": None, "step": None}
     scenario = _scenario(suite, row, why["world"], ablated=ablated)
-    explained = _explained(why["check"], scenario, _trace(verdict, scenario), Patience(), verdict.get("cut"))
+    explained = _explained(why["check"], scenario, verdict, trace_of(verdict), Patience())
     return {"passed": False, "failure": why, **told, **explained}
 
 
@@ -108,51 +107,35 @@ def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablat
     return next((s for s in (*scenarios[number : number + 1], *scenarios) if s.world.about == about), None)
 
 
-def _trace(verdict: Mapping[str, Any], scenario: Scenario | None) -> Trace:
-    trace = trace_from(verdict["trace"])
-    return trace if scenario is None else located(trace, scenario.world)
-
-
-def located(trace: Trace, world: World) -> Trace:
-    """The trace with the place of each event, found by driving through the world again."""
-    rooms = [room.name for room in world.rooms]
-    room_of = cache(partial(resolve_room, rooms))
-    here, events = world.robot, []
-    for event in trace:
-        events.append(replace(event, place=here))
-        if event.kind == "goto":
-            here = room_of(event.text) or here
-    return tuple(events)
-
-
 def _world_data(
     verdict: Mapping[str, Any], scenario: Scenario | None, patience: Patience, suite: Suite | None
 ) -> dict[str, Any]:
-    trace, cut = _trace(verdict, scenario), verdict.get("cut")
+    trace, cut = trace_of(verdict), verdict.get("cut")
     world, rules = None if scenario is None else scenario.world, None if suite is None else suite.rules
-    names = [] if scenario is None else [room.name for room in scenario.world.rooms]
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
-        "steps": steps_of(trace, None if scenario is None else cache(partial(resolve_room, names))),
+        "steps": steps_of(trace, has_places=has_circumstances(verdict)),
         **({} if cut is None else {"cut": cut}),
         "remarks": remarks_on(verdict, trace, world, rules),
         "failed_checks": [
-            {"check": check, **_explained(check, scenario, trace, patience, cut)}
+            {"check": check, **_explained(check, scenario, verdict, trace, patience)}
             for check in verdict["failed_checks"]
         ],
     }
 
 
 def _explained(
-    check: str, scenario: Scenario | None, trace: Trace, patience: Patience, cut: object
+    check: str, scenario: Scenario | None, verdict: Mapping[str, Any], trace: Trace, patience: Patience
 ) -> dict[str, Any]:
     """Why a check fails, and the number of the step, from 1, that makes it fail, if it is one."""
-    if cut is not None:
+    if "cut" in verdict:
         return {"explanation": CUT, "step": None}
     require = () if scenario is None else scenario.require
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
         return {"explanation": f"{CHANGED} and no longer requires this here", "step": None}
+    if not can_judge(requirement.formula, verdict):
+        return {"explanation": EARLIER, "step": None}
     if not patience.reaches_for(trace):
         return {"explanation": TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)

@@ -33,6 +33,7 @@ from roboeval.evaluation.engines import PYTHON, Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown
 from roboeval.evaluation.runs.rows import Row, bounded
+from roboeval.evaluation.runs.traces import circumstances
 from roboeval.suites.load import Requirement, Scenario, Suite
 
 LOG = logging.getLogger("roboeval.evaluation.judge")
@@ -259,6 +260,7 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
         **{name: value for name, value in outcome.items() if name != "trace"},
         "failed_checks": [requirement.text for requirement in verdict.failed],
         "trace": outcome["trace"],
+        **circumstances(verdict.outcome.trace),
     }
 
 

@@ -43,7 +43,7 @@ def coming_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     for run in runs:
         for reports, completions, failed, away, lost, passed in coming_back(run.results).iter_rows():
             tasks = WITH_REPORT if reports else "others"
-            shares = (away / failed, lost / failed) if failed else (None, None)
+            shares = [count / failed if failed and count is not None else None for count in (away, lost)]
             rows.append([run.name, tasks, completions, passed, failed, away, shares[0], lost, shares[1]])
     return sheet("coming-back", rows)
 
@@ -51,11 +51,15 @@ def coming_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 def coming_back_sentences(table: Sheet) -> list[str]:
     """Sentences about tasks that end with a report."""
     return [
-        f"Of {failed:,} failures of {name} in tasks that end with a report, {away:,} left and never came "
-        f"back, and {lost:,} went to a room that does not exist."
+        f"Of {failed:,} failures of {name} in tasks that end with a report, {_known(away)} left and never "
+        f"came back, and {lost:,} went to a room that does not exist."
         for name, tasks, _, _, failed, away, _, lost, _ in table.rows[:MOST_SENTENCES]
         if tasks == WITH_REPORT and failed
     ]
+
+
+def _known(count: Any) -> str:  # noqa: ANN401 - of a table's cell
+    return "an unknown number (an earlier version judged them)" if count is None else f"{count:,}"
 
 
 # --- phrasing

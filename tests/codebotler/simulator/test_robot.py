@@ -10,7 +10,6 @@ from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.robot import Result, SimulatedRobot, Thing
 from codebotler.simulator.rules import Matching, Rules, _pattern, choose, resolve_room
-from roboeval.evaluation.explanation import located
 
 Texts: TypeAlias = tuple[str, ...]
 
@@ -386,17 +385,19 @@ def test_number_among_the_options_is_matched_as_text() -> None:
 # --- the rest
 
 
-def test_places_of_a_trace_are_found_again_from_the_world() -> None:
+def test_events_say_where_they_happen_and_where_drives_lead() -> None:
     robot = robot_in("hall", "lab", "office")
     for request in ("the lab", "attic", "office"):
         try:
             robot.perform("go_to", [request])
         except RobotError:
             robot.perform("say", ["where?"])
-    world = World((Room("hall"), Room("lab"), Room("office")), "hall")
-    bare = tuple(Event(event.kind, event.text) for event in robot.trace)
-    assert [e.place for e in located(bare, world)] == ["hall", "lab", "lab", "lab"]
-    assert [e.place for e in located(bare, world)] == [e.place for e in robot.trace]
+    assert [(e.place, e.destination) for e in robot.trace] == [
+        ("hall", "lab"),
+        ("lab", None),
+        ("lab", None),
+        ("lab", "office"),
+    ]
 
 
 def test_rules_are_the_suites_own() -> None:

@@ -7,11 +7,13 @@ from typing import Any
 import polars as pl
 import pytest
 
+from codebotler.core.trace import Event, trace_data
 from codebotler.core.world import Room, World
-from made_results import VERDICT, results_of
+from made_results import VERDICT, as_driven, results_of
 from made_up_runs import SUITE, made_up
 from roboeval.analysis.breakdown import by_ability, coming_back, never_returned, phrasing, spread
 from roboeval.analysis.counts import prompt_scores
+from roboeval.evaluation.runs.traces import circumstances
 from roboeval.suites.load import Scenario
 
 WORLD = World((Room("start"), Room("kitchen")), "start", about="w")
@@ -33,9 +35,9 @@ def test_abilities_by_hand() -> None:
 
 
 def row(*drives: str, index: int = 0, kind: str = "SayAtLocation") -> dict[str, Any]:
-    trace = [["say", "hello"], *(["goto", place] for place in drives)]
+    trace = as_driven(WORLD, Event("say", "hello"), *(Event("goto", room) for room in drives))
     why = {"class": "TaskCompletionError", "kind": kind, "world": 0, "check": "c"}
-    verdict = {**VERDICT, "satisfied": False, "trace": trace}
+    verdict = {**VERDICT, "satisfied": False, "trace": trace_data(trace), **circumstances(trace)}
     named = {"task": "Visit", "prompt": 0, "index": index, "passed": False}
     return {**named, "failure": why, "verdicts": [verdict]}
 
@@ -53,11 +55,18 @@ def row(*drives: str, index: int = 0, kind: str = "SayAtLocation") -> dict[str, 
     ],
 )
 def test_who_never_returned(drives: Sequence[str], *, away: bool) -> None:
-    assert never_returned(row(*drives), ABLE) is away
+    assert never_returned(row(*drives)) is away
 
 
-def test_worlds_that_the_suite_has_no_more() -> None:
-    assert not never_returned(row("kitchen"), replace(ABLE, tasks={}))
+def test_nobody_knows_of_rows_of_an_earlier_version_who_never_returned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delitem(VERDICT, "places")  # with which rows are filled in
+    old = row("kitchen", index=1)
+    del old["verdicts"][0]["places"]
+    table = coming_back(results_of([old, row("kitchen", "start", index=2)], ABLE))
+    assert table["never_returned"].to_list() == [None]
+    assert table["failed"].to_list() == [2]
 
 
 def test_coming_back_by_hand() -> None:

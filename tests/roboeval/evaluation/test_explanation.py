@@ -16,7 +16,7 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Explanation, Formula, explain, parse
 from codebotler.simulator.rules import Rules
-from made_results import results_of, row_of
+from made_results import as_driven, results_of, row_of
 from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
@@ -62,7 +62,7 @@ SUITE = Suite("small", 1, "", Rules(), {"Visit": TASK}, "0")
 
 GOTO, HELLO = Event("goto", "office"), Event("say", "hello")
 FINE = Outcome(Status.FINISHED, (GOTO, HELLO))
-MUTE = Outcome(Status.FINISHED, (GOTO, Event("goto", "lab"), HELLO))
+MUTE = Outcome(Status.FINISHED, as_driven(WORLD, GOTO, Event("goto", "lab"), HELLO))
 
 
 def completion(index: int = 0, program: str = "x = 1\ny = 2\n", **fields: Any) -> Completion:  # noqa: ANN401 - any field
@@ -133,7 +133,8 @@ def test_a_prompt_is_shown_line_by_line() -> None:
 def test_a_completion_is_shown_world_by_world() -> None:
     written = completion(program="go_to('office')\nsay('hello')\n", instruction="Visit her.", model="m")
     answered = Event("ask", "lunch?", (Option("yes"), Option("5", is_text=False)), answer="yes")
-    trace = (
+    trace = as_driven(
+        WORLD,
         Event("check", "amy", found=False),
         GOTO,
         Event("check", "amy", found=True),
@@ -247,7 +248,8 @@ def test_of_a_prompt_it_is_said_what_is_gone_and_what_was_not_recorded() -> None
 
 def test_a_completion_as_data_holds_every_step() -> None:
     written = completion(model="m")
-    data = completion_data(row(written, Outcome(Status.FINISHED, (GOTO,) * 999)), written, SUITE)
+    trace = as_driven(WORLD, *[GOTO] * 999)
+    data = completion_data(row(written, Outcome(Status.FINISHED, trace)), written, SUITE)
     json.dumps(data)
     world = data["worlds"][0]
     assert len(world["steps"]) == 999
@@ -295,14 +297,15 @@ def test_a_world_that_the_suite_has_no_more_still_shows_its_trace() -> None:
     renamed = replace(TASK, scenarios=(Scenario(replace(WORLD, about="amy is out"), (VISITS, GREETS)),))
     for suite in (replace(SUITE, tasks={}), replace(SUITE, tasks={"Visit": renamed})):
         text = printed(completion_view(row(completion(), MUTE), completion(), suite), 160)
-        assert '1  → "office"\n2  → "lab"\n3      said "hello"\n' in text
+        assert '1  start → office\n2  office → lab\n3      said "hello"\n' in text
 
 
 # --- long traces and texts
 
 
 def test_a_long_trace_is_shortened_in_its_middle() -> None:
-    trace = (GOTO, *[Event("check", "amy", found=False), Event("say", "hm")] * 499, Event("goto", "start"))
+    waits = [Event("check", "amy", found=False), Event("say", "hm")] * 499
+    trace = as_driven(WORLD, GOTO, *waits, Event("goto", "start"))
     text = printed(completion_view(row(completion(), Outcome(Status.FINISHED, trace)), completion(), SUITE))
     assert "     ... 982 more, repeating steps 11 to 12 ...\n" in text
     assert "\n1000  office → start\n" in text

@@ -108,8 +108,7 @@ def read_results(
 def without_other_traces(row: JudgedRow, world: int) -> bytes:
     """A row as JSON, with the trace of one world only: a run may fail often, with long traces."""
     verdicts = [
-        verdict if number == world else msgspec.structs.replace(verdict, trace=())
-        for number, verdict in enumerate(row.verdicts)
+        verdict if number == world else verdict.without_trace() for number, verdict in enumerate(row.verdicts)
     ]
     return msgspec.json.encode(msgspec.structs.replace(row, verdicts=tuple(verdicts)))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
+from roboeval.evaluation.runs.traces import CIRCUMSTANCES, first_events
 
 MOST = 1_000_000  # bytes of a row
 MOST_OF_WORLD = 20_000  # bytes for each world, where there are so many worlds that they come to more
@@ -37,8 +39,9 @@ class Judgement(TypedDict):
         passed: whether the program does what is required in all worlds.
         failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
         verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
-            `line`, `failed_checks` and `trace`; where the trace is too long for a row, it ends early, and
-            `cut` says how many `events` more there are, and the `sha256` of the JSON of all of it.
+            `line`, `failed_checks` and `trace`, with the `circumstances` of its events; where the trace is
+            too long for a row, it ends early, and `cut` says how many `events` more there are, and the
+            `sha256` of the JSON of all of it.
     """
 
     passed: bool
@@ -107,8 +110,15 @@ class CutTrace(_Part, frozen=True):
     sha256: str
 
 
+Numbered: TypeAlias = tuple[tuple[int, str], ...]  # by the numbers of events
+PerhapsNumbered: TypeAlias = tuple[tuple[int, str | None], ...]
+
+
 class WorldVerdict(_Part, frozen=True):
-    """What a row says of one world; `trace` holds one JSON list an event."""
+    """What a row says of one world; `trace` holds one JSON list an event.
+
+    What follows are the circumstances of the events; rows of earlier versions have no `places`.
+    """
 
     world: str
     satisfied: bool
@@ -117,12 +127,20 @@ class WorldVerdict(_Part, frozen=True):
     line: int | None
     failed_checks: tuple[str, ...]
     trace: tuple[msgspec.Raw, ...]
+    places: Numbered | msgspec.UnsetType = msgspec.UNSET
+    holding: Numbered | msgspec.UnsetType = msgspec.UNSET
+    to: PerhapsNumbered | msgspec.UnsetType = msgspec.UNSET
+    destinations: PerhapsNumbered | msgspec.UnsetType = msgspec.UNSET
     cut: CutTrace | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def events(self) -> int:
         """How many events the trace had when it was judged."""
         return len(self.trace) + (0 if self.cut is msgspec.UNSET else self.cut.events)
+
+    def without_trace(self) -> WorldVerdict:
+        """The same with no events."""
+        return msgspec.structs.replace(self, trace=(), **dict.fromkeys(CIRCUMSTANCES, msgspec.UNSET))
 
 
 class JudgedRow(_Part, frozen=True):
@@ -272,20 +290,33 @@ def bounded(judgement: Judgement) -> bytes:
     if not verdicts or len(whole) < most:
         return whole
     longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH} for verdict in verdicts)
-    bare = [{**verdict, "trace": [], "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)]
+    bare = [
+        {**first_events(verdict, 0), "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)
+    ]
     share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
     return _json({**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]})
 
 
 def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
     trace = verdict["trace"]
+    beside = _sizes_beside(verdict)
     size = 0
     for kept, event in enumerate(trace):
-        size += len(_json(event)) + BETWEEN
+        size += len(_json(event)) + BETWEEN + beside[kept + 1]
         if size > share:
             whole = hashlib.sha256(_json(trace)).hexdigest()
-            return {**verdict, "trace": trace[:kept], "cut": {"events": len(trace) - kept, "sha256": whole}}
+            cut = {"events": len(trace) - kept, "sha256": whole}
+            return {**first_events(verdict, kept), "cut": cut}
     return verdict
+
+
+def _sizes_beside(verdict: Mapping[str, Any]) -> Counter[int]:
+    """How many bytes the circumstances of each event take, with the place where it led."""
+    sizes: Counter[int] = Counter()
+    for name in CIRCUMSTANCES:
+        for entry in verdict.get(name, ()):
+            sizes[max(1, entry[0] - (name == "places"))] += len(_json(entry)) + BETWEEN
+    return sizes
 
 
 def _json(data: object) -> bytes:

@@ -88,6 +88,8 @@ def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, pape
         "line": 1,
         "failed_checks": [],
         "trace": [["goto", "nowhere"]],
+        "places": [[1, "start_loc"]],
+        "destinations": [[1, None]],
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import MOST, MOST_OF_WORLD, Row
+from roboeval.evaluation.runs.traces import CIRCUMSTANCES, trace_of
 from roboeval.suites.load import Suite, load_suite
 
 WORLD = World(rooms=(Room("start"),), robot="start", about="nobody is in")
@@ -48,6 +50,25 @@ def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
         assert verdict["trace"][0] == ["goto", "start"]
         assert (verdict["error"]["message"], verdict["line"]) == ("\x00" * 1_000, 1)
     assert to_line(row([LOUD[:20]] * worlds, "\x00" * 1_000)) == line
+
+
+def test_circumstances_are_bounded_with_their_events() -> None:
+    rooms = [f"room {n} " + "x" * 300 for n in range(1_000)]
+    drives = [
+        Event("goto", "x", place=here, holding="y" * (n % 2), to=f"{n} " + "z" * 900, destination=there)
+        for n, (here, there) in enumerate(pairwise(rooms))
+    ]
+    one = row([tuple(drives), LOUD])
+    assert 0.5 * MOST < len(to_line(one)) <= MOST
+    first, second = one["verdicts"]
+    kept = trace_of(first)
+    assert 0 < len(kept) < len(drives)
+    assert first["cut"]["events"] == len(drives) - len(kept)
+    assert [(e.place, e.holding, e.to, e.destination) for e in kept] == [
+        (e.place, e.holding, e.to, e.destination) for e in drives[: len(kept)]
+    ]
+    assert max(number for name in CIRCUMSTANCES[1:] for number, _ in first.get(name, [(0, "")])) <= len(kept)
+    assert trace_of(second)[1].place == ""
 
 
 def test_what_fits_stays_whole() -> None:
