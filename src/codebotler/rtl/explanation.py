@@ -19,7 +19,7 @@ from codebotler.rtl.semantics import (
     narrowed,
     scoped,
 )
-from codebotler.rtl.wording import deed, few, happening, is_any, room, verb
+from codebotler.rtl.wording import deed, few, happening, inside, is_any, is_plain, room, verb
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,25 @@ def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
     clause = _failing_part(formula, trace)
     deciding = _deciding(clause, trace, is_true=False)
     facts = [_fact(test, trace, is_true=is_true) for test, is_true in deciding]
-    if len(facts) == 1:
-        text = f"{facts[0].text}{facts[0].ending}{facts[0].detail}"
-    else:
-        both = "both" if len(facts) == 2 else "all"  # noqa: PLR2004 - that is what both means
-        text = f"{', and it '.join(fact.text for fact in facts)}; these must not {both} be so"
     event = max((fact.event for fact in facts if fact.event is not None), default=None)
+    text = _together([*{fact.text: fact for fact in facts}.values()])
     return Explanation(clause, event, " ".join(f"the robot {text}".split()))
+
+
+def _together(facts: Sequence[_Fact]) -> str:
+    """Facts that are wrong together; the words `the robot` stand before them."""
+    if len(facts) == 1:
+        return f"{facts[0].text}{facts[0].ending}{facts[0].detail}"
+    missing = [fact for fact in facts if fact.is_missing]
+    done = [fact for fact in facts if not fact.is_missing]
+    did = ", and it ".join(
+        f"{fact.short or fact.text}{fact.detail and f' ({fact.detail[2:]})'}" for fact in done
+    )
+    if not done:
+        return f"{', and it '.join(fact.text for fact in missing)}; it had to do at least one of these"
+    if missing:
+        return f"{did}, although it {' and it '.join(fact.short or fact.text for fact in missing)}"
+    return f"{did}; it must not do {'both' if len(done) == 2 else 'all'} of these"  # noqa: PLR2004 - a pair
 
 
 def _failing_part(formula: formulas.Formula, trace: Trace) -> formulas.Formula:
@@ -111,6 +123,7 @@ def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     return None
 
 
+_MOST_QUOTED = 3  # of what the robot did instead
 _AtPlace = formulas.ActAtFirst | formulas.ActAtSome
 
 
@@ -121,6 +134,8 @@ class _Fact(NamedTuple):
     text: str
     ending: str = ""  # what was required instead, unless other facts follow
     detail: str = ""  # what came nearest
+    is_missing: bool = False  # whether it is that the robot did not do something
+    short: str = ""  # the text without what other facts tell already
 
 
 def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
@@ -131,33 +146,42 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
             return _fact(formulas.Exists(element, test.scopes), trace, is_true=is_true)
         case formulas.Count() | formulas.AtLeast():
             return _number(test, trace, is_true=is_true)
-    return _presence(test, trace) if is_true else _absence(test, trace)
+    return _presence(test, trace) if is_true else _absence(test, trace)._replace(is_missing=True)
 
 
 def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
-    element, here = test.element, _positions(test, trace)
-    at = next(at for at in here if matches(element, trace, at))
+    at = next(at for at in _positions(test, trace) if matches(test.element, trace, at))
+    element = replace(test.element, place=None)
     done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
-    place = f" in {room(test.arrival.text)}" if isinstance(test, _AtPlace) else ""
-    last = " last," if isinstance(test, formulas.Last) else ""
-    text = f"{did}{place}{last} at step {at + 1}{_where(test.scopes, trace)}"
-    return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}")
+    place = "" if test.element.place is None else f" {inside(room(formulas.Regex(test.element.place)))}"
+    stay = f" {inside(room(test.arrival.text))}" if isinstance(test, _AtPlace) else ""
+    step = f"{place}{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
+    where = _where(test.scopes, trace, is_true=True)
+    if is_plain(element):
+        return _Fact(at, f"{done}{step}{where}", ", which it must not do", short=f"{done}{step}")
+    text, short = deed(element, "past", when=step, where=where), deed(element, "past", when=step)
+    return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}", short=short)
 
 
 def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
-    element, where = test.element, _where(test.scopes, trace)
+    element, where = test.element, _where(test.scopes, trace, is_true=False)
     here = [*_positions(test, trace)]
+    if (missing := _missing_bound(test.scopes, trace)) is not None:
+        text = f"never {deed(missing.element, 'past', negated=True)}"
+        when = "before" if missing.is_before else "after"
+        return _Fact(None, text, f", {when} which it was to {deed(element, 'base')}")
     if isinstance(test, formulas.Exists):
         event, detail = _instead(element, trace, here)
-        return _Fact(event, f"never {deed(element, 'past', negated=True)}{where}", detail=detail)
+        return _Fact(event, f"never {deed(element, 'past', negated=True, where=where)}", detail=detail)
     if isinstance(test, formulas.Last):
         return _not_last(element, where, trace, here)
     span = scoped(test.scopes, trace)
     arrivals = [at for at in span if matches(test.arrival, trace, at)]
     if not arrivals:
         _, detail = _instead(test.arrival, trace, span)
-        text = f"never {deed(test.arrival, 'past', negated=True)}{where}"
-        return _Fact(None, text, f", where it was to {deed(element, 'base')}", detail)
+        never = f"never {deed(test.arrival, 'past', negated=True)}"
+        ending = f", where it was to {deed(element, 'base')}{where and ','}{where}"
+        return _Fact(None, never, ending, detail)
     first = isinstance(test, formulas.ActAtFirst)
     there = "during that stay" if first and len(arrivals) > 1 else "there"
     event, detail = _instead(element, trace, here)
@@ -167,13 +191,15 @@ def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
         detail = f": it only {only}" if only else ": it did nothing there"
     visits = arrivals[:1] if first else arrivals
     rooms = dict.fromkeys(happening(trace[at], test.arrival) for at in visits)
-    failed = f"did not {deed(element, 'base', negated=True)} {there}{where}"
+    failed = f"did not {deed(element, 'base', negated=True, when=f' {there}', where=where)}"
+    stay = f" {inside(room(test.arrival.text))}"
+    short = f"did not {deed(element, 'base', negated=True, when=stay, where=where)}"
     text = f"went to {listed(few([*rooms]))} at {_steps(visits)} but {failed}"
-    return _Fact(arrivals[0] if event is None else event, text, detail=detail)
+    return _Fact(arrivals[0] if event is None else event, text, detail=detail, short=short)
 
 
 def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Sequence[int]) -> _Fact:
-    text = f"did not {deed(element, 'base', negated=True)} last{where}"
+    text = f"did not {deed(element, 'base', negated=True, when=' last', where=where)}"
     if not here:
         return _Fact(None, text, detail=": it did nothing")
     (at,) = here
@@ -182,26 +208,37 @@ def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Se
     return _Fact(at, text, detail=f": it last {verb(kind).past} {happening(event, wanted)} (step {at + 1})")
 
 
+def _missing_bound(scopes: tuple[formulas.Scope, ...], trace: Trace) -> formulas.Scope | None:
+    """The first scope that leaves nothing of a trace, since what bounds it never happened."""
+    span = range(len(trace))
+    for scope in scopes:
+        at = bound(scope, trace, span)
+        if at is None and scope.is_only:
+            return scope
+        span = narrowed(scope, at, span)
+    return None
+
+
 def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
-    where, number, exactly = _where(test.scopes, trace), test.number, isinstance(test, formulas.Count)
+    where, number = _where(test.scopes, trace, is_true=is_true), test.number
+    exactly, is_missing = isinstance(test, formulas.Count), not is_true
     span = scoped(test.scopes, trace)
     found = [at for at in span if _is_match(test.element, trace, at)]
     if found:
-        text = f"{deed(test.element, 'past')} {times(len(found))} ({_steps(found)}){where}"
+        text = deed(test.element, "past", when=f" {times(len(found))} ({_steps(found)})", where=where)
     else:
-        text = f"never {deed(test.element, 'past', negated=True)}{where}"
+        text = f"never {deed(test.element, 'past', negated=True, where=where)}"
     if is_true:
         limit = (
-            f"must not do so exactly {times(number)}"
-            if exactly
-            else f"must do so fewer than {number:,} times"
+            f"must not do so exactly {times(number)}" if exactly else f"may do so {times(number - 1)} at most"
         )
         return _Fact(found[-1] if found else None, text, f", but {limit}")
     if not found:
         _, detail = _instead(test.element, trace, span)
-        return _Fact(None, text, f", but should have {'' if exactly else 'at least '}{times(number)}", detail)
+        ending = f", but should have {'' if exactly else 'at least '}{times(number)}"
+        return _Fact(None, text, ending, detail, is_missing)
     ending = f" instead of {'' if exactly else 'at least '}{times(number)}"
-    return _Fact(found[number] if len(found) > number else None, text, ending)
+    return _Fact(found[number] if len(found) > number else None, text, ending, is_missing=is_missing)
 
 
 def _positions(test: formulas.Presence, trace: Trace) -> Iterable[int]:
@@ -217,19 +254,24 @@ def _positions(test: formulas.Presence, trace: Trace) -> Iterable[int]:
     return first_stay(test, trace, span) or ()
 
 
-def _where(scopes: tuple[formulas.Scope, ...], trace: Trace) -> str:
-    """Scopes in English, such as ` after going to the lobby (step 1)`."""
-    span, parts = range(len(trace)), []
+def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -> str:
+    """The scopes that bound what is left of a trace, such as ` after going to the lobby (step 1)`.
+
+    Where something is missing, the reader also needs to know after what it was to happen.
+    """
+    span, ends = range(len(trace)), {"after": "", "before": ""}
     for scope in scopes:
         at = bound(scope, trace, span)
         when = "before" if scope.is_before else "after"
-        if at is None:
-            done = f"{deed(scope.element, 'ing')} (which never happened)"
-        else:
-            done = f"{verb(scope.element.kind).ing} {happening(trace[at], scope.element)} (step {at + 1})"
-        parts.append(f" {when} {done}")
+        if at is not None:
+            bare = replace(scope.element, place=None, options=None, mention=False)
+            ends[when] = f"{verb(bare.kind).ing} {happening(trace[at], bare)} (step {at + 1})"
+        elif not is_true and not scope.is_before:
+            ends[when] = f"{deed(scope.element, 'ing')} (which never happened)"
         span = narrowed(scope, at, span)
-    return " and".join(parts)
+    if all(ends.values()):
+        return f" between {ends['after']} and {ends['before']}"
+    return "".join(f" {when} {end}" for when, end in ends.items() if end)
 
 
 def _instead(element: formulas.EventPattern, trace: Trace, here: Sequence[int]) -> tuple[int | None, str]:
@@ -244,9 +286,8 @@ def _instead(element: formulas.EventPattern, trace: Trace, here: Sequence[int]) 
     if element.kind == "goto":
         rooms = dict.fromkeys(happening(trace[at], element) for at in alike)
         return None, f"{only} {listed(few([*rooms]))}"
-    return alike[
-        0
-    ], f"{only} {listed(few([f'{happening(trace[at], element)} (step {at + 1})' for at in alike]))}"
+    shown = [f"{happening(trace[at], element)} (step {at + 1})" for at in alike]
+    return alike[0], f"{only} {listed(few(shown, _MOST_QUOTED))}"
 
 
 def _is_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:

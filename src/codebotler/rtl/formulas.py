@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import UnionType
 from typing import Literal, TypeAlias
 
@@ -111,6 +111,8 @@ class EventPattern:
         to: what the person must match whom a question was for; None if that does not matter.
         more: what the further arguments of a skill that has several must match, in order.
         has_text: whether such events have a text: False if their skill has no arguments.
+        means: what its texts come to, after the verb in a sentence, such as `that nobody is coming`; None
+            where the texts are plain enough.
     """
 
     kind: str
@@ -124,6 +126,7 @@ class EventPattern:
     to: Text | None = None
     more: tuple[Text, ...] = ()
     has_text: bool = True
+    means: str | None = field(default=None, compare=False)
 
     @cached_property
     def place_regex(self) -> re.Pattern[str] | None:

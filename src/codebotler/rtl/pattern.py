@@ -1,13 +1,25 @@
-"""The regexes in formulas: compiled, and printed back."""
+"""The regexes in formulas: compiled, parsed, and printed back."""
 
 from __future__ import annotations
 
 import re
+from importlib import import_module
+from typing import Any
+
+Tree = Any
+"""A parsed regex or a part of one: pairs of an operation and its arguments, of private classes of `re`."""
+
+FLAGS = re.IGNORECASE | re.DOTALL
 
 
 def compile_regex(pattern: str) -> re.Pattern[str]:
     """A regex as RTL reads it: case is ignored, and `.` matches line breaks as well."""
-    return re.compile(pattern, re.IGNORECASE | re.DOTALL)
+    return re.compile(pattern, FLAGS)
+
+
+def parse_tree(pattern: str) -> Tree:
+    """The tree of a regex, as Python parses it."""
+    return import_module("re._parser").parse(pattern, FLAGS)
 
 
 def whole_word(pattern: str) -> re.Pattern[str]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
+from types import MappingProxyType
 from typing import get_args
 
 from codebotler.core.program import parse_expression
@@ -20,10 +21,13 @@ from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 SCOPES: dict[str, formulas.ScopeName] = {name: name for name in get_args(formulas.ScopeName)}
 TESTS = ("Exists", "Last", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
 TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
-QUESTIONS = ("mention", "answered")
+ANSWERED = "answered"
+QUESTIONS = ("mention", ANSWERED)
 LOOKS = {"found": True, "missed": False}
 SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
 AROUND = ("at", "holding", "to", "returned")  # what else an event must be like
+
+NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
 DEEPEST = 50
 """How deep a formula may be nested; few enough for Python's stack wherever it is evaluated."""
@@ -48,21 +52,26 @@ class RtlSyntaxError(ValueError):
         return type(self), (self.column, self.problem), vars(self)
 
 
-def parse(text: str, *, skills: SkillTable = SKILLS) -> formulas.Formula:
+def parse(
+    text: str, *, skills: SkillTable = SKILLS, means: Mapping[str, str] = NO_MEANINGS
+) -> formulas.Formula:
     """The formula that a text writes.
 
     Args:
         text: the formula; a line break counts as a space.
         skills: the skills whose events formulas are about.
+        means: for explanations, what the texts of the elements of a kind come to, such as `that nobody is
+            coming` for `say`; of questions that were answered, by `answered`.
 
     Raises:
         RtlSyntaxError: the text is no formula.
     """
-    return _Parser(text, skills).formula()
+    return _Parser(text, skills, means).formula()
 
 
 class _Parser:
-    def __init__(self, text: str, skills: SkillTable) -> None:
+    def __init__(self, text: str, skills: SkillTable, means: Mapping[str, str]) -> None:
+        self.means = means
         self.indent = len(text) - len(text.lstrip())
         self.text = re.sub(r"[\r\n\f]", " ", text).strip()
         self.bytes = self.text.encode(errors="replace")  # in which `ast` counts columns
@@ -146,6 +155,11 @@ class _Parser:
                     raise self.expected("tr or a scope such as tr.AfterFirst(...)", node)
 
     def element(self, node: ast.expr) -> formulas.EventPattern:
+        element = self.bare_element(node)
+        key = element.kind if element.answer is None else ANSWERED
+        return replace(element, means=self.means.get(key))
+
+    def bare_element(self, node: ast.expr) -> formulas.EventPattern:
         match node:
             case ast.Call(ast.Name(name)) if name in AROUND:
                 return self.around(name, *self.arguments(node, node, name, 2))

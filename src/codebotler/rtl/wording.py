@@ -13,6 +13,7 @@ from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
 from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
+from codebotler.rtl.regex_words import ANYTHING, choices, one_of
 from codebotler.rtl.text.claims import Claim, Number, Time
 
 Form: TypeAlias = Literal["base", "past", "ing"]
@@ -21,51 +22,93 @@ _LOOKS: Mapping[bool, Mapping[Form, str]] = {
     True: {"base": "find", "past": "found", "ing": "finding"},
     False: {"base": "look in vain for", "past": "looked in vain for", "ing": "looking in vain for"},
 }
+_MENTIONS: Mapping[Form, str] = {"base": "mention", "past": "mentioned", "ing": "mentioning"}
+_OFFERS: Mapping[Form, str] = {"base": "offer", "past": "offered", "ing": "offering"}
+_ANSWERS: Mapping[Form, str] = {"base": "get", "past": "got", "ing": "getting"}
+_CLAUSES = ("that ", "to ", "whether ", "what ", "in one ")
 _MOST_LISTED = 5
-_TEXT = r"[\w ',;:!%@&/-]+"
-_ALTERNATIVES = re.compile(rf"{_TEXT}(?:\|{_TEXT})*")
-_EXACT = re.compile(r"\^([\w -]+(?:\\?\.\d+)?)\$")
-_PLAIN = re.compile(rf"{_ALTERNATIVES.pattern}|{_EXACT.pattern}")
-_WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
+_UNCLEAR = "that fits the requirement"  # in the place of a regex that has no certain words
 
 
-def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
-    """What an element asks for, such as `said something with "hello"`; `anything` after a negation."""
+def deed(element: EventPattern, form: Form, *, negated: bool = False, when: str = "", where: str = "") -> str:
+    """What an element asks for, such as `said something with "hello"`; `anything` after a negation.
+
+    Args:
+        element: what an event must match.
+        form: of the verb.
+        negated: whether a negation stands before it.
+        when: what follows, with a space at its start; it stands before a clause such as `that nobody is in`.
+        where: what follows after that, such as ` after going to the lobby (step 1)`.
+    """
     thing = "anything" if negated else "something"
+    is_open = is_any(element.text) and is_any(element.options)
+    means = None if is_open and element.answer is None else element.means
+    if element.place is not None:
+        when = f" {inside(room(Regex(element.place)))}{when}"
+    if means is not None and means.startswith(_CLAUSES):
+        return f"{getattr(verb(element.kind), form)}{when}{where and f',{where},'} {means}"
+    if means is not None and negated:
+        means = re.sub("^something", "anything", means)
     if element.found is not None and element.kind == "check":
-        done = f"{_LOOKS[element.found][form]} {_wanted(element, thing)}"
+        done = f"{_LOOKS[element.found][form]} {means or _wanted(element, thing)}"
     elif element.answer is not None:
-        got = {"base": "get", "past": "got", "ing": "getting"}[form]
-        done = f"{got} an answer {described(element.answer)}"
+        answer = (
+            f"the answer {named}" if (named := _named(element.answer)) else _like(element.answer, "an answer")
+        )
+        done = f"{_ANSWERS[form]} {means or answer}"
+    elif means is not None:
+        done = f"{getattr(verb(element.kind), form)} {means}"
+    elif element.mention and not is_open:
+        done = f"{_MENTIONS[form]} {_named(element.text) or _like(element.text, thing)} in a question"
+    elif element.options is not None and is_any(element.text) and not is_open:
+        return f"{_OFFERS[form]} an option {described(element.options)}{when}{where}"
     elif verb(element.kind).object:
         told = verb(element.kind)
         wanted = [_part(text, thing) for text in (element.text, *element.more)]
         done = told.with_object(getattr(told, form), [*wanted, *[thing] * told.object.count("{")], "")
     else:
         done = f"{getattr(verb(element.kind), form)} {_wanted(element, thing)}"
-    if element.mention:
-        done += " in the question or an option"
-    if element.options is not None and not is_any(element.options):
-        done += f" offering an option {described(element.options)}"
+    return f"{done.rstrip()}{_further(element, means)}{when}{where}"
+
+
+def _further(element: EventPattern, means: str | None) -> str:
+    """What else an event must be like, apart from its text."""
+    more = ""
+    if element.options is not None and means is None and not is_any(element.options):
+        more += f" offering an option {described(element.options)}"
     if element.more and not verb(element.kind).object:
-        done = f"{done.rstrip()}, {listed([*filter(None, map(described, element.more))])}".rstrip(", ")
+        more += f", {listed([*filter(None, map(described, element.more))])}".rstrip(", ")
     if element.found is not None and element.kind != "check":
-        done = f'{done.rstrip()} with the result "{verb(element.kind).results[element.found]}"'
+        more += f' with the result "{verb(element.kind).results[element.found]}"'
     if element.to is not None:
-        done = f"{done.rstrip()} of somebody {described(element.to)}"
+        more += f" of somebody {described(element.to)}".rstrip()
     if element.holding is not None:
-        done = f"{done.rstrip()} while holding something {described(element.holding)}"
-    return done.rstrip() if element.place is None else f"{done.rstrip()} in {room(Regex(element.place))}"
+        more += f" while holding something {described(element.holding)}".rstrip()
+    return more
+
+
+def is_plain(element: EventPattern) -> bool:
+    """Whether what an event was says all that matters about it, so that no other words are needed."""
+    if element.is_about_more or not isinstance(element.text, Regex):
+        return False
+    return (is_any(element.text) and is_any(element.options)) or not is_spoken(element.kind)
+
+
+def is_clear(element: EventPattern) -> bool:
+    """Whether all that an element asks for can be said in words."""
+    texts = [element.text, element.options, element.answer, element.holding, element.to, *element.more]
+    needed = texts[3:] if element.means is not None else texts
+    if element.place is not None:
+        needed.append(Regex(element.place))
+    return all(text is None or _UNCLEAR not in _qualities(text) for text in needed)
 
 
 def _part(text: Text, thing: str) -> str:
     """One of the things that a verb is done to, among other words."""
-    match text:
-        case Regex(pattern) if exact := _EXACT.fullmatch(pattern):
-            return exact[1]
-        case Regex(pattern) if _ALTERNATIVES.fullmatch(pattern):
-            return named(pattern)
-    return f"{thing} {described(text)}".rstrip()
+    named = _named(text)
+    if isinstance(text, Regex) and named and text.pattern.startswith("^"):
+        return named.strip('"')
+    return named or _like(text, thing)
 
 
 def _wanted(element: EventPattern, thing: str) -> str:
@@ -73,10 +116,24 @@ def _wanted(element: EventPattern, thing: str) -> str:
         return ""
     if element.kind == "goto":
         return room(element.text, "any" if thing == "anything" else "a")
-    match element.text:
-        case Regex(pattern) if not is_spoken(element.kind) and _PLAIN.fullmatch(pattern):
-            return named(pattern)
-    return f"{thing} {described(element.text)}".rstrip()
+    named = "" if is_spoken(element.kind) else _named(element.text)
+    return named or _like(element.text, thing)
+
+
+def _like(text: Text, thing: str) -> str:
+    """Something that is like a text, such as `something with "hello"`, or a number or time itself."""
+    if isinstance(text, Number | Time):
+        return described(text).removeprefix("with ")
+    return f"{thing} {described(text)}".rstrip()
+
+
+def _named(text: Text) -> str:
+    """The plain texts that a regex finds, in quotes; empty if it finds any, or has no certain words."""
+    return _words_of(text.pattern) if isinstance(text, Regex) and not is_any(text) else ""
+
+
+def _words_of(pattern: str) -> str:
+    return one_of(choices(pattern) or ())
 
 
 def happening(event: Event, element: EventPattern) -> str:
@@ -104,7 +161,7 @@ def happening(event: Event, element: EventPattern) -> str:
         thing += f" of {quoted(event.to or '')}"
     if element.holding is not None:
         thing += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
-    return thing if element.place is None else f"{thing} in {room_name(event.place)}"
+    return f"{thing} {inside(room_name(event.place))}" if element.place is not None and event.place else thing
 
 
 def event_words(event: Event) -> str:
@@ -147,26 +204,28 @@ def is_spoken(kind: str) -> bool:
 
 
 def room(text: Text, article: str = "a") -> str:
-    """The room that a text names, such as `the lobby`, `bob's office` or `a room with /[12]/`."""
+    """The room that a text names, such as `the lobby`, `bob's office` or `a room other than the lobby`."""
     match text:
-        case Regex(pattern) if _ALTERNATIVES.fullmatch(pattern):
-            return listed(few([room_name(name) for name in pattern.split("|")]), "or")
+        case Regex(pattern) | Without(pattern) if names := choices(pattern):
+            rooms = listed(few([*map(room_name, names)]), "or")
+            return rooms if isinstance(text, Regex) else f"{article} room other than {rooms}"
     return f"{article} room {described(text)}".rstrip()
 
 
 def room_name(name: str) -> str:
     """The name of a room, with an article if it is a common noun."""
-    short = brief(name)
-    return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else short or '""'
+    short = words.room_name(brief(name))
+    return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", short) else short or '""'
+
+
+def inside(place: str) -> str:
+    """Where something happens: `in the lobby`, but `at the start`."""
+    return f"{'at' if place.startswith('the start') else 'in'} {place}"
 
 
 def described(text: Text) -> str:
-    """What a text must be like, such as `with "5 or five" and "lobby"`; empty if any text matches."""
-    found = [*_qualities(text)]
-    parts = (
-        (head, [q.removeprefix(head) for q in found if q.startswith(head)]) for head in ("with ", "without ")
-    )
-    return listed([head + listed(few(same)) for head, same in parts if same])
+    """What a text must be like, such as `with "5" or "five" and without "no"`; empty if any text matches."""
+    return listed(few([*dict.fromkeys(_qualities(text))]))
 
 
 def _qualities(text: Text) -> Iterator[str]:
@@ -175,37 +234,34 @@ def _qualities(text: Text) -> Iterator[str]:
             yield from chain.from_iterable(map(_qualities, parts))
         case Regex(pattern):
             if not is_any(text):
-                yield f"with {named(pattern)}"
+                yield f"with {named}" if (named := _words_of(pattern)) else _UNCLEAR
         case Without(pattern):
-            yield f"without the word {named(pattern)}"
+            yield f"without {named}" if (named := _words_of(pattern)) else _UNCLEAR
         case Number(number, thing, _, other):
-            yield f"with {'a number other than' if other else 'the number'} {number} for {named(thing)}"
+            things = choices(thing)
+            of = f' for "{brief(things[0])}"' if things else ""
+            yield f"with {'a number other than' if other else 'the number'} {number}{of}"
+        case Time(start, end, other) if start == end:
+            yield f"with {'a time other than' if other else 'the time'} {start}"
+        case Time("0:00", "24:00", False):
+            yield "with a time of day"
         case Time(start, end, other):
             yield f"with a time {'outside' if other else 'from'} {start} to {end}"
         case Claim(pattern, denied):
-            yield f"with {'a denial' if denied else 'an affirmation'} of {named(pattern)}"
+            does = "denies" if denied else "affirms"
+            named = "something" if is_any(Regex(pattern)) else _words_of(pattern)
+            yield f"that {does} {named}" if named else _UNCLEAR
 
 
 def is_any(text: Text | None) -> bool:
     """Whether a text is written to match every string, or there is none."""
-    return text is None or (isinstance(text, Regex) and text.pattern in {"", ".*", "^.*$"})
+    return text is None or (isinstance(text, Regex) and text.pattern in ANYTHING)
 
 
-def named(pattern: str) -> str:
-    """A regex as the plain texts it chooses between, or as it is."""
-    if exact := _EXACT.fullmatch(pattern):
-        return f'"{exact[1]}"'
-    if _ALTERNATIVES.fullmatch(pattern):
-        return f'"{brief(listed(pattern.split("|"), "or"))}"'
-    if whole := _WHOLE_WORDS.fullmatch(pattern):
-        return f"the word {named(whole[1])}"
-    return f"/{brief(pattern)}/"
-
-
-def few(parts: Sequence[str]) -> list[str]:
+def few(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:
     """The first parts of an enumeration, and how many more there are."""
-    more = len(parts) - _MOST_LISTED
-    return [*parts[:_MOST_LISTED], f"{more:,} more"] if more > 0 else [*parts]
+    more = len(parts) - most
+    return [*parts[:most], f"{more:,} more"] if more > 0 else [*parts]
 
 
 def quoted(text: str) -> str:

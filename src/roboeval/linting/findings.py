@@ -18,6 +18,7 @@ Kind = Literal[
     "untripped",
     "dead-regex",
     "slow-regex",
+    "unworded",
     "absent",
     "same-worlds",
     "stale-acceptance",

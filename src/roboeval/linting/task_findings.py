@@ -12,6 +12,8 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
+from codebotler.rtl.regex_words import UNCLEAR
+from codebotler.rtl.wording import is_clear
 from codebotler.simulator.rules import whole_words
 from roboeval.evaluation.failures import failure
 from roboeval.evaluation.runs.rows import Failure
@@ -21,11 +23,12 @@ from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import judged_worlds
 from roboeval.suites.load import Requirement, Task
 from roboeval.suites.solutions import place_of, solutions
+from roboeval.suites.task import check_label
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     """All findings that are not about one world."""
-    yield from (*_unused(task), *_unsaid(task), *_uncovered(task), *_slow(task))
+    yield from (*_unused(task), *_unsaid(task), *_uncovered(task), *_slow(task), *_unworded(task))
     yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
 
 
@@ -73,6 +76,21 @@ def _uncovered(task: Task) -> Iterator[Finding]:
                 f'no check covers "{clause.text}" in prompt {clause.prompt}; add a fact with these words'
             )
             yield Finding("uncovered", f"{clause.prompt}: {clause.text}", message, task.path, line)
+
+
+def _unworded(task: Task) -> Iterator[Finding]:
+    """Checks with a regex that explanations cannot put into words."""
+    unclear = {
+        requirement.check
+        for requirement in _required(task)
+        if not all(map(is_clear, elements(requirement.formula))) or UNCLEAR in check_label(requirement.text)
+    }
+    for check in task.checks:
+        if check.name in unclear:
+            message = (
+                f'no sentence can show a regex of the check "{check.name}"; add what it means under "means"'
+            )
+            yield Finding("unworded", check.name, message, task.path, check.line)
 
 
 # --- solutions

@@ -28,6 +28,7 @@ from roboeval.report.sheets import (
     described,
     told,
 )
+from roboeval.suites.task import check_label
 
 WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
 MOST_ROWS = 1_000  # of a table on the page; its file has all
@@ -193,7 +194,7 @@ def _cluster(model: str, cluster: Cluster) -> str:
     data = {"model": model, "task": cluster.task, "kind": kind, "size": str(size)}
     attributes = "".join(f' data-{name}="{_text(value)}"' for name, value in data.items())
     check = cluster.failure["check"]
-    why = f"{check}: {cluster.why}" if check else cluster.why
+    why = f"{check_label(check)}: {cluster.why}" if check else cluster.why
     return (
         f'<details class="cluster"{attributes}><summary><b>{size:,}</b><span>{_text(model)}, '
         f'{_text(cluster.task)}, {_text(kind)}<br><span class="why">{_text(_cut(why, WORDS))}</span></span>'

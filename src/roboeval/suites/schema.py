@@ -39,12 +39,24 @@ class _Form(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def _of_what_is_said(means: object) -> object:
+    return {"say": means} if isinstance(means, str) else means
+
+
 class CheckFile(_Form):
-    """A check as a task file writes it."""
+    """A check as a task file writes it.
+
+    Args:
+        category: the class of failure.
+        commonsense: whether it tests what no prompt says.
+        rtl: the constraint.
+        means: by the kind of event, what its texts come to in a sentence; a single text is what is said.
+    """
 
     category: Category
     commonsense: bool = False
     rtl: Text
+    means: Annotated[dict[str, Name], BeforeValidator(_of_what_is_said)] = {}
 
 
 class Fact(_Form):

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import re
+from ast import literal_eval
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from codebotler.core.words import counted
 from codebotler.core.world import Answer, Person, World
 from codebotler.rtl import Formula
+from codebotler.rtl.regex_words import first_choice
 from roboeval.suites.schema import Ability, Accepted, Category, Fact
+
+_STRINGS = re.compile(r"""r?"(?:\\.|[^"\\])*"|r?'(?:\\.|[^'\\])*'""")
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,7 @@ class Check:
         rtl: the constraint with `{parameter}` where an argument goes.
         commonsense: whether it tests what no prompt says.
         line: where it stands in the task file.
+        means: by the kind of event, what its texts come to in a sentence, with `{parameter}` as in `rtl`.
     """
 
     name: str
@@ -70,6 +78,7 @@ class Check:
     rtl: str
     commonsense: bool
     line: int | None = None
+    means: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -115,6 +124,13 @@ class Task:
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
         """The worlds and requirements by which programs are judged; none if there is no ablation."""
         return (self.ablation or ()) if ablated else self.scenarios
+
+
+def check_label(text: str) -> str:
+    """A requirement for people, such as `offers("bread")` for one whose argument is a regex with `bread`."""
+    return _STRINGS.sub(
+        lambda found: json.dumps(first_choice(literal_eval(found[0])), ensure_ascii=False), text
+    )
 
 
 def world_title(number: int, of: str, about: str) -> str:

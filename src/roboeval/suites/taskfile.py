@@ -12,9 +12,11 @@ from codebotler.core.errors import UserError
 from codebotler.core.program import parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.words import listed
+from codebotler.core.words import listed, room_name
 from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
+from codebotler.rtl.regex_words import first_choice
+from codebotler.rtl.syntax import ANSWERED
 from roboeval.suites.schema import DrawnTaskFile, RequirementFile, ScenarioFile, TaskFile
 from roboeval.suites.task import Check, Requirement, Scenario, Task
 from roboeval.suites.worlds import WorldSampler
@@ -24,6 +26,7 @@ PEOPLE = "people"  # in checks of drawn worlds: any person or word for people
 START = "start"  # in checks: the room in which the robot starts
 
 _PARAMETER = r" *[^\W\d]\w* *"
+_USED = re.compile(r"\{([^\W\d]\w*)\}")
 _HEAD = re.compile(rf"(\w+)(?:\(({_PARAMETER}(?:,{_PARAMETER})*)\))?")
 
 
@@ -131,6 +134,12 @@ def _phrases(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[
     return phrases
 
 
+def _filled(text: str, given: Mapping[str, str]) -> str:
+    for name, value in given.items():
+        text = text.replace(f"{{{name}}}", value)
+    return text
+
+
 @dataclass(frozen=True)
 class _Reader:
     """The checks and requirements of one task file."""
@@ -157,15 +166,29 @@ class _Reader:
             raise wrong(f'a parameter cannot be called "{START}", which is the room of the robot; rename it')
         if again := next((p for n, p in enumerate(parameters) if p in parameters[:n]), None):
             raise wrong(f'the check "{name}" has two parameters "{again}"; rename one')
-        for used in re.findall(r"\{([^\W\d]\w*)\}", body.rtl):
+        for used in _USED.findall(body.rtl):
             if used not in parameters and used not in self.phrases and used != START:
                 known = f"its parameters are: {', '.join(parameters)}" if parameters else "it takes none"
                 raise wrong(f'the check "{name}" has no parameter "{used}"; {known}', "rtl")
+        means = self._means(head, parameters)
         if unused := next((p for p in parameters if f"{{{p}}}" not in body.rtl), None):
             sentence = f'the check "{name}" does not use its parameter "{unused}"'
             raise wrong(f"{sentence}; write {{{unused}}} in its rtl", "rtl")
         line = self.file.line(("checks", head))
-        return Check(name, parameters, body.category, body.rtl, body.commonsense, line)
+        return Check(name, parameters, body.category, body.rtl, body.commonsense, line, means)
+
+    def _means(self, head: str, parameters: Sequence[str]) -> dict[str, str]:
+        """What the texts of a check come to, by the kind of event."""
+        body = self.form.checks[head]
+        for kind, meaning in body.means.items():
+            if kind not in self.skills.recordings and kind != ANSWERED:
+                kinds = listed([*self.skills.recordings, ANSWERED])
+                sentence = f'no element is called "{kind}"; there is {kinds}'
+                raise self.file.wrong(sentence, "checks", head, "means", kind)
+            if unknown := {*_USED.findall(meaning)} - {*parameters, START}:
+                sentence = f'"{min(unknown)}" is no parameter of the check; write words in its place'
+                raise self.file.wrong(sentence, "checks", head, "means", kind)
+        return {**({"check": "a person"} if f"{{{PEOPLE}}}" in body.rtl else {}), **body.means}
 
     # --- worlds
 
@@ -220,12 +243,12 @@ class _Reader:
             raise self.file.wrong(
                 f'the check "{name}" takes {takes}, but "{text}" gives {len(arguments)}', *at
             )
-        rtl = check.rtl
-        given = zip(check.parameters, arguments, strict=True)
-        for word, replacement in (*self.phrases.items(), (START, start), *given):
-            rtl = rtl.replace(f"{{{word}}}", replacement)
+        given = {**self.phrases, START: start, **dict(zip(check.parameters, arguments, strict=True))}
+        rtl = _filled(check.rtl, given)
+        spoken = {START: room_name(start), **{p: first_choice(given[p]) for p in check.parameters}}
+        means = {kind: _filled(meaning, spoken) for kind, meaning in check.means.items()}
         try:
-            formula = parse(f"not ({rtl})" if bare != text.strip() else rtl, skills=self.skills)
+            formula = parse(f"not ({rtl})" if bare != text.strip() else rtl, skills=self.skills, means=means)
         except RtlSyntaxError as error:
             sentence = f'the check "{name}" is not a valid formula ({error})'
             raise UserError(sentence, file=self.file.name, line=check.line) from None

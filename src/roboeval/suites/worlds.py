@@ -18,6 +18,7 @@ from codebotler.core.words import listed
 from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
+from codebotler.rtl.regex_words import first_choice
 from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
 from roboeval.suites.pairwise import Row, spread
 from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile
@@ -220,8 +221,8 @@ def _owner(factor: str) -> str:
 
 def _detail(factor: str, level: Level) -> str:
     if ".topic " in factor:
-        return f"{factor.partition(' ')[2]} {level}"
-    return f"after looks {level}" if "looks" in factor else f"{level}"
+        return f"{first_choice(factor.partition(' ')[2])} {first_choice(str(level))}"
+    return f"after looks {level}" if "looks" in factor else first_choice(str(level))
 
 
 def _required(text: str, names: Names) -> Iterator[str]:

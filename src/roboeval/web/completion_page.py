@@ -28,7 +28,7 @@ from roboeval.evaluation.explanation import (
 )
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import Key, by_hand, name_of
-from roboeval.suites.task import describe_person, world_title
+from roboeval.suites.task import check_label, describe_person, world_title
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import completion_details
@@ -184,7 +184,7 @@ def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> No
 
 def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
     with ui.element("li").classes("failed-check"):
-        PlainText("code", shortened(check["check"]))
+        PlainText("code", shortened(check_label(check["check"])))
         if check["explanation"] is not None:
             PlainText("span", shortened(check["explanation"], MOST_SENTENCE))
         if check["step"] is not None:

@@ -19,6 +19,7 @@ from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
+from roboeval.suites.task import check_label
 
 # How a program did in a world: + satisfied, - not, ! ended by an error.
 SIGN = (
@@ -32,7 +33,7 @@ SIGN = (
 ERROR = pl.col("error_message")
 WHY = (
     pl.when(pl.col("failure_check").is_not_null())
-    .then("failure_check")
+    .then(pl.col("failure_check").map_elements(check_label, return_dtype=pl.String))
     .when((pl.col("status") == "timeout") & ERROR.str.contains(r"^\d"))
     .then(pl.format("stopped after {} (limit)", ERROR))
     .otherwise(ERROR)

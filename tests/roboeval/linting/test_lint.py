@@ -50,6 +50,7 @@ def linted(tmp_path: Path) -> Lint:
         accepted: dict[str, str] | None = None,
         solutions: str = SOLUTIONS,
         untripped: bool = False,
+        unworded: bool = False,
         replaced: tuple[str, str] = ("", ""),
         edited: Sequence[tuple[str, str]] = (),
     ) -> list[Finding]:
@@ -75,7 +76,8 @@ def linted(tmp_path: Path) -> Lint:
         loaded = load_suite(str(suite))
         task = loaded.task("Hello")
         findings = lint(task, tried(task, loaded) if untripped else [])
-        return [one for one in findings if untripped or one.kind != "untripped"]
+        wanted = {"untripped": untripped, "unworded": unworded}
+        return [one for one in findings if wanted.get(one.kind, True)]
 
     return write
 
@@ -301,6 +303,22 @@ def test_a_regex_that_takes_much_longer_the_longer_a_text_is(linted: Lint) -> No
     assert finding.line == 5
     assert '"greets"' in finding.message
     assert not linted({"greets": 'tr.Exists(say("a[^a]*b"))'}, ["greets"])
+
+
+def test_a_regex_without_words(linted: Lint) -> None:
+    checks = {"greets": 'tr.Exists(say("a[^a]*b"))', "speaks": SPEAKS}
+    (finding,) = linted(checks, ["greets", "speaks"], unworded=True)
+    assert (finding.name, finding.line) == ("unworded: greets", 5)
+    assert "means" in finding.message
+    assert "[^a]" not in finding.message
+    named = ("greets: {category", "greets: {means: a greeting, category")
+    assert not linted(checks, ["greets", "speaks"], unworded=True, edited=[named])
+
+
+def test_an_argument_without_words(linted: Lint) -> None:
+    checks = {"says(number)": 'tr.Exists(say("{number}"))', "speaks": SPEAKS}
+    found = linted(checks, ['says("[^a]b")', "speaks"], unworded=True)
+    assert names(found) == ["unworded: says"]
 
 
 def test_a_visit_that_leads_nowhere(linted: Lint) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.rtl import parse
+from codebotler.rtl.reasoning.alphabet import elements
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task
 from small_suite import SUITE, TASK, a_suite
@@ -29,6 +30,17 @@ def test_a_requirement_may_rest_on_the_words_of_some_prompts(tmp_path: Path) -> 
     goes, not_bye = scenario.require
     assert (goes.words, not_bye.words) == ((), ((1, "say bye to NOBODY"),))
     assert [scenario.asked_by(prompt).require for prompt in range(2)] == [(goes,), (goes, not_bye)]
+
+
+def test_a_check_says_what_its_texts_mean(tmp_path: Path) -> None:
+    task = TASK.replace("says(what): {", 'says(what): {means: "that {what} is over, at {start}", ')
+    assert task != TASK
+    suite = load_suite(a_suite(tmp_path, task))
+    _, not_bye = suite.task("T").scenarios[0].require
+    (said,) = elements(not_bye.formula)
+    assert said.means == "that bye is over, at kitchen"
+    (tmp_path / "plain").mkdir()
+    assert suite.digest == load_suite(a_suite(tmp_path / "plain", TASK)).digest
 
 
 def test_a_check_may_name_where_the_robot_starts(tmp_path: Path) -> None:
@@ -57,6 +69,8 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("says(what)", '"says(what, what)"', 6, 'two parameters "what"'),
         ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is not a valid formula'),
         ("goto(", "gote(", 5, 'the check "goes" is not a valid formula'),
+        ("goes: {", "goes: {means: {go: there}, ", 5, 'no element is called "go"'),
+        ("goes: {", "goes: {means: 'that {it} is', ", 5, '"it" is no parameter'),
         ("[goes,", "[gose,", 11, 'no check "gose"'),
         ("[goes,", '[goes("x"),', 11, 'the check "goes" takes no argument'),
         ('says("bye")', "says(bye)", 11, "not a requirement"),

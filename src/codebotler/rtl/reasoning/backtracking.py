@@ -9,8 +9,8 @@ from itertools import product, takewhile
 from random import Random
 from typing import Any, NamedTuple
 
-from codebotler.rtl.pattern import compile_regex
-from codebotler.rtl.reasoning.regex_samples import Tree, failing, inner_trees, parse_tree, spelled
+from codebotler.rtl.pattern import Tree, compile_regex, parse_tree
+from codebotler.rtl.reasoning.regex_samples import failing, inner_trees, spelled
 
 SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)  # of texts, in characters
 FACTOR = 3  # how much longer one text is than another, about

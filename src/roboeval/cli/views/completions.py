@@ -25,7 +25,7 @@ from roboeval.evaluation.explanation import (
 )
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import by_hand, name_of
-from roboeval.suites.task import world_title
+from roboeval.suites.task import check_label, world_title
 
 EXPLANATION = 2_000
 ALL_GONE = "the judged programs are no longer in this run"
@@ -53,7 +53,8 @@ def _program_line(program: Mapping[str, Any]) -> Text:
     if program["explanation"] is None:
         why = shortened(error_sentence(program))
     else:
-        why = f"{visible(program['failure']['check'])}: {shortened(program['explanation'], EXPLANATION)}"
+        label = visible(check_label(program["failure"]["check"]))
+        why = f"{label}: {shortened(program['explanation'], EXPLANATION)}"
     return text.append(f"\n{why}" if why else "")
 
 
@@ -122,7 +123,9 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
         parts.append(Padding(Text(cut_told(cut), "yellow"), (0, 0, 0, 2)))
     for check in world["failed_checks"]:
         text = Text.assemble(
-            ("failed ", "red"), visible(check["check"]), f": {shortened(check['explanation'], EXPLANATION)}"
+            ("failed ", "red"),
+            visible(check_label(check["check"])),
+            f": {shortened(check['explanation'], EXPLANATION)}",
         )
         parts.append(Padding(text, (0, 0, 0, 2)))
     parts += [Padding(Text(shortened(one, EXPLANATION)), (0, 0, 0, 2)) for one in world["remarks"]]

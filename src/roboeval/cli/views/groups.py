@@ -19,6 +19,7 @@ from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.explanation import GONE
 from roboeval.evaluation.runs.completions import how_many, name_of
+from roboeval.suites.task import check_label
 
 MOST_LINES = 60  # of a difference between programs
 
@@ -66,7 +67,7 @@ def cluster_view(cluster: Cluster) -> RenderableType:
     head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
     lines = [Text(f'such as {name}, in "{visible(str(cluster.told["world"]))}"', "dim")]
     check = cluster.failure["check"]
-    lines.append(Text(shortened(f"{check}: {cluster.why}" if check else cluster.why)))
+    lines.append(Text(shortened(f"{check_label(check)}: {cluster.why}" if check else cluster.why)))
     if cluster.program is None:
         lines.append(Text(GONE, "yellow"))
     if (fix := cluster.fix) is not None:

@@ -1,0 +1,114 @@
+"""The words of a regex: the plain texts that it finds, for readers who do not know regexes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import product
+from typing import Any
+
+from codebotler.core.words import brief, listed
+from codebotler.rtl.pattern import Tree, parse_tree
+
+ANYTHING = frozenset({"", ".*", ".+", "^.*$"})
+UNCLEAR = "(…)"
+_MOST = 40  # texts that one regex may find
+_FEWEST_IN_A_ROW = 3  # whole numbers that are named by the first and the last of them
+_SHOWN = 5
+
+
+@lru_cache(maxsize=4096)
+def choices(pattern: str) -> tuple[str, ...] | None:
+    """The texts that a regex finds, such as `bread` and `toast`, each in its shortest form.
+
+    Whole words and numbers in a row count as they are read: `7[3-9]` finds `73 to 79`.
+
+    Returns:
+        None if the texts are too many, or the regex says what must not be there.
+    """
+    try:
+        found = [" ".join(text.split()) for text in _texts(parse_tree(pattern))]
+    except _UnclearError:
+        return None
+    distinct = tuple(dict.fromkeys(found))
+    if not all(text.strip("…, ") for text in distinct):
+        return None
+    if len(distinct) > _FEWEST_IN_A_ROW and all(text.isdecimal() and text.isascii() for text in distinct):
+        numbers = sorted(map(int, distinct))
+        if numbers[-1] - numbers[0] == len(numbers) - 1:
+            return (f"{numbers[0]} to {numbers[-1]}",)
+    return distinct
+
+
+def one_of(texts: tuple[str, ...], quote: str = '"') -> str:
+    """Texts to choose from, such as `"bread" or "toast"`, without the last of many."""
+    left = len(texts) - _SHOWN
+    shown = [f"{quote}{brief(text)}{quote}" for text in texts[: _SHOWN if left > 1 else None]]
+    return listed([*shown, f"{left} more"] if left > 1 else shown, "or")
+
+
+def first_choice(pattern: str) -> str:
+    """The first plain text that a regex finds, for a reader; `(…)` if there is none for certain."""
+    first = "anything" if pattern in ANYTHING else (choices(pattern) or (UNCLEAR,))[0]
+    return pattern if first == pattern.strip() or not pattern else first
+
+
+class _UnclearError(Exception):
+    """A regex has no certain words."""
+
+
+def _texts(tree: Tree) -> list[str]:
+    texts = [""]
+    for op, arguments in tree:
+        each = _node_texts(str(op), arguments)
+        texts = [text + part for text, part in product(texts, each)]
+        if len(texts) > _MOST:
+            raise _UnclearError
+    return texts
+
+
+def _node_texts(op: str, arguments: Any) -> list[str]:  # noqa: ANN401 - as Python's parser made them
+    if op == "LITERAL":
+        return [chr(arguments)]
+    if op == "IN":
+        return _set_texts(arguments)
+    if op in {"BRANCH", "SUBPATTERN"}:
+        trees = arguments[1] if op == "BRANCH" else arguments[-1:]
+        return [text for tree in trees for text in _texts(tree)]
+    if op.endswith("REPEAT"):
+        return _repeat_texts(*arguments)
+    if op == "ASSERT_NOT":
+        _texts(arguments[-1])  # `cheese` is what a regex for cheese that is not grilled finds
+    elif op not in {"AT", "ANY"}:
+        raise _UnclearError
+    return ["…" if op == "ANY" else ""]
+
+
+def _repeat_texts(least: int, most: int, tree: Tree) -> list[str]:
+    if least == 0 and most == 1:
+        return [""]
+    if str(tree[0][0]) == "ANY" or _is_category(tree, "CATEGORY_WORD"):
+        return ["…"]
+    if _is_category(tree, "CATEGORY_NOT_WORD", "CATEGORY_SPACE"):
+        return [" "]
+    if least == 1:
+        return _texts(tree)
+    raise _UnclearError
+
+
+def _is_category(tree: Tree, *names: str) -> bool:
+    op, arguments = tree[0]
+    return (
+        len(tree) == 1 and str(op) == "IN" and [str(value) for _, value in arguments] in [[n] for n in names]
+    )
+
+
+def _set_texts(members: Any) -> list[str]:  # noqa: ANN401 - as in `_node_texts`
+    """The characters of a set; the first of signs, which differ in how they are written only."""
+    characters: list[str] = []
+    for op, value in members:
+        if str(op) not in {"LITERAL", "RANGE"}:
+            raise _UnclearError
+        start, end = value if str(op) == "RANGE" else (value, value)
+        characters += map(chr, range(start, min(end, start + _MOST) + 1))
+    characters = [*dict.fromkeys(character.lower() for character in characters)]
+    return characters if all(map(str.isalnum, characters)) else characters[:1]

@@ -1,0 +1,66 @@
+"""What people read of failures: no regex in any explanation, label of a check or title of a world."""
+
+import re
+from collections.abc import Iterator
+
+import pytest
+
+from codebotler.core.trace import Trace
+from codebotler.core.words import brief
+from codebotler.rtl import explain
+from roboeval.linting.trials import tried
+from roboeval.suites.load import Suite, Task, load_suite
+from roboeval.suites.task import check_label
+
+REGEX = re.compile(r"\\[bBdDsSwW]|\.[*+]|\(\?|\||\[[^\]]*\]|\w[?*+]")
+SUITES = ("paper", "plus")
+
+
+def said_in(trace: Trace) -> Iterator[str]:
+    for event in trace:
+        yield from (event.text, *(option.text for option in event.options), event.answer or "")
+
+
+def without_what_was_said(sentence: str, trace: Trace) -> str:
+    for text in sorted(map(brief, said_in(trace)), key=len, reverse=True):
+        sentence = sentence.replace(text, "")
+    return sentence
+
+
+def explanations(task: Task, suite: Suite) -> Iterator[str]:
+    for verdicts in tried(task, suite):
+        for verdict in verdicts:
+            for requirement in verdict.failed:
+                why = explain(requirement.formula, verdict.outcome.trace)
+                assert why is not None
+                yield without_what_was_said(why.sentence, verdict.outcome.trace)
+
+
+@pytest.mark.slow  # some thousand explanations of each suite
+@pytest.mark.parametrize("name", SUITES)
+def test_explanations_of_all_wrong_solutions(name: str) -> None:
+    suite = load_suite(name)
+    found = {sentence for task in suite.tasks.values() for sentence in explanations(task, suite)}
+    assert len(found) > 100
+    assert [sentence for sentence in found if REGEX.search(sentence)] == []
+    assert [sentence for sentence in found if "fits the requirement" in sentence] == []
+
+
+@pytest.mark.parametrize("name", SUITES)
+def test_titles_of_worlds_and_labels_of_checks(name: str) -> None:
+    worlds = [world for task in load_suite(name).tasks.values() for world in task.scenarios]
+    labels = {check_label(requirement.text) for world in worlds for requirement in world.require}
+    assert [text for text in {*labels, *(world.world.about for world in worlds)} if REGEX.search(text)] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "label"),
+    [
+        ('reports(r"40|forty|^4\\b")', 'reports("40")'),
+        ('not says("please\\\\W+follow")', 'not says("please follow")'),
+        ('greets("amy\'s lab", 2)', 'greets("amy\'s lab", 2)'),
+        ("comes_back", "comes_back"),
+    ],
+)
+def test_a_label_shows_words(text: str, label: str) -> None:
+    assert check_label(text) == label
