@@ -9,7 +9,8 @@ from typing import Any
 from codebotler.core.trace import Event, Status, Trace
 from codebotler.core.words import counted, listed
 from codebotler.core.world import Answer, Person, World
-from codebotler.rtl.wording import done_to, few, named, quoted, room_name, verb
+from codebotler.rtl.regex_words import choices, one_of
+from codebotler.rtl.wording import done_to, few, quoted, room_name, verb
 from codebotler.simulator.rules import Rules, choose, finds
 
 FEWEST_TIMES = 3  # that steps must be repeated to be a cycle
@@ -114,7 +115,7 @@ def _misplaced(room: str, person: Person, number: int, question: Event) -> str:
 def _answer(answer: Answer) -> str:
     if isinstance(answer, int):
         return "the last option" if answer == -1 else f"option {answer}"
-    return "the first option" if answer == ".*" else named(answer)
+    return "the first option" if answer == ".*" else one_of(choices(answer) or ()) or "an answer of its own"
 
 
 def _ordinal(number: int) -> str:
