@@ -26,6 +26,7 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.rtl.semantics.Inconclusive": ((4, 1, Option("3", is_text=False)), {}),
     "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),
+    "codebotler.simulator.isolated_call.IsolatedCallError": (("MemoryError", "it is too large"), {}),
     "codebotler.simulator.rule_guard.RuleViolationError": (
         (Rule("quiet", "Be quiet.", parse('not tr.Exists(say(".*"))')), Event("say", "hello")),
         {"verdict": "is broken by"},

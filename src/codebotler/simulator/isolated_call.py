@@ -49,8 +49,11 @@ class IsolatedCallError(Exception):
     """
 
     def __init__(self, kind: str, message: str) -> None:
-        super().__init__(f"{kind}: {message}")
+        super().__init__(kind, message)
         self.kind, self.message = kind, message
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.message}"
 
 
 class IsolatedFunction(Generic[Arguments, Result]):
