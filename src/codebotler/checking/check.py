@@ -21,10 +21,10 @@ from codebotler.checking.sampled import (
 )
 from codebotler.checking.static import read_program, read_rooms
 from codebotler.core.errors import UserError, expect_list
+from codebotler.core.labels import check_label
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
-from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
 from codebotler.simulator.rule_guard import Rule
@@ -186,7 +186,7 @@ def _room_map(program: str, rooms: Sequence[str] | None, start: str | None, skil
     if rooms is not None:
         for room in rooms:
             try:
-                check_regex(room)
+                check_label(room)
             except ValueError as error:
                 raise UserError(f'the room is "{room}", but {error}') from None
         names = tuple(dict.fromkeys(rooms)) or (start or START,)

@@ -26,6 +26,7 @@ from pydantic import (
     model_validator,
 )
 
+from codebotler.core.labels import check_label
 from codebotler.core.program import literal, parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
@@ -50,24 +51,8 @@ Text = Annotated[str, StringConstraints(strict=True)]
 Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
 
 
-PLAIN = re.compile(
-    r"[\w ',;:!%@&/-]*"
-)  # texts, most names among them, that are regexes which find themselves
-
-
-def check_regex(text: str) -> str:
-    """A text, unless it is no regular expression."""
-    if PLAIN.fullmatch(text):
-        return text
-    try:
-        re.compile(text)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise ValueError(f"it is not a valid regular expression: {error}") from None
-    return text
-
-
-Pattern = Annotated[Text, AfterValidator(check_regex)]
-NamePattern = Annotated[Name, AfterValidator(check_regex)]
+Pattern = Annotated[Text, AfterValidator(check_label)]
+NamePattern = Annotated[Name, AfterValidator(check_label)]
 Value: TypeAlias = StrictBool | StrictInt | StrictFloat | StrictStr
 Metres = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
 Corner: TypeAlias = tuple[Metres, Metres]

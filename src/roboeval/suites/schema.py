@@ -5,9 +5,10 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from codebotler.core.world_file import AnswerFile, Name, Pattern, PersonFile, Text, WorldFile
+from codebotler.core.labels import check_regex
+from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, Text, WorldFile
 from codebotler.simulator.rules import WORDS_FOR_PEOPLE, Limits, Rules
 
 MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
@@ -69,7 +70,7 @@ class Fact(_Form):
     """
 
     fact: Text
-    words: Annotated[tuple[Pattern, ...], Field(min_length=1)]
+    words: Annotated[tuple[Annotated[Text, AfterValidator(check_regex)], ...], Field(min_length=1)]
     commonsense: bool = False
 
 
@@ -118,10 +119,10 @@ Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 class DrawnPersonFile(_Form):
     """A person who may be in the worlds of a task; where there is a choice, it is drawn for each world."""
 
-    name: Name | None = None
+    name: NamePattern | None = None
     where: Levels = Field(alias="in")
     answers: list[Answers] = []
-    topics: dict[Name, Answers] = {}
+    topics: dict[NamePattern, Answers] = {}
     after_looks: Looks | list[Looks] = 0
     leaves: Annotated[bool, Field(strict=True)] = False
 
@@ -129,7 +130,7 @@ class DrawnPersonFile(_Form):
 class DrawnThingFile(_Form):
     """A thing that may lie in the worlds of a task."""
 
-    label: Name | None = None
+    label: NamePattern | None = None
     where: Levels = Field(alias="in")
 
 
@@ -144,9 +145,9 @@ class DrawnWorldsFile(_Form):
     """What the worlds of a task have in common, and what may differ."""
 
     robot: Levels
-    rooms: Annotated[list[Name], Field(min_length=1)]
-    people: dict[Name, DrawnPersonFile] = {}
-    things: dict[Name, DrawnThingFile] = {}
+    rooms: Annotated[list[NamePattern], Field(min_length=1)]
+    people: dict[NamePattern, DrawnPersonFile] = {}
+    things: dict[NamePattern, DrawnThingFile] = {}
     may_wait_forever: Text | Annotated[bool, Field(strict=True)] = False
     corners: list[CornerFile] = []
 
@@ -199,9 +200,9 @@ class RulesFile(_Form):
     literals: Literal["lowercase", "as-written"] = "lowercase"
     matching: Literal["label-in-request", "whole-words"] = "label-in-request"
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
-    words_for_people: tuple[Name, ...] = ()
-    words_for_yes: tuple[Name, ...] = ()
-    words_for_no: tuple[Name, ...] = ()
+    words_for_people: tuple[NamePattern, ...] = ()
+    words_for_yes: tuple[NamePattern, ...] = ()
+    words_for_no: tuple[NamePattern, ...] = ()
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0

@@ -331,6 +331,11 @@ def test_a_room_that_is_no_regex_is_refused(pool: WorkerPool) -> None:
         check(START + "pass", rooms=["c++ ("], pool=pool)
 
 
+def test_a_room_that_may_take_too_long_to_find_is_refused(pool: WorkerPool) -> None:
+    with pytest.raises(UserError, match=r'"\(a\+\)\+\$", but finding it may take too long'):
+        check(START + f'go_to("{"a" * 40}!")', rooms=["(a+)+$"], pool=pool)
+
+
 # --- equal checks
 
 

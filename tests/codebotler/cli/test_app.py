@@ -92,6 +92,14 @@ def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
     assert '"kitchn"  failed: ' in out
 
 
+def test_a_room_that_may_take_too_long_to_find_ends_the_command(files: Path) -> None:
+    (files / "slow.yaml").write_text("robot: lab\nrooms:\n  - lab\n  - (a+)+$\n")
+    status, _, err = codebotler("check", files / "good.py", "--world", files / "slow.yaml")
+    assert status == 2
+    assert "slow.yaml, line 4: " in err
+    assert "too long" in err
+
+
 def test_what_takes_long_says_that_it_goes_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

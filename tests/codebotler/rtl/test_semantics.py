@@ -283,14 +283,21 @@ def test_a_trace_is_judged_by_what_is_compared_only(
     assert holds(formula, padded) == holds(formula, trace)
 
 
-def test_all_of_an_event_but_its_time_is_visible() -> None:
+def test_all_of_an_event_but_its_time_and_destination_is_visible() -> None:
     event = Event("say", "a")
     other = Event(
-        "ask", "b", (Option("1"),), "c", found=True, place="d", time=2.0, holding="e", to="f", more=("g",)
+        *("ask", "b", (Option("1"),), "c"),
+        found=True,
+        place="d",
+        time=2.0,
+        holding="e",
+        to="f",
+        more=("g",),
+        destination="h",
     )
     for name in (one.name for one in fields(Event)):
         changed = replace(event, **{name: getattr(other, name)})
-        assert (visible((changed,)) == visible((event,))) == (name == "time"), name
+        assert (visible((changed,)) == visible((event,))) == (name in {"time", "destination"}), name
 
 
 @given(st.data())

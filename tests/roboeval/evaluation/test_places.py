@@ -224,7 +224,7 @@ def test_drives_that_fail_lead_nowhere(worker: Worker) -> None:
 
 
 @skill(names="object")
-def fetch(sim: Simulation, obj: str) -> None:
+def bring_from_kitchen(sim: Simulation, obj: str) -> None:
     """Get an object from the kitchen."""
     sim.drive("kitchen")
     sim.take(obj)
@@ -238,7 +238,7 @@ def test_events_within_skills_of_a_users_own(worker: Worker) -> None:
         'tr.Exists(at("kitchen", holding("mug", say("got"))))',
     )
     suite = suite_of(world, STRICT, *formulas, skills=SKILLS.with_skill(fetch))
-    program = "def task_program():\n    fetch('mug')\n    say('got it')\n"
+    program = "def task_program():\n    bring_from_kitchen('mug')\n    say('got it')\n"
     assert expect_agreement(worker, suite, program) == [True, True, True]
     _, row = judge(worker, suite, program)
     (world_shown,) = completion_data(row, None, suite)["worlds"]

@@ -184,6 +184,10 @@ def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list
     ("good", "bad", "line", "named"),
     [
         ("in: lab,", "in: attic,", 9, '"attic"'),
+        ("rooms: [lab", "rooms: [(a+)+$, lab", 6, "may take too long"),
+        ("lou|louise", "(a|aa)+$", 9, "may take too long"),
+        ("topics: {tea:", "topics: {(a+)+$:", 9, "may take too long"),
+        ("mug: {", "(a+)+$: {", 11, "may take too long"),
         ('"*.in": nowhere', '"kim.in": attic', 14, '"kim.in" names can be "attic"'),
         ("counts(cups) if cups", "counts(cup) if cups", 31, '"cup"'),
         ("not counts(3)", "not counts(here)", 32, "argument"),

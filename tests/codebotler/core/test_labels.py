@@ -1,0 +1,82 @@
+"""Labels of a world: which regexes are accepted, and that those are found quickly."""
+
+import re
+import time
+from random import Random
+
+import pytest
+
+from codebotler.core.labels import SlowRegexError, check_label, expect_quick
+
+
+@pytest.mark.parametrize(
+    "label",
+    [
+        "kitchen",
+        ".*",
+        "kitchen|galley",
+        "lab [12]",
+        r"printer room \d+",
+        "bob('s)? office",
+        "^(?=.*tea)(?=.*hot)",
+    ],
+)
+def test_label_that_is_quick_is_accepted(label: str) -> None:
+    assert check_label(label) == label
+
+
+@pytest.mark.parametrize(
+    ("label", "why"),
+    [
+        ("(a+)+$", "a repeat"),
+        ("(a|aa)+$", "a repeat"),
+        ("(?:a|aa){40}b", "a repeat"),
+        ("((a{100}){100}){100}", "a repeat"),
+        ("(a?){30}b", "a repeat"),
+        ("a*a*b", "two repeats"),
+        ("x.*y.*z", "two repeats"),
+        ("(?=.*a.*b)", "two repeats"),
+        ("a?" * 30 + "b", "too many ways"),
+        ("[a-z]{0,50}" * 3 + "!", "too many ways"),
+        ("(a|b|(?:c|d)?)" * 10 + "!", "too many ways"),
+        (r"(\w)\1", "groups"),
+    ],
+)
+def test_label_that_may_take_long_is_refused(label: str, why: str) -> None:
+    with pytest.raises(ValueError, match=f"too long: .*{why}"):
+        check_label(label)
+
+
+@pytest.mark.parametrize("label", ["(", "a{2}{3}", "(?<=a+)b", "*"])
+def test_label_that_is_no_regex_is_refused(label: str) -> None:
+    with pytest.raises(ValueError, match="not a valid regular expression"):
+        check_label(label)
+
+
+def drawn(random: Random, depth: int = 0) -> str:
+    """A random regex of letters, choices, groups and repeats."""
+    parts = []
+    for _ in range(random.randint(1, 4)):
+        kind = random.randrange(6 if depth < 3 else 3)
+        part = random.choice("ab.") if kind < 3 else f"({drawn(random, depth + 1)})"
+        if kind == 5:
+            part = f"(?:{drawn(random, depth + 1)}|{drawn(random, depth + 1)})"
+        parts.append(part + random.choice(["", "", "?", "*", "+", "{0,9}", "{0,200}"]))
+    return "".join(parts)
+
+
+@pytest.mark.slow
+def test_random_labels_that_are_accepted_are_found_quickly() -> None:
+    random, accepted = Random(1), 0
+    for _ in range(3_000):
+        label = drawn(random)
+        try:
+            expect_quick(label)
+        except SlowRegexError:
+            continue
+        accepted += 1
+        start = time.thread_time()
+        for text in ("a" * 200 + "!", "ab" * 100 + "!", "b" * 200 + "c"):
+            re.search(label + "[!]$", text, re.IGNORECASE | re.DOTALL)
+        assert time.thread_time() - start < 1, label  # exponential ones take hours
+    assert accepted > 300
