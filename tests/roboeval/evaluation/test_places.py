@@ -237,7 +237,7 @@ def test_events_within_skills_of_a_users_own(worker: Worker) -> None:
         'tr.Exists(at("^office", goto("kitchen")))',
         'tr.Exists(at("kitchen", holding("mug", say("got"))))',
     )
-    suite = suite_of(world, STRICT, *formulas, skills=SKILLS.with_skill(fetch))
+    suite = suite_of(world, STRICT, *formulas, skills=SKILLS.with_skill(bring_from_kitchen))
     program = "def task_program():\n    bring_from_kitchen('mug')\n    say('got it')\n"
     assert expect_agreement(worker, suite, program) == [True, True, True]
     _, row = judge(worker, suite, program)
