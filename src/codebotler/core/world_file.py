@@ -27,6 +27,7 @@ from pydantic import (
 )
 
 from codebotler.core.program import literal, parse_expression
+from codebotler.core.regex_flags import scope_flags
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar, plain, written_call
@@ -61,6 +62,7 @@ def check_regex(text: str) -> str:
         return text
     try:
         re.compile(text)
+        re.compile(f"(?:{scope_flags(text)})")  # whole words are found by a regex around it
     except (re.error, RecursionError, OverflowError) as error:
         raise ValueError(f"it is not a valid regular expression: {error}") from None
     return text

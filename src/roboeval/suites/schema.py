@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from codebotler.core.world_file import AnswerFile, Name, Pattern, PersonFile, Text, WorldFile
+from codebotler.core.world_file import AnswerFile, Name, NamePattern, Pattern, PersonFile, Text, WorldFile
 from codebotler.simulator.rules import WORDS_FOR_PEOPLE, Limits, Rules
 
 MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
@@ -199,9 +199,9 @@ class RulesFile(_Form):
     literals: Literal["lowercase", "as-written"] = "lowercase"
     matching: Literal["label-in-request", "whole-words"] = "label-in-request"
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
-    words_for_people: tuple[Name, ...] = ()
-    words_for_yes: tuple[Name, ...] = ()
-    words_for_no: tuple[Name, ...] = ()
+    words_for_people: tuple[NamePattern, ...] = ()
+    words_for_yes: tuple[NamePattern, ...] = ()
+    words_for_no: tuple[NamePattern, ...] = ()
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0

@@ -226,6 +226,7 @@ def test_world_files_say_so_and_are_written_so(tmp_path: Path) -> None:
     [
         ("option: 2", "option: 0", "there is no option 0"),
         ("tea:", "'(':", "not a valid regular expression"),
+        ("tea:", "'(?#cup)(?i)tea':", "global flags"),  # which Python accepts, but not within another regex
         ("after_looks: 3", "after_looks: -3", "line 9"),
     ],
 )
