@@ -417,6 +417,11 @@ def test_a_no_is_a_no_however_it_is_written(pattern: str, option: str, *, means_
         one.perform("ask", ["ann", "Really?", (Option("yes"),)])
 
 
+def test_the_guide_has_the_pattern_for_a_no() -> None:
+    guide = Path(__file__).parents[3] / "docs" / "house-rules.md"
+    assert r'answered(r"^\W*no\b")' in guide.read_text(encoding="utf-8")
+
+
 def test_blanks_around_options_and_names_hide_nothing() -> None:
     for formula in ('ask(".*", "^no$")', 'mention("^no$")', 'to("^ann$", mention(".*"))'):
         one = robot(rule(f"not tr.Exists({formula})"))
