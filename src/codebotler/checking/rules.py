@@ -12,14 +12,15 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import brief
-from codebotler.core.world_file import Text
+from codebotler.core.world_file import Name, Text
 from codebotler.core.yaml_files import Place, YamlFile
-from codebotler.rtl import EventPattern, Formula, RtlSyntaxError, holds, parse
+from codebotler.rtl import And, EventPattern, Formula, RtlSyntaxError, holds, parse
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.rule_guard import Rule
 
+EACH = "{each}"  # in a formula, what the names of `for_each` replace
 MOST_QUOTED = 30  # characters of a formula, from where it is wrong
 
 
@@ -43,6 +44,7 @@ class RuleFile(BaseModel):
     always: Text | None = None
     finally_: Annotated[Text | None, Field(alias="finally")] = None
     refuse: Annotated[bool, Field(strict=True)] = False
+    for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
 
     def rule(self, file: YamlFile, at: Place, skills: SkillTable) -> Rule:
         """The rule that it describes, or a UserError."""
@@ -57,15 +59,22 @@ class RuleFile(BaseModel):
             if self.refuse:
                 sentence = 'what holds "finally" cannot be refused; remove "refuse", or write "always"'
                 raise file.wrong(sentence, *at, "refuse")
-            formula = _parsed(self.finally_ or "", file, (*at, "finally"), skills)
+            formula = self._formula(self.finally_ or "", file, (*at, "finally"), skills)
             return Rule(self.name, self.says, formula, "finally")
-        formula = _parsed(self.always, file, (*at, "always"), skills)
+        formula = self._formula(self.always, file, (*at, "always"), skills)
         if not holds(formula, ()):
             whenever = f'not tr.Last(goto(".*")) or {_bracketed(formula)}'
             sentence = f'the rule "{self.name}" is broken before anything has happened'
             mend = f'say when it counts, such as on each drive: {whenever}, or write "finally" for the end'
             raise file.wrong(f"{sentence}; {mend}", *at, "always")
         return Rule(self.name, self.says, formula, "always", self.refuse)
+
+    def _formula(self, text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula:
+        """The formula, or that of each name joined by `and`."""
+        if self.for_each is not None and EACH not in text:
+            raise file.wrong(f'"for_each" needs {EACH} in the formula, where its names belong', *at)
+        parts = [_parsed(text.replace(EACH, name), file, at, skills) for name in self.for_each or [EACH]]
+        return parts[0] if len(parts) == 1 else And(tuple(parts))
 
 
 class RulesFile(BaseModel):

@@ -138,7 +138,7 @@ def rules(
     """
     from codebotler.checking.rule_review import reviewed
     from codebotler.checking.rules import read_rules
-    from codebotler.cli.rules import review_data, review_view
+    from codebotler.cli.rules import note_evasions, review_data, review_view
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
@@ -146,6 +146,7 @@ def rules(
     table = skills_from(*(skills or ()))
     house_rules = read_rules(file, table)
     known = None if world is None else World.read(world, table)
+    note_evasions(house_rules, known, table)
     with busy("looking for examples"):
         found = reviewed(house_rules, known)
     if json:

@@ -9,6 +9,7 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
+from codebotler.checking.evasions import evasions
 from codebotler.checking.rule_review import Review, unknown_rooms_in
 from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
@@ -28,11 +29,19 @@ ASPECTS = {"always": "at any time", "finally": "at the end"}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """The rules in a file, if one is named, with a remark on each room that the world lacks."""
+    """The rules in a file, if one is named, with remarks on what the world lacks and what evades them."""
     rules = () if path is None else read_rules(path, skills)
     for sentence in () if world is None else unknown_rooms_in(rules, [room.name for room in world.rooms]):
         note(sentence)
+    note_evasions(rules, world, skills)
     return rules
+
+
+def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable) -> None:
+    """Say how programs could evade rules; UserError if one cannot hold in the rooms of the world."""
+    rooms = () if world is None else [room.name for room in world.rooms]
+    for sentence in evasions(rules, rooms, skills):
+        note(sentence)
 
 
 def review_view(found: Sequence[Review]) -> RenderableType:
@@ -87,6 +96,8 @@ def step_sentence(event: Event, here: str = "") -> str:
     given = [made_up if t in MADE_UP else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
     told = [done_with(event.kind, verb.third, given, "")]
     offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
+    more = len(event.options) - len(offered)
+    offered += [f"{more} {'more' if offered else 'options'}"] if more > 1 else []
     told += [f"offering {listed(offered)}"] if offered else []
     told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []
     where = "from" if drives else "in"

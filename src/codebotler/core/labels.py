@@ -13,6 +13,8 @@ from importlib import import_module
 from math import prod
 from typing import Any
 
+from codebotler.core.regex_flags import scope_flags
+
 PLAIN = re.compile(
     r"[\w ',;:!%@&/-]*"
 )  # texts, most names among them, that are regexes which find themselves
@@ -49,6 +51,7 @@ def check_regex(text: str) -> str:
     """Return a regular expression; a ValueError for any other text."""
     try:
         re.compile(text)
+        re.compile(f"(?:{scope_flags(text)})")  # whole words are found by a regex around it
     except (re.error, RecursionError, OverflowError) as error:
         raise ValueError(f"it is not a valid regular expression: {error}") from None
     return text

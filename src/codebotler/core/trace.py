@@ -25,6 +25,13 @@ class Option(NamedTuple):
     is_text: bool = True
 
 
+def options_of(values: Iterable[object]) -> tuple[Option, ...]:
+    """Options as events have them, from what a question offers; options stay as they are."""
+    return tuple(
+        [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
+    )
+
+
 class Names(str):
     """The names of one room or thing, which formulas compare with each; as a text, the first of them."""
 

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from codebotler.checking.evasions import evasions
 from codebotler.checking.problems import Check
 from codebotler.checking.rule_review import unknown_rooms_in
 from codebotler.core.errors import UserError
@@ -225,7 +226,10 @@ class MissionSession:
                     return
                 raise
             self._show(room_map=rooms_to_check(room_map, self._remark))
-            for sentence in unknown_rooms_in(self._view.rules, room_map.rooms) if room_map else ():
+            rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
+            regexes = () if room_map is None or room_map.plain else rooms
+            unknown = unknown_rooms_in(rules, rooms) if rooms else ()
+            for sentence in (*unknown, *evasions(rules, regexes, self._robot.skills)):
                 self._remark(sentence)
             if order.has_program:
                 self._take(mission, order.program)

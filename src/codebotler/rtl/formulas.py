@@ -110,6 +110,7 @@ class EventPattern:
         holding: what the robot must have held when it began; None if that does not matter.
         to: what the person must match whom a question was for; None if that does not matter.
         more: what the further arguments of a skill that has several must match, in order.
+        offers: how many options a question must offer, at least and at most; None for any number.
         has_text: whether such events have a text: False if their skill has no arguments.
         means: what its texts come to, after the verb in a sentence, such as `that nobody is coming`; None
             where the texts are plain enough.
@@ -125,6 +126,7 @@ class EventPattern:
     holding: Text | None = None
     to: Text | None = None
     more: tuple[Text, ...] = ()
+    offers: tuple[int, int | None] | None = None
     has_text: bool = True
     means: str | None = field(default=None, compare=False)
 
@@ -136,7 +138,8 @@ class EventPattern:
     @cached_property
     def is_about_more(self) -> bool:
         """Whether more than the texts and the room matters."""
-        return bool(self.more) or (self.answer, self.found, self.holding, self.to) != (None, None, None, None)
+        wanted = self.answer, self.found, self.holding, self.to, self.offers
+        return bool(self.more) or any(one is not None for one in wanted)
 
     def __str__(self) -> str:
         if self.answer is not None:
@@ -152,6 +155,9 @@ class EventPattern:
             written = f"returned({self.found}, {written})"
         if self.to is not None:
             written = f"to({self.to}, {written})"
+        if self.offers is not None:
+            numbers = (str(number) for number in self.offers if number is not None)
+            written = f"options({', '.join(numbers)}, {written})"
         if self.holding is not None:
             written = f"holding({self.holding}, {written})"
         return written if self.place is None else f"at({quote(self.place)}, {written})"

@@ -6,6 +6,8 @@ import re
 from importlib import import_module
 from typing import Any
 
+from codebotler.core.regex_flags import scope_flags
+
 Tree = Any
 """A parsed regex or a part of one: pairs of an operation and its arguments, of private classes of `re`."""
 
@@ -24,7 +26,7 @@ def parse_tree(pattern: str) -> Tree:
 
 def whole_word(pattern: str) -> re.Pattern[str]:
     """The regex that finds another regex as a whole word."""
-    return compile_regex(rf"\b(?:{pattern})\b")
+    return compile_regex(rf"\b(?:{scope_flags(pattern)})\b")
 
 
 def quote(text: str) -> str:

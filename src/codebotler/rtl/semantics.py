@@ -110,7 +110,10 @@ def _is_at(regex: re.Pattern[str], place: str) -> bool:
 
 
 def _fits(element: formulas.EventPattern, event: Event) -> bool:
-    """Whether answer, find, what is held and who is asked are as an element wants them."""
+    """Whether answer, find, what is held, who is asked and how many options are as an element wants them."""
+    least, most = element.offers or (0, None)
+    if not least <= len(event.options) <= (len(event.options) if most is None else most):
+        return False
     wanted = (element.answer, event.answer), (element.holding, event.holding or None), (element.to, event.to)
     if any(text is not None and (is_ is None or not text.matches(is_)) for text, is_ in wanted):
         return False

@@ -25,12 +25,14 @@ ANSWERED = "answered"
 QUESTIONS = ("mention", ANSWERED)
 LOOKS = {"found": True, "missed": False}
 SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
-AROUND = ("at", "holding", "to", "returned")  # what else an event must be like
+AROUND = ("at", "holding", "to", "options", "returned")  # what else an event must be like
 
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
 DEEPEST = 50
 """How deep a formula may be nested; few enough for Python's stack wherever it is evaluated."""
+
+MOST_OPTIONS = 100  # of a question, in a formula
 
 _LONGEST_SHOWN = 40
 
@@ -162,7 +164,7 @@ class _Parser:
     def bare_element(self, node: ast.expr) -> formulas.EventPattern:
         match node:
             case ast.Call(ast.Name(name)) if name in AROUND:
-                return self.around(name, *self.arguments(node, node, name, 2))
+                return self.around(name, node)
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
                     return self.plain_element(kind, node)
@@ -218,12 +220,22 @@ class _Parser:
                 return formulas.Regex(f"^{re.escape(as_text(-value if is_negative else value))}$")
         return self.matched(node)
 
-    def around(self, name: str, what: ast.expr, inner: ast.expr) -> formulas.EventPattern:
-        element = self.element(inner)
+    def around_arguments(self, name: str, node: ast.Call) -> list[ast.expr]:
+        if name != "options":
+            return self.arguments(node, node, name, 2)
+        given = self.arguments(node, node, name)
+        if len(given) not in {2, 3}:
+            raise self.error(node, "options takes the least number, optionally the most, and a question")
+        return given
+
+    def around(self, name: str, node: ast.Call) -> formulas.EventPattern:
+        *given, inner = self.around_arguments(name, node)
+        what, element = given[0], self.element(inner)
         nested = {
             "at": element.place,
             "holding": element.holding,
             "to": element.to,
+            "options": element.offers,
             "returned": element.found,
         }[name]
         if nested is not None:
@@ -242,8 +254,13 @@ class _Parser:
                     )
                 return replace(element, found=what.value)
         if element.kind != self.question:
-            raise self.error(inner, "to is about questions; use ask, mention or answered")
-        return replace(element, to=self.matched(what))
+            raise self.error(inner, f"{name} is about questions; use ask, mention or answered")
+        if name == "to":
+            return replace(element, to=self.matched(what))
+        least, most = self.number(what), self.number(given[-1])
+        if not 0 <= least <= most <= MOST_OPTIONS:
+            raise self.error(node, f"options takes numbers from 0 to {MOST_OPTIONS}, the smaller one first")
+        return replace(element, offers=(least, most if len(given) > 1 else None))
 
     def matched(self, node: ast.expr) -> formulas.Text:
         match node:

@@ -60,7 +60,7 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False, when: str 
         done = f"{getattr(verb(element.kind), form)} {means}"
     elif element.mention and not is_open:
         done = f"{_MENTIONS[form]} {_named(element.text) or _like(element.text, thing)} in a question"
-    elif element.options is not None and is_any(element.text) and not is_open:
+    elif element.options is not None and is_any(element.text) and not is_open and element.offers is None:
         return f"{_OFFERS[form]} an option {described(element.options)}{when}{where}"
     elif verb(element.kind).object:
         told = verb(element.kind)
@@ -76,6 +76,10 @@ def _further(element: EventPattern, means: str | None) -> str:
     more = ""
     if element.options is not None and means is None and not is_any(element.options):
         more += f" offering an option {described(element.options)}"
+    if element.offers is not None:
+        least, most = element.offers
+        number = f"{least} or more" if most is None else f"{least} to {most}" if most > least else f"{least}"
+        more += f" with {number} option{'s' * (number != '1')}"
     if element.more and not verb(element.kind).object:
         more += f", {listed([*filter(None, map(described, element.more))])}".rstrip(", ")
     if element.found is not None and element.kind != "check":
@@ -145,8 +149,7 @@ def happening(event: Event, element: EventPattern) -> str:
         thing = ""
     else:
         thing = room_name(event.text) if event.kind == "goto" else quoted(event.text)
-    if event.options and (element.mention or not is_any(element.options)):
-        thing += f" with the options {listed(few([quoted(option.text) for option in event.options]))}"
+    thing += _offered(event, element)
     if element.answer is not None:
         thing += (
             " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
@@ -162,6 +165,13 @@ def happening(event: Event, element: EventPattern) -> str:
     if element.holding is not None:
         thing += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
     return f"{thing} {inside(room_name(event.place))}" if element.place is not None and event.place else thing
+
+
+def _offered(event: Event, element: EventPattern) -> str:
+    """The options of a question, or their number, as far as an element compares them."""
+    if event.options and (element.mention or not is_any(element.options)):
+        return f" with the options {listed(few([quoted(option.text) for option in event.options]))}"
+    return "" if element.offers is None else f" with {words.counted(len(event.options), 'option')}"
 
 
 def event_words(event: Event) -> str:

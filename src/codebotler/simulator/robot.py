@@ -13,8 +13,8 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.calling import called
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.skills.values import Scalar, plain, possible, written_call
-from codebotler.core.trace import Event, Option, Trace, attempted
+from codebotler.core.skills.values import Scalar, as_text, plain, possible, written_call
+from codebotler.core.trace import Event, Option, Trace, attempted, options_of
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.rules import PAPER, Matching, Rules, choose, finds, is_called, resolve_room
@@ -181,8 +181,9 @@ class SimulatedRobot:
             coming.looks_before -= 1
         return seen
 
-    def ask(self, person: str, question: str, options: tuple[Option, ...]) -> int:
+    def ask(self, person: str, question: str, options: Sequence[object]) -> int:
         """Ask the first person here who is meant, and return the position of the option they choose."""
+        person, options = as_text(person), options_of(options)
         self.record("ask", question, options, to=person)
         if not options:
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
@@ -210,8 +211,8 @@ class SimulatedRobot:
         thing = next((thing for thing in here if thing.is_meant_by(obj, self.rules.matching)), None)
         if thing is None:
             raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
-        here.remove(thing)
         self.record("pick", obj if self.rules.events == "as-requested" else thing.label)
+        here.remove(thing)
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
@@ -224,8 +225,8 @@ class SimulatedRobot:
         if self.held is None or (self.held != obj and not is_meant):
             holds = "nothing" if self.held is None else f'"{self.held}"'
             raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
-        self.things[self.room].append(taken or Thing(obj, is_pattern=False))
         self.record("place", taken.label if taken else obj)
+        self.things[self.room].append(taken or Thing(obj, is_pattern=False))
         self.held = self.taken = None
 
     # --- skills of a user's own
@@ -324,17 +325,18 @@ class SimulatedRobot:
         self,
         kind: str,
         text: str,
-        options: tuple[Option, ...] = (),
+        options: Sequence[object] = (),
         *,
         found: bool | None = None,
         to: str | None = None,
         destination: str | None = None,
     ) -> None:
         """Add an event that happens here and now; the text loses the spaces at its ends."""
-        given = text.strip(), options, None, found
-        self.events.append(
-            Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
-        )
+        given = text.strip(), options_of(options), None, found
+        event = Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
+        if self.guard is not None:
+            self.guard.judge_inside(self, event)
+        self.events.append(event)
 
     def repeat(self, events: Sequence[Event]) -> None:
         """Add events that happened here before, and happen again now."""

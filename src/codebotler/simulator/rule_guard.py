@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Literal, TypeAlias
 
 from codebotler.core.errors import VIOLATION, RobotError
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Names, attempted
 from codebotler.rtl import Formula, Inconclusive, Monitor
@@ -81,6 +82,8 @@ class RuleGuard:
         self._watch([(rule, Monitor(rule.formula), _depends_on(rule)) for rule in rules])
         self._unjudged: set[str] = set()  # names of rules that had to compare an option that is no text
         self._here = ""  # the room, as rules name it
+        self._call: tuple[Skill, int, Thing | None, Event | None] | None = None  # of a user's own skill
+        self._prevented: list[RuleViolationError] = []  # within that call
 
     def _watch(self, watched: Iterable[Watched]) -> None:
         """Go on with monitors; of one rule there are several where it is uncertain what has happened."""
@@ -104,16 +107,44 @@ class RuleGuard:
         attempt = attempted(row, arguments, place=self._here, time=robot.now, holding=holding)
         if attempt is not None:
             self.judge(*_attempts(robot, attempt, arguments, is_drive=row.is_drive))
+        self._call = None if SKILLS.get(skill) is row else (row, before, thing, attempt)
+        self._prevented.clear()
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
             tried = [attempt] if attempt is not None and _is_tried(row) else []
-            self._take_in(robot, row, robot.events[before:] or tried, thing, attempt, failed=True)
+            for event in self._named(robot, row, robot.events[before:] or tried, thing, attempt, failed=True):
+                self.happened(event)
+            if self._prevented:
+                raise self._prevented[0] from None
             raise
-        self._take_in(robot, row, robot.events[before:], thing, attempt)
+        for event in self._named(robot, row, robot.events[before:], thing, attempt):
+            self.happened(event)
+        if self._prevented:  # the function of the skill has caught it
+            raise self._prevented[0]
         return result
 
-    def _take_in(
+    def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
+        """RuleViolationError if a rule would be broken by what a user's own skill is about to do inside."""
+        if self._call is None:
+            return
+        row, before, thing, attempt = self._call
+        here, watched = self._here, [*self._always, *self._finally]
+        self._watch([(rule, copy(monitor), depends) for rule, monitor, depends in watched])
+        try:
+            events = [*robot.events[before:], event]
+            *earlier, now = self._named(robot, row, events, thing, attempt, failed=True)
+            for each in earlier:
+                self.happened(each)
+            self.judge(*_attempts(robot, now, (), is_drive=now.kind == DRIVE))
+        except RuleViolationError as broken:
+            self._prevented.append(broken)
+            raise
+        finally:  # what has happened is taken in for good when the call has ended, with its result
+            self._here = here
+            self._watch(watched)
+
+    def _named(
         self,
         robot: SimulatedRobot,
         row: Skill,
@@ -122,8 +153,8 @@ class RuleGuard:
         attempt: Event | None,
         *,
         failed: bool = False,
-    ) -> None:
-        """Take what has happened in a call, by all names of rooms and things; before, it held `thing`."""
+    ) -> Iterator[Event]:
+        """What has happened in a call, by all names of rooms and things; before, the robot held `thing`."""
         start, own = self._here, _own_event(row, events, attempt, failed=failed)
         moved = thing or robot.taken if sum(event.kind in MOVES for event in events) == 1 else None
         for number, event in enumerate(events, 1):
@@ -139,13 +170,14 @@ class RuleGuard:
             elif moved is not None and event.kind in MOVES:
                 text = names_of(moved.label, asked)
             if text is event.text and place is event.place and holding is event.holding:
-                self.happened(event)
+                yield event
             else:
-                self.happened(replace(event, text=text, place=place, holding=holding))
+                yield replace(event, text=text, place=place, holding=holding)
 
     def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
         caught: RuleViolationError | None = None
+        attempts = tuple(map(_trimmed, attempts))
         for rule, monitor, depends in self._always:
             for attempt in attempts:
                 if attempt.kind in depends:
@@ -169,7 +201,7 @@ class RuleGuard:
                 do so whichever it was.
         """
         watched = [*self._always, *self._finally]
-        late = None
+        possible, late = tuple(map(_trimmed, possible)), None
         for event in possible[1:]:
             apart = [(rule, copy(monitor), depends) for rule, monitor, depends in watched]
             late = self._feed(apart, event) or late
@@ -200,6 +232,15 @@ class RuleGuard:
             if rule.name in self._unjudged or not monitor.holds:
                 return RuleViolationError(rule, None)
         return None
+
+
+def _trimmed(event: Event) -> Event:
+    """An event whose options, answer and person have no blanks at their ends."""
+    if event.to is None and not event.options:
+        return event
+    options = tuple([option._replace(text=option.text.strip()) for option in event.options])
+    answer, to = (None if text is None else text.strip() for text in (event.answer, event.to))
+    return replace(event, options=options, answer=answer, to=to)
 
 
 def _attempts(

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
+from codebotler.core.regex_flags import scope_flags
 from codebotler.core.trace import Option
 from codebotler.core.world import Answer, Person
 
@@ -74,7 +75,7 @@ def finds(request: str, label: str, matching: Matching) -> bool:
 @lru_cache(maxsize=4096)
 def whole_words(label: str) -> str:
     """A regex that finds another one as whole words, in the singular or the plural."""
-    return rf"(?<!\w)(?:{_anchored(label)})(?:e?s)?(?!\w)"
+    return rf"(?<!\w)(?:{_anchored(scope_flags(label))})(?:e?s)?(?!\w)"
 
 
 @lru_cache(maxsize=4096)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, TypeAlias
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.trace import Option
+from codebotler.core.skills.values import as_text
+from codebotler.core.trace import options_of
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World
 from codebotler.simulator.fact_sampler import Draw, FactSampler
@@ -288,8 +289,9 @@ class SampledRobot(SimulatedRobot):
         self.record("check", entity, found=found)
         return found
 
-    def ask(self, person: str, question: str, options: tuple[Option, ...]) -> int:
+    def ask(self, person: str, question: str, options: Sequence[object]) -> int:
         """Ask somebody, who is there unless the program saw that they are not; they choose by chance."""
+        person, options = as_text(person), options_of(options)
         who = meant(person)
         if not options or not self._answers(who):
             lost = self.search(who).is_lost or self.search(SOMEBODY).is_lost

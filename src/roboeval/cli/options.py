@@ -167,8 +167,10 @@ def with_options_of(called: Callable[..., object]) -> Callable[[Command], Comman
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
     """Read a suite by name or folder, files of further skills, and the rules of a house."""
+    from codebotler.checking.evasions import evasions
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
+    from codebotler.core.skills.paper import SKILLS
     from roboeval.suites.house import HouseRules
     from roboeval.suites.load import load_suite
 
@@ -177,7 +179,14 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
         raise UserError(
             f'the suite "{read.name}" has house rules of its own, which would not count; leave out --rules'
         )
-    return read if rules is None else read.with_house_rules(HouseRules.read(rules, read.skills))
+    if rules is None:
+        return read
+    house = HouseRules.read(rules, read.skills)
+    worlds = [scenario.world for task in read.tasks.values() for scenario in task.scenarios]
+    rooms = dict.fromkeys(room.name for world in worlds for room in world.rooms)
+    for sentence in evasions(house.rules, [*rooms], SKILLS):  # in simulation, rules see inside own skills
+        note(sentence)
+    return read.with_house_rules(house)
 
 
 def command(

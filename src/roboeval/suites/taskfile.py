@@ -10,6 +10,7 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.program import parse_expression
+from codebotler.core.regex_flags import scope_flags
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import listed, room_name
@@ -122,7 +123,7 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
 def _phrases(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[str, str]:
     """Regexes that checks may name without a parameter: people, and the phrases of the task."""
     names = [person.name or key for key, person in form.worlds.people.items()]
-    phrases = {PEOPLE: rf"(?:{'|'.join([*words, *names])})s?"}
+    phrases = {PEOPLE: rf"(?:{'|'.join(map(scope_flags, [*words, *names]))})s?"}
     for name, regexes in form.phrases.items():
         if not name.isidentifier() or name in {PEOPLE, START}:
             raise file.wrong(f'"{name}" cannot name phrases; choose another word', "phrases", name)
@@ -130,7 +131,7 @@ def _phrases(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[
             raise file.wrong(f'no check uses the phrases "{name}"; write {{{name}}} in one', "phrases", name)
         if quoted := next((regex for regex in regexes if '"' in regex), None):
             raise file.wrong(f"{quoted} has a quotation mark, which phrases cannot have", "phrases", name)
-        phrases[name] = f"(?:{'|'.join(regexes)})"
+        phrases[name] = f"(?:{'|'.join(map(scope_flags, regexes))})"
     return phrases
 
 

@@ -52,9 +52,39 @@ def test_a_sentence_on_several_lines_is_one_line(tmp_path: Path) -> None:
     assert [rule.says for rule in read_rules(rules_in(tmp_path, text))] == ["Stay out."]
 
 
+EACH_ROOM = """
+rules:
+  - name: two-questions
+    says: Ask at most two questions in each room.
+    for_each: [kitchen, alice's office]
+    always: not tr.AtLeast(at("{each}", mention(".*")), 3)
+"""
+
+
+def test_a_rule_for_each_room_is_written_once(tmp_path: Path) -> None:
+    (rule,) = read_rules(rules_in(tmp_path, EACH_ROOM))
+    assert str(rule.formula) == (
+        'not tr.AtLeast(at("kitchen", mention(".*")), 3) and '
+        'not tr.AtLeast(at("alice\'s office", mention(".*")), 3)'
+    )
+    (alone,) = read_rules(rules_in(tmp_path, EACH_ROOM.replace("[kitchen, alice's office]", "[kitchen]")))
+    assert str(alone.formula) == 'not tr.AtLeast(at("kitchen", mention(".*")), 3)'
+    program = "def task_program():\n" + "".join(
+        f"    go_to({room!r})\n" + "    ask('', 'Tea?', ['yes', 'no'])\n" * number
+        for room, number in (("kitchen", 2), ("alice's office", 3))
+    )
+    found = check(program, rooms=ROOMS, house_rules=read_rules(rules_in(tmp_path, EACH_ROOM)))
+    assert [problem.line for problem in found.problems] == [8]
+
+
 @pytest.mark.parametrize(
     ("text", "line", "named"),
     [
+        (EACH_ROOM.replace("{each}", "kitchen"), 6, ["{each}", '"for_each"']),
+        (EACH_ROOM.replace("alice's", '"alice"'), 5, []),
+        (EACH_ROOM.replace("[kitchen, alice's office]", "[]"), 5, ['"for_each"']),
+        (EACH_ROOM.replace("[kitchen, alice's office]", "kitchen"), 5, ['"for_each"']),
+        (EACH_ROOM.replace("kitchen,", "'a(',"), 6, ["not a valid regex"]),
         ("- a\n", 1, ["a list", "a mapping"]),
         ("rules: []\n", 1, ['"rules"']),
         ("rules:\n  - name: a\n    says: b\n", 2, ['"a"', '"always"', '"finally"']),

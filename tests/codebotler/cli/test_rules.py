@@ -114,3 +114,36 @@ def test_rules_that_cannot_be_read_end_a_command_before_anything_else(
     missing = command_line.refused(*arguments, "--rules", "none.yaml", name="codebotler")
     assert "none.yaml" in str(missing)
     assert not (files / "home").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["check", "sly.py"], ["rules", "anchor.yaml"], ["run", "sly.py", "--yes", "--speed", "0"]],
+)
+def test_a_rule_that_other_words_for_a_room_evade_is_refused_at_start(
+    files: Path, arguments: list[str]
+) -> None:
+    (files / "anchor.yaml").write_text(RULES.replace('goto("vault")', 'goto("^vault$")'))
+    (files / "regex.yaml").write_text(WORLD.replace("vault", "vault|safe"))
+    rules = [] if "anchor.yaml" in arguments else ["--rules", "anchor.yaml"]
+    ended = codebotler(files, *arguments, "--world", "regex.yaml", *rules)
+    assert ended.status == 2
+    assert 'the rule "vault" names a room with ^ or $' in " ".join(ended.err.split())
+    assert "Traceback" not in ended.err
+
+
+def test_a_skill_inside_which_rules_do_not_see_is_named(files: Path) -> None:
+    (files / "own.py").write_text(
+        "from codebotler import Simulation, skill\n@skill\ndef tour(sim: Simulation) -> None:\n"
+        "    'Tour.'\n    sim.drive('hall')\n"
+    )
+    (files / "good.py").write_text("def task_program():\n    tour()\n")
+    own = ["--skills", "own.py", "--world", "world.yaml"]
+    for arguments in (
+        ["check", "good.py", "--rules", "rules.yaml"],
+        ["rules", "rules.yaml"],
+        ["run", "good.py", "--yes", "--speed", "0", "--rules", "rules.yaml"],
+    ):
+        ended = codebotler(files, *arguments, *own)
+        assert ended.status == 0, ended
+        assert 'do not see inside the skill "tour"' in " ".join(ended.err.split())

@@ -17,13 +17,14 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.verbs import Verb, verb_of
 from codebotler.core.trace import Event, Outcome, Status, trace_data, trace_from
-from codebotler.core.world import Room, World
+from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
 from codebotler.rtl.syntax import AROUND, LOOKS, QUESTIONS, TEXTS
 from codebotler.rtl.wording import done_to
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.rules import PAPER
 
 HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"
@@ -427,6 +428,24 @@ def test_a_question_of_ones_own_is_answered_by_lot(tmp_path: Path, pool: WorkerP
     outcome = ran(pool, table, ["say(vote('all', 'Tea?', ['yes', 'no']))"], "tame")
     vote, said = outcome.trace
     assert (vote.text, vote.to, vote.answer) == ("tea?", "all", said.text)
+
+
+def test_a_skill_may_ask_with_options_of_any_type(tmp_path: Path) -> None:
+    (tmp_path / "lab.py").write_text(
+        HEAD + "@skill\ndef vote(sim, who: str) -> None:\n    'Vote.'\n    sim.ask(who, 'Tea?', ['yes', 2])\n"
+    )
+    table = skills_from(tmp_path / "lab.py")
+    guard = RuleGuard([Rule("a", "A.", parse('not tr.Exists(ask("cake", "no"))'))])
+    world = World((Room("hall", (), (Person("ann", ("yes",)),)),), "hall")
+    robot = SimulatedRobot(world, PAPER, table, guard=guard)
+    with pytest.raises(RuleViolationError, match="no text"):
+        robot.perform("vote", ["ann"])
+    free = SimulatedRobot(world, PAPER, table)
+    free.perform("vote", ["ann"])
+    assert trace_data(free.trace, table) == [
+        ["ask", "Tea?", ["yes", {"no text": "2"}], "yes"],
+        ["vote", "ann"],
+    ]
 
 
 def test_the_words_of_a_verb_follow_its_event(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,9 +15,10 @@ from hypothesis import strategies as st
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
-from codebotler.core.trace import Event, Option, Outcome, Status
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.trace import Event, Option, Outcome, Status, Trace
 from codebotler.core.world import Person, Room, World
-from codebotler.rtl import holds, parse
+from codebotler.rtl import Formula, holds, parse
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.rules import Rules
@@ -259,6 +262,95 @@ def test_what_a_skill_of_a_user_does_inside_counts(
         one.perform(skill, [argument])
 
 
+FORMULAS = (
+    r'not tr.Exists(goto("vault"))',
+    'not tr.AtLeast(say(".*"), 2)',
+    'not tr.Exists(holding("glass", goto("office")))',
+    'not tr.Exists(to("carol", ask(".*", ".*")))',
+    'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))',
+    'tr.OnlyAfterFirst(pick("mug")).Exists(say("done")) or not tr.Last(goto("office"))',
+)
+INSIDE = """
+from codebotler import Simulation, skill
+
+@skill(when_tried={tried})
+def work(sim: Simulation, steps: list[str], stubborn: bool) -> None:
+    "Do some steps."
+    for step in steps:
+        what, _, text = step.partition(" ")
+        try:
+            if what == "ask":
+                sim.ask("", text, ["Yes ", "no"])
+            else:
+                getattr(sim, what)(text)
+        except Exception:
+            if not stubborn:
+                raise
+"""
+STEPS = ("drive office", "drive vault", "drive attic", "take mug", "put mug", "look glass", "ask Tea?")
+WITHIN = (
+    *FORMULAS,
+    'not tr.Exists(at("office", ask(".*", ".*")))',
+    'not tr.Exists(holding("mug", goto("office")))',
+    'not tr.OnlyAfterFirst(answered("^yes$")).Exists(goto(".*"))',
+    'not tr.AtLeast(missed("glass"), 2)',
+    'not tr.Last(pick("mug")) or tr.BeforeLast(pick("mug")).Exists(found("glass"))',
+)
+
+
+@pytest.mark.parametrize("tried", [False, True])
+@settings(max_examples=20, deadline=None)
+@given(
+    steps=st.lists(st.sampled_from(STEPS), max_size=7),
+    formula=st.sampled_from(WITHIN),
+    stubborn=st.booleans(),
+)
+def test_a_rule_stops_a_skill_of_a_user_before_the_event_that_breaks_it(
+    own_work: dict[bool, SkillTable], steps: list[str], formula: str, *, stubborn: bool, tried: bool
+) -> None:
+    skills = own_work[tried]
+    free = SimulatedRobot(WORLD, AS_WRITTEN, skills)
+    one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([rule(formula)]))
+    kept = parse(formula)
+    for robot_ in (free, one):
+        with suppress(RobotError):
+            robot_.perform("work", [tuple(steps), stubborn])
+    broken = first_broken(kept, free.trace)
+    if broken is None:
+        assert one.trace == free.trace
+        return
+    assert one.trace[: broken - 1] == free.trace[: broken - 1]
+    inside = [event for event in one.trace if event.kind != "work" or tried]
+    if "missed" in formula:  # which only the result breaks
+        assert len(inside) == broken
+    else:
+        assert stubborn or len(one.trace) == broken - 1
+        assert first_broken(kept, one.trace) in {None, len(inside)}
+
+
+def first_broken(kept: Formula, trace: Trace) -> int | None:
+    """After how many events a rule is broken, with answers as rules see them."""
+    seen = tuple(replace(event, answer=event.answer and event.answer.strip()) for event in trace)
+    return next((n for n in range(len(seen) + 1) if not holds(kept, seen[:n])), None)
+
+
+@pytest.fixture(scope="module")
+def own_work(tmp_path_factory: pytest.TempPathFactory) -> dict[bool, SkillTable]:
+    folder = tmp_path_factory.mktemp("work")
+    for tried in (False, True):
+        (folder / f"work_{tried}.py").write_text(INSIDE.format(tried=tried))
+    return {tried: skills_from(folder / f"work_{tried}.py") for tried in (False, True)}
+
+
+def test_a_rule_ends_the_run_even_if_the_skill_goes_on(own_work: dict[bool, SkillTable]) -> None:
+    guard = RuleGuard([VAULT])
+    one = SimulatedRobot(WORLD, AS_WRITTEN, own_work[False], guard=guard)
+    with pytest.raises(RuleViolationError) as caught:
+        one.perform("work", [("drive office", "drive vault", "drive hall"), True])
+    assert not caught.value.is_late
+    assert "vault" not in {event.text for event in one.trace}
+
+
 def test_where_it_is_uncertain_what_has_happened_rules_hold_whatever_it_was() -> None:
     one, other = Event("goto", "lab"), Event("goto", "lab 2")
     for formula, may in (
@@ -300,6 +392,40 @@ def test_an_option_that_is_no_text_is_refused() -> None:
     error = refused(one, "ask", "ann", "tea?", (Option("1", is_text=False),))
     told = 'the rule "vault" cannot judge asking "tea?", which offers an option that is no text: '
     assert str(error).startswith(told.replace("vault", error.rule.name))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "option", "means_no"),
+    [
+        *(("^no$", option, True) for option in ("no", "No ", "\tNO\n", "\u00a0no")),
+        *(
+            (r"^\W*no\b", option, True)
+            for option in ("no", " No", "No.", "NO!", "No, thank you", "No - later")
+        ),
+        *((r"^\W*no\b", option, True) for option in ('"No"', "- no", "(no)", "\u200bno", "no\nthanks")),
+        *((r"^\W*no\b", option, False) for option in ("yes", "Yes, no sugar", "Nobody", "not today", "Noah")),
+    ],
+)
+def test_a_no_is_a_no_however_it_is_written(pattern: str, option: str, *, means_no: bool) -> None:
+    world = World((Room("hall", (), (Person("ann", (1,)),)),), "hall")
+    formula = f'not tr.OnlyAfterFirst(answered(r"{pattern}")).Exists(mention(".*"))'
+    one = SimulatedRobot(world, AS_WRITTEN, guard=RuleGuard([rule(formula)]))
+    one.perform("ask", ["ann", "Tea?", (Option(option), Option("maybe"))])
+    if means_no:
+        refused(one, "ask", "ann", "Really?", (Option("yes"),))
+    else:
+        one.perform("ask", ["ann", "Really?", (Option("yes"),)])
+
+
+def test_the_guide_has_the_pattern_for_a_no() -> None:
+    guide = Path(__file__).parents[3] / "docs" / "house-rules.md"
+    assert r'answered(r"^\W*no\b")' in guide.read_text(encoding="utf-8")
+
+
+def test_blanks_around_options_and_names_hide_nothing() -> None:
+    for formula in ('ask(".*", "^no$")', 'mention("^no$")', 'to("^ann$", mention(".*"))'):
+        one = robot(rule(f"not tr.Exists({formula})"))
+        assert not refused(one, "ask", " Ann ", "Tea?", (Option("yes"), Option("no "))).is_late
 
 
 def test_rules_of_the_end() -> None:
@@ -383,14 +509,6 @@ SKILLS = {
     "look": st.sampled_from(["mug", "ann"]).map(lambda thing: f"is_in_room({thing!r})"),
     "ask": st.sampled_from(["ann", "carol"]).map(lambda who: f"ask({who!r}, 'Tea?', ['yes', 'no'])"),
 }
-FORMULAS = (
-    r'not tr.Exists(goto("vault"))',
-    'not tr.AtLeast(say(".*"), 2)',
-    'not tr.Exists(holding("glass", goto("office")))',
-    'not tr.Exists(to("carol", ask(".*", ".*")))',
-    'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))',
-    'tr.OnlyAfterFirst(pick("mug")).Exists(say("done")) or not tr.Last(goto("office"))',
-)
 
 
 @settings(max_examples=60, deadline=None)

@@ -229,6 +229,7 @@ def test_world_files_say_so_and_are_written_so(tmp_path: Path) -> None:
         ("tea:", "(a+)+$:", "line 8: "),
         ("name: kim", "name: (a+)+$", "may take too long"),
         ("['yes',", "['(a|aa)+$',", "line 7: "),
+        ("tea:", "'(?#cup)(?i)tea':", "global flags"),  # which Python accepts, but not within another regex
         ("after_looks: 3", "after_looks: -3", "line 9"),
     ],
 )

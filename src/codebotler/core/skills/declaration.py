@@ -19,7 +19,7 @@ from codebotler.core.skills.verbs import Verb, verb_of
 TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"})
 RTL_WORDS = frozenset(
     {
-        *("at", "holding", "to", "found", "missed", "mention", "answered", "returned", "tr"),
+        *("at", "holding", "to", "options", "found", "missed", "mention", "answered", "returned", "tr"),
         *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies"),
     }
 )

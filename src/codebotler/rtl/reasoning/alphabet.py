@@ -79,7 +79,9 @@ def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
     """The elements that say of one aspect each what an element says: it matches where all of these do."""
     kind = element.kind
     return (
-        EventPattern(kind, element.text, element.options, element.mention, more=element.more),
+        EventPattern(
+            kind, element.text, element.options, element.mention, more=element.more, offers=element.offers
+        ),
         EventPattern(kind, ANYTHING, answer=element.answer, found=element.found),
         EventPattern(kind, ANYTHING, place=element.place),
         EventPattern(kind, ANYTHING, holding=element.holding, to=element.to),
@@ -154,11 +156,20 @@ def _is_as_empty(string: str, texts: Sequence[Text]) -> bool:
 
 
 def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
-    """Options that match in all combinations; one option may match what another cannot match as well."""
+    """Options that match in all combinations, and so many of them; one may match what another cannot."""
     texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
     found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
+    other: tuple[Option, ...] = ()
     for string in distinct_strings(texts, outer=True):
         matched = frozenset(text for text in texts if text.matches(string))
+        other = other if matched else (Option(string),)
         for already, options in tuple(found.items()):
-            found.setdefault(already | matched, (*options, Option(string)))
-    return found.values()
+            longer = (*options, Option(string))
+            if len(found.setdefault(already | matched, longer)) > len(longer):
+                found[already | matched] = longer
+    ranges = {e.offers for e in wanted if e.offers is not None}
+    numbers = sorted({n for least, most in ranges for n in (least, least if most is None else most + 1)})
+    for options in found.values():
+        more = other or options[-1:]
+        yield options
+        yield from ((*options, *more * (n - len(options))) for n in numbers if more and n > len(options))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.regex_flags import scope_flags
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
 from codebotler.rtl.text.matcher import Matcher
@@ -77,7 +78,7 @@ NEAR = 30  # characters before a thing, in which such words are looked for
 
 def _word(pattern: str) -> re.Pattern[str]:
     """A regex as a whole word, in the singular or the plural; a sign such as `%` may touch a word."""
-    return compile_regex(rf"(?:\b|(?=\W))(?:{pattern})(?:e?s)?(?:\b|(?<=\W))")
+    return compile_regex(rf"(?:\b|(?=\W))(?:{scope_flags(pattern)})(?:e?s)?(?:\b|(?<=\W))")
 
 
 Mark = tuple[int | None, tuple[float, ...]]

@@ -1,0 +1,111 @@
+"""Finds how a program could evade a rule: by another name of a room, or inside a skill of the user's own."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Iterator, Sequence
+from textwrap import dedent
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.trace import Names
+from codebotler.core.world_file import PLAIN
+from codebotler.rtl import Regex
+from codebotler.rtl.reasoning import samples
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.reasoning.sample_strings import patterns
+from codebotler.simulator.rule_guard import DRIVE, Rule
+from codebotler.simulator.rules import found_in
+
+ACTS = {"drive": DRIVE, "take": "pick", "put": "place", "look": "check", "ask": "ask"}
+"""What a skill can do to a robot, and the kind of event that it is."""
+HARMLESS = {"room", "rooms", "state", "outcome", "truth", "fail"}
+
+
+def evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) -> Iterator[str]:
+    """A sentence for each way in which a program could evade rules.
+
+    Args:
+        rules: the rules in force.
+        rooms: the names of the rooms, if they are regexes.
+        skills: what a program may call.
+
+    Raises:
+        UserError: a rule cannot hold in these rooms.
+    """
+    yield from _partly_named_rooms(rules, rooms)
+    yield from _unseen_skills(rules, skills)
+
+
+def _unseen_skills(rules: Sequence[Rule], skills: SkillTable) -> Iterator[str]:
+    """A sentence for each own skill that may do inside what a rule speaks of, and that no rule names."""
+    kinds = {
+        rule.name: {one.kind for one in elements(rule.formula)} for rule in rules if rule.when == "always"
+    }
+    for name, row in skills.items():
+        done = set() if name in SKILLS else acts_inside(row)
+        evaded = [rule for rule, spoken_of in kinds.items() if done & spoken_of]
+        is_named = row.recording is not None and any(row.recording.kind in each for each in kinds.values())
+        if evaded and not is_named:
+            yield (
+                f'while a robot moves, rules such as "{evaded[0]}" do not see inside the skill "{name}"; '
+                "write a rule that names it"
+            )
+
+
+def acts_inside(row: Skill) -> set[str]:
+    """The kinds of events that an own skill may add inside; all of them if its code does not tell."""
+    always = {DRIVE} if row.is_drive else set()
+    if row.is_by_lot or row.does is None:
+        return always
+    try:
+        tree = ast.parse(dedent(inspect.getsource(row.does)))
+    except (OSError, SyntaxError):
+        return {*ACTS.values(), "say"}
+    robot = row.does.__code__.co_varnames[0]
+    used = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
+    acts = {node.attr for node in used if isinstance(node.value, ast.Name) and node.value.id == robot}
+    named = sum(isinstance(node, ast.Name) and node.id == robot for node in ast.walk(tree))
+    direct = sum(isinstance(node.value, ast.Name) and node.value.id == robot for node in used)
+    if named > direct or acts - HARMLESS - {*ACTS}:  # it is given to another function, for example
+        return {*ACTS.values(), "say"}
+    return always | {ACTS[act] for act in acts if act in ACTS}
+
+
+def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator[str]:
+    """A sentence for each rule that names a room by some of the names which its regex gives it.
+
+    Raises:
+        UserError: a rule names such a room with `^` or `$`, so that any further word of a request evades it.
+    """
+    regexes = [room for room in rooms if not PLAIN.fullmatch(room)]
+    for rule in rules:
+        for pattern in dict.fromkeys(_room_patterns(rule) if regexes else ()):
+            for room in regexes:
+                text = Regex(pattern)
+                requests = [one for one in (*samples(room), *samples(pattern)) if found_in(room, one)]
+                matching = [one for one in requests if text.matches(Names(one, room))]
+                longer = [f"x {one} x" for one in matching if found_in(room, f"x {one} x")]
+                if not all(text.matches(Names(one, room)) for one in longer):
+                    raise UserError(
+                        f'the rule "{rule.name}" names a room with ^ or $, '
+                        f'which other words for "{room}" evade; write the name alone'
+                    )
+                missed = next((one for one in requests if one not in matching), None)
+                if matching and missed is not None:
+                    yield (
+                        f'the rule "{rule.name}" names the room "{room}" by some of its names only; '
+                        f'"{missed}" does not count'
+                    )
+
+
+def _room_patterns(rule: Rule) -> Iterator[str]:
+    for element in elements(rule.formula):
+        if element.place is not None:
+            yield element.place
+        row = by_event(element.kind)
+        if row is not None and row.is_drive:
+            yield from patterns(element.text)

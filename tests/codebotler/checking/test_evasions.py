@@ -1,0 +1,122 @@
+"""How programs could evade rules: by other names of a room, and inside skills of the user's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from codebotler.checking.evasions import evasions
+from codebotler.core.errors import UserError
+from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.paper import SKILLS
+from codebotler.rtl import parse
+from codebotler.simulator.rule_guard import Rule
+
+BOTH = "bob's office|accounting"
+
+
+def rule(formula: str, name: str = "bob") -> Rule:
+    return Rule(name, "Keep out.", parse(formula))
+
+
+# --- rooms
+
+
+@pytest.mark.parametrize(
+    ("formula", "room"),
+    [
+        ('not tr.Exists(goto("^bob\'s office$"))', BOTH),
+        ('not tr.Exists(goto("^(bob\'s office|accounting)$"))', BOTH),
+        ('not tr.Exists(goto("accounting$|^bob\'s office$"))', "(bob's office|accounting)"),
+        ('not tr.Exists(at("^accounting$", say(".*")))', BOTH),
+        ('not tr.Exists(goto("^lab 3$"))', "lab [0-9]"),
+        ('not tr.OnlyAfterLast(goto("^lab 3$")).Exists(pick(".*"))', "lab [0-9]"),
+        ('not tr.Last(goto(".*")) or tr.Last(goto(words("^accounting$")))', BOTH),
+        ('not tr.ActAtSome("^accounting$", say(".*"))', BOTH),
+    ],
+)
+def test_an_anchor_that_other_words_evade_is_refused(formula: str, room: str) -> None:
+    with pytest.raises(UserError) as caught:
+        list(evasions([rule(formula)], ["hall", room], SKILLS))
+    assert '"bob"' in caught.value.sentence
+    assert room in caught.value.sentence
+
+
+@pytest.mark.parametrize(
+    ("formula", "room"),
+    [
+        ('not tr.Exists(goto("bob\'s office"))', BOTH),
+        ('not tr.Exists(goto("^hall$"))', BOTH),
+        ('not tr.Exists(goto("^bob\'s office$"))', "bob's office"),
+        ('not tr.Exists(goto("^acme inc[.]$"))', "acme inc."),
+        ('not tr.Exists(goto("^lab$"))', "^lab$"),
+        ('not tr.Exists(goto(r"\\bbob\'s office\\b"))', BOTH),
+        ('not tr.Exists(goto("^.*$"))', BOTH),
+        ('not tr.Exists(goto(".*"))', "lab [0-9]"),
+        ('not tr.Exists(say("^accounting$"))', BOTH),
+    ],
+)
+def test_what_no_words_evade_is_accepted(formula: str, room: str) -> None:
+    assert list(evasions([rule(formula)], ["hall", room], SKILLS)) == []
+
+
+@pytest.mark.parametrize(
+    ("formula", "room", "missed"),
+    [
+        ('not tr.Exists(goto("lab 3"))', "lab [0-9]", "lab 0"),
+        ('not tr.Exists(at("bob\'s office", say(".*")))', "(bob's|robert's) office", "robert's office"),
+    ],
+)
+def test_a_room_that_is_named_by_some_of_its_names_is_told(formula: str, room: str, missed: str) -> None:
+    (told,) = evasions([rule(formula)], ["hall", room], SKILLS)
+    assert room in told
+    assert f'"{missed}"' in told
+
+
+# --- skills
+
+HEAD = "from codebotler import Simulation, skill\n"
+DRIVES = 'def tour(sim: Simulation, room: str) -> None:\n    "Tour."\n    sim.drive(room)\n'
+HANDS_ON = (
+    "def lead(it, room):\n    it.drive(room)\n\n@skill\n"
+    'def tour(sim: Simulation, room: str) -> None:\n    "Tour."\n    lead(sim, room)\n'
+)
+NESTED = (
+    'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    def go() -> None:\n'
+    "        sim.drive(room)\n    go()\n"
+)
+NAMED = 'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    getattr(sim, "drive")(room)\n'
+HARMLESS = 'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    sim.truth(sim.room + room)\n'
+LOOKS = 'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    sim.look(room)\n'
+BY_LOT = "def tour(sim: Simulation, room: str) -> None: 'Tour.'\n"
+NO_VAULT, NO_KNIFE = 'not tr.Exists(goto("vault"))', 'not tr.Exists(pick("knife"))'
+
+
+@pytest.mark.parametrize(
+    ("code", "formulas", "is_told"),
+    [
+        ("@skill\n" + DRIVES, [NO_VAULT], True),
+        ("@skill\n" + DRIVES, [NO_KNIFE], False),
+        ("@skill\n" + DRIVES, [NO_VAULT, 'not tr.Exists(tour("vault"))'], False),
+        ("@skill(event=None)\n" + DRIVES, [NO_VAULT], True),
+        (HANDS_ON, [NO_VAULT], True),
+        (HANDS_ON, [NO_KNIFE], True),
+        ("@skill\n" + NESTED, [NO_VAULT], True),
+        ("@skill\n" + NAMED, [NO_VAULT], True),
+        ("@skill\n" + HARMLESS, [NO_VAULT, NO_KNIFE], False),
+        ("@skill\n" + LOOKS, [NO_VAULT], False),
+        ("@skill\n" + LOOKS, ['not tr.Exists(missed("mug"))'], True),
+        ("@skill\n" + BY_LOT, [NO_VAULT], False),
+        ("@skill(names='room')\n" + BY_LOT, [NO_VAULT], True),
+    ],
+)
+def test_an_own_skill_that_may_do_what_rules_forbid_is_told(
+    tmp_path: Path, code: str, formulas: list[str], *, is_told: bool
+) -> None:
+    (tmp_path / "own.py").write_text(HEAD + code)
+    skills = skills_from(tmp_path / "own.py")
+    rules = [Rule(f"r{n}", "So it is.", parse(text, skills=skills)) for n, text in enumerate(formulas)]
+    told = list(evasions(rules, (), skills))
+    assert len(told) == is_told
+    assert all('"tour"' in sentence for sentence in told)
