@@ -8,11 +8,11 @@ from collections.abc import Iterator, Sequence
 from textwrap import dedent
 
 from codebotler.core.errors import UserError
+from codebotler.core.labels import PLAIN
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.trace import Names
-from codebotler.core.world_file import PLAIN
 from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
