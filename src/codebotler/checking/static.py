@@ -36,7 +36,7 @@ def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> TextFin
     try:
         compiles, problems = _findings(program, room_map, _without_functions(skills))
     except IsolatedCallError as error:
-        message = f"the program takes too long, or too much memory, to be read ({error.message})"
+        message = f"the program cannot be read: {error.message}"
         return TextFindings(compiles=False, problems=(Problem(error.kind, message),))
     return TextFindings(compiles, tuple(Problem(*each) for each in problems))
 

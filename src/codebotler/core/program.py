@@ -25,7 +25,7 @@ from codebotler.core.skills.table import Parameter, Skill, SkillTable
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
-LONGEST = 50_000  # characters of a program that is parsed: at most half a second
+LONGEST = 20_000  # characters of a program that is parsed: at most a tenth of a second
 MOST_NAMES, LONGEST_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
 ALIKE = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
 GIVEN = ("time", "sys")  # modules that every program finds imported

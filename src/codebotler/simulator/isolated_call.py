@@ -136,6 +136,9 @@ class ClosedProcess:
         self._channel = IsolatedProcess(
             lambda: self._process.pid, ours, self._process.wait, has_seccomp=False
         )
+        if self._channel.receive_bytes(len(RESULT)) != RESULT:
+            self.end()
+            raise LostProcessError("a closed process does not start")
 
     def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - whatever the function returns
         """Call a function, and return its result."""
@@ -205,6 +208,7 @@ def serve(module: str, descriptor: str) -> NoReturn:
     os.dup2(int(descriptor), CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     enclose(seccomp, round(time.process_time()) + CPU_SECONDS)
+    send_frames([RESULT])  # ready
     while True:
         name, call = receive_at_once()
         send_frames([_answer(functions[name], call)])

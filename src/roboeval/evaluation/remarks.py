@@ -22,9 +22,8 @@ def remarks_on(
 ) -> list[str]:
     """Return sentences that explain a run beside its failed checks; events of the trace have their places."""
     remarks = []
-    is_whole = verdict.get("cut") is None
-    if verdict["status"] == Status.TIMEOUT and is_whole and (cycle := cycle_at_end(trace)) is not None:
-        remarks.append(cycle.sentence)
+    if verdict["status"] == Status.TIMEOUT and (cycle := cycle_at_end(trace)) is not None:
+        remarks.append(cycle.sentence if verdict.get("cut") is None else cycle.sentence_at_least)
     if not verdict["satisfied"] and world is not None and rules is not None:
         remarks += misplaced_questions(trace, world, rules)
     return remarks
@@ -47,6 +46,11 @@ class Cycle:
         those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
         deeds = ", ".join(few([*map(_deed, self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
+
+    @property
+    def sentence_at_least(self) -> str:
+        """The same of a trace of which only the first part was kept."""
+        return self.sentence.replace(" times: ", " times or more: ", 1)
 
 
 def cycle_at_end(trace: Trace) -> Cycle | None:

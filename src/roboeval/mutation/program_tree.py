@@ -61,7 +61,7 @@ def read(program: str) -> ProgramTree | None:
         return (
             None if isinstance(tree, Flaw) or not compiles(program) else ProgramTree(tree, ast.unparse(tree))
         )
-    except RecursionError:
+    except (RecursionError, ValueError):  # nested too deeply, or a number with too many digits
         return None
 
 
@@ -103,7 +103,7 @@ def changed(program: ProgramTree, edit: Edit) -> str | None:
     """The text of an edited program; None if it no longer compiles, such as with a stray `break`."""
     try:
         text = ast.unparse(ast.fix_missing_locations(rewritten(program.tree, edit)))
-    except RecursionError:
+    except (RecursionError, ValueError):
         return None
     return text if compiles(text) else None
 

@@ -13,6 +13,7 @@ from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Groups, Picture, Prose, Section, Sheet, note, section, sheet
+from roboeval.suites.task import check_label
 
 MOST, FEWEST, ALTOGETHER = 100, 4, 200  # groups to show of a run, and of all runs
 MOST_REVERSALS = 100  # groups of each run
@@ -100,7 +101,8 @@ def groups_sheet(every: Sequence[tuple[str, Cluster]]) -> Sheet:
 
 
 def _cells(one: Cluster) -> list[Cell]:
-    ground = [one.failure[name] for name in ("class", "kind", "check")]
+    check = one.failure["check"]
+    ground = [one.failure["class"], one.failure["kind"], check and check_label(check)]
     return [one.task, *ground, one.why, name_of(one.representative)]
 
 

@@ -43,9 +43,10 @@ TAKES_BACK = (
     r" (all |any )?(of )?(it|that|this|what i)\b"
     r"|\b(that|this|it|which|all|everything)( i said)?(\Ws| is| was| were)( all)?"
     r" (not (true|right)|a lie|false|wrong|untrue|a joke)\b"
-    r"|\b(that|this|it) (is|was)n\Wt (true|right)\b"
+    r"|\b(that|this|it) (is|was)n\Wt (true|right)\b|^\W*not (true|right)\b|\bincorrect\b"
+    r"|\b(never mind|do ?n\Wt believe me|do not believe me|disregard my|ignore my|april fool)\b"
     r"|\bi (lied|was (lying|wrong)|(take|made) (it|that|this|all) (back|up))\b"
-    r"|\b(just|only) (kidding|joking)\b"
+    r"|\b(just|only|was) (kidding|joking)\b"
 )
 
 Choice: TypeAlias = Name | Annotated[list[Name], Field(min_length=1)]

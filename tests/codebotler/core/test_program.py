@@ -122,10 +122,10 @@ def test_a_misspelt_name_is_told_with_the_one_that_may_be_meant(lines: list[str]
 
 
 def test_many_undefined_names_are_quickly_told() -> None:
-    bound = "".join(f"    name_{n}_bound = 1\n" for n in range(600))
-    used = "".join(f"    say(name_{n}_bond)\n" for n in range(600))
+    bound = "".join(f"    name_{n}_bound = 1\n" for n in range(300))
+    used = "".join(f"    say(name_{n}_bond)\n" for n in range(300))
     found = flaws(f"def task_program():\n{bound}{used}")
-    assert len(found) == 600
+    assert len(found) == 300
     assert 0 < sum("did you mean" in flaw.message for flaw in found) <= 10
 
 

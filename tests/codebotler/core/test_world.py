@@ -1,4 +1,3 @@
-import re
 import time
 from dataclasses import replace
 from itertools import combinations
@@ -9,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.errors import UserError
+from codebotler.core.labels import check_label
 from codebotler.core.world import HALLWAY, Person, Room, World, laid_out
 from codebotler.core.world_file import WorldFile
 from codebotler.core.yaml_files import YamlFile
@@ -184,10 +184,10 @@ def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
     assert (error.value.file, error.value.line) == (path, 1)
 
 
-def is_regex(text: str) -> bool:
+def is_label(text: str) -> bool:
     try:
-        re.compile(text)
-    except (re.error, OverflowError):
+        check_label(text)
+    except ValueError:
         return False
     return True
 
@@ -197,7 +197,7 @@ TEXTS = st.text(
 ) | st.sampled_from(
     ["no", "yes", "3", "null", "~", "=", "<<", "a: b", "# a", "2001-01-01", "\ta\n b ", "1e3"]
 )
-REGEXES = TEXTS.filter(is_regex)
+REGEXES = TEXTS.filter(is_label)
 NAMES = REGEXES.filter(bool)
 METRES = st.floats(-1e6, 1e6)
 POINTS = st.tuples(METRES, METRES)

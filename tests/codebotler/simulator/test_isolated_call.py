@@ -150,7 +150,7 @@ def nested_returns(depth: int = 4, returns: int = 30) -> str:
     return "\n".join([*lines, f"{pad}pass", ""])
 
 
-def redefinitions(count: int = 2_700) -> str:
+def redefinitions(count: int = 1_050) -> str:
     """A program that pyflakes reads in quadratic time."""
     return "if 1:\n" + "    def f(): pass\n" * count
 
