@@ -42,6 +42,7 @@ _ASIDE = re.compile(
     re.IGNORECASE,
 )
 _THERE = re.compile(r"\s*(?:there|it)\b", re.IGNORECASE)
+_THERE_IS = re.compile(r"\bthere(?: is| are| was| were|['\u2019]s)\b", re.IGNORECASE)
 _POSSESSES = r"(?:has|have|had|got|with|contains?)"
 _HAS = re.compile(rf"\b{_POSSESSES}\b", re.IGNORECASE)
 _NO_THING = re.compile(rf"\W*no\s+(?!{_POSSESSES}\b)\w+\W*", re.IGNORECASE)
@@ -241,6 +242,8 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
     contrasts = [at for at, joint in enumerate(joints) if at and joint not in (",", "and")]
     if contrasts and (done or not (_PLACE.match(waiting[0].text) or joints[-1] in ("however", "though"))):
         return contrasts[-1]
+    if done and joints[0] not in (",", "and"):  # what follows a contrast is none of what comes before it
+        return 0
     may_list = bool(done) and _STATE.search(done[-1][-NEAR:]) is None
     has_no_subject = _NO_SUBJECT.match(part.text) is not None and (may_list or joints[-1] == "and")
     if done and (has_no_subject or _SUBJECT.match(part.text)):
@@ -253,9 +256,11 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
 
 
 def _belong(waiting: Sequence[_Part], part: str) -> bool:
-    """Whether the words before a clause with a subject belong to it: `in room 3, there is one`."""
-    asked = any(_ASKED.search(name.text) for name in waiting)
-    return asked or (bool(_PLACE.match(waiting[-1].text)) and bool(_THERE.match(part)))
+    """Whether the words before a clause belong to it: `in room 3, there is one`."""
+    if any(_ASKED.search(name.text) for name in waiting):
+        return True
+    is_place_after = bool(_PLACE.match(waiting[-1].text)) and bool(_THERE.match(part))
+    return is_place_after or (bool(_PLACE.match(waiting[0].text)) and bool(_THERE_IS.search(part)))
 
 
 def _is_item(part: str) -> bool:

@@ -63,5 +63,5 @@ def test_few_are_read_otherwise() -> None:
         "claims": 150,
         "numbers": 100,
         "times": 50,
-        "contrasts": 115,
+        "contrasts": 121,
     }
