@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from codebotler.core.program import TASK, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
 from roboeval.evaluation.runs.completions import Key, name_of
-from roboeval.evaluation.runs.judged import JudgedRun
+from roboeval.evaluation.runs.judged import RunEvaluation
 from roboeval.evaluation.runs.rows import RowData, key_of
 
 Lines: TypeAlias = tuple[str, ...]
@@ -74,7 +74,7 @@ def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[
     return [rows for _, _, rows in sorted(placed, key=lambda one: one[:2])]
 
 
-def clusters(groups: Iterable[Sequence[RowData]], results: JudgedRun) -> Iterator[Cluster]:
+def clusters(groups: Iterable[Sequence[RowData]], results: RunEvaluation) -> Iterator[Cluster]:
     """Say of each group why it fails and what would have helped."""
     programs = results.programs
     right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
@@ -98,7 +98,7 @@ def clusters(groups: Iterable[Sequence[RowData]], results: JudgedRun) -> Iterato
         )
 
 
-def nearest_fix(results: JudgedRun, key: Key) -> Fix | None:
+def nearest_fix(results: RunEvaluation, key: Key) -> Fix | None:
     """What turns one completion into one that passes; None if its program is gone or no other passes."""
     programs = results.programs
     if key not in programs:

@@ -18,11 +18,11 @@ from roboeval.cli.output import fail, note, watched
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.judged import JudgedRun
+    from roboeval.evaluation.runs.judged import RunEvaluation
     from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
 
-    Judged = TypeVar("Judged", bound=JudgedRun)
+    Judged = TypeVar("Judged", bound=RunEvaluation)
 
 
 # --- what a shell completes
@@ -253,12 +253,12 @@ def open_run(
 
 def open_completion(
     run: Path, name: str, suite_name: str, *, ablated: bool, rules: Path | None = None
-) -> tuple[JudgedRun, str]:
+) -> tuple[RunEvaluation, str]:
     """Read a judged run as `open_run` does, but only the task of one completion, without a table."""
     from roboeval.evaluation.runs.judged import read_judged
     from roboeval.evaluation.runs.selection import parse_selection
 
-    def read(run: Run, key: str, suite: Suite, **how: Any) -> JudgedRun:  # noqa: ANN401 - as it is called
+    def read(run: Run, key: str, suite: Suite, **how: Any) -> RunEvaluation:  # noqa: ANN401 - as it is called
         task = parse_selection(name, suite).key[0]
         return read_judged(run, key, suite, task=task, **how)
 
@@ -311,7 +311,7 @@ def open_current(
     return opened
 
 
-def complaint_of(results: JudgedRun) -> str | None:
+def complaint_of(results: RunEvaluation) -> str | None:
     """A sentence about rows that judge other programs than stand in the run now; None without such rows."""
     from roboeval.evaluation.runs.completions import name_of
 
@@ -322,7 +322,7 @@ def complaint_of(results: JudgedRun) -> str | None:
     return f"{name_of(stale[0])} {judge} another program than stands in {results.run.completions} now"
 
 
-def unfinished_of(results: JudgedRun) -> str | None:
+def unfinished_of(results: RunEvaluation) -> str | None:
     """A clause about completions that are not judged yet; None without such completions."""
     from roboeval.evaluation.runs.completions import how_many
 
@@ -330,7 +330,7 @@ def unfinished_of(results: JudgedRun) -> str | None:
     return None if count >= total else f"{count:,} of {how_many(total)} judged"
 
 
-def _to_go_on(results: JudgedRun, suite: Suite) -> list[str]:
+def _to_go_on(results: RunEvaluation, suite: Suite) -> list[str]:
     """Options with which a command goes on with an evaluation."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 

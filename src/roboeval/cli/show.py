@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from roboeval.analysis.summary import Summary
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.judged import JudgedRun
+    from roboeval.evaluation.runs.judged import RunEvaluation
     from roboeval.evaluation.runs.results import Results
     from roboeval.evaluation.runs.selection import Selection
     from roboeval.suites.load import Suite
@@ -150,7 +150,7 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 
 
 def show_completion(
-    judged: JudgedRun, selection: Selection, suite: str, *, in_full: bool, as_json: bool
+    judged: RunEvaluation, selection: Selection, suite: str, *, in_full: bool, as_json: bool
 ) -> None:
     """Print a completion, and the command that shows the program nearest to one that fails."""
     from codebotler.core.words import counted

@@ -18,7 +18,7 @@ from roboeval.suites.load import ABLATED, Suite
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class JudgedRun:
+class RunEvaluation:
     """One evaluation of a run, without its table."""
 
     run: Run
@@ -90,7 +90,7 @@ def unwatched(lines: Iterator[Line], _total: int) -> Iterable[Line]:
 
 def read_judged(
     run: Run, key: str, suite: Suite | None = None, *, task: str, watch: Watch = unwatched
-) -> JudgedRun:
+) -> RunEvaluation:
     """Read what an evaluation of a run says of one task, without its table; raise what is wrong."""
 
     def wanted(line: bytes) -> bool:
@@ -111,7 +111,7 @@ def read_judged(
             stale.append(row.key)
 
     head, places = read_rows(run, key, completions, add, watch=watch, wanted=wanted)
-    return JudgedRun(
+    return RunEvaluation(
         run=run,
         key=key,
         suite=suite,

@@ -14,7 +14,7 @@ import polars as pl
 from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.completions import Key
 from roboeval.evaluation.runs.folder import Run, evaluation_of
-from roboeval.evaluation.runs.judged import JudgedRun, Watch, read_rows, read_written, unwatched
+from roboeval.evaluation.runs.judged import RunEvaluation, Watch, read_rows, read_written, unwatched
 from roboeval.evaluation.runs.rows import JudgedRow, RowData, add_or_raise, read_checks
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
@@ -54,7 +54,7 @@ def load_results(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Results(JudgedRun):
+class Results(RunEvaluation):
     """One evaluation of a run, with its table."""
 
     table: pl.DataFrame  # as `load_results` gives it

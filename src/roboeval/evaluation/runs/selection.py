@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from roboeval.evaluation.runs.completions import Key
-from roboeval.evaluation.runs.judged import JudgedRun
+from roboeval.evaluation.runs.judged import RunEvaluation
 from roboeval.suites.load import Suite
 
 
@@ -28,7 +28,7 @@ class Selection:
         assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - one thing
         return self.task, self.prompt, self.index
 
-    def expect_judged(self, judged: JudgedRun) -> None:
+    def expect_judged(self, judged: RunEvaluation) -> None:
         """Raise UserError if nothing of this part was judged."""
         wanted = self.task, self.prompt, self.index
         if not any(all(w in {None, h} for w, h in zip(wanted, key, strict=True)) for key in judged.places):
