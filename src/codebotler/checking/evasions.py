@@ -18,7 +18,7 @@ from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.rule_guard import DRIVE, Rule
-from codebotler.simulator.rules import found_in
+from codebotler.simulator.rules import resolve_room
 
 ACTS = {"drive": DRIVE, "take": "pick", "put": "place", "look": "check", "ask": "ask"}
 """What a skill can do to a robot, and the kind of event that it is."""
@@ -41,18 +41,18 @@ def evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) ->
 
 
 def _unseen_skills(rules: Sequence[Rule], skills: SkillTable) -> Iterator[str]:
-    """A sentence for each own skill that may do inside what a rule speaks of, and that no rule names."""
+    """A sentence for each own skill that may do inside what a rule speaks of that does not name it."""
     kinds = {
         rule.name: {one.kind for one in elements(rule.formula)} for rule in rules if rule.when == "always"
     }
     for name, row in skills.items():
         done = set() if name in SKILLS else acts_inside(row)
-        evaded = [rule for rule, spoken_of in kinds.items() if done & spoken_of]
-        is_named = row.recording is not None and any(row.recording.kind in each for each in kinds.values())
-        if evaded and not is_named:
+        own = "" if row.recording is None else row.recording.kind
+        evaded = [rule for rule, spoken_of in kinds.items() if done & spoken_of and own not in spoken_of]
+        if evaded:
             yield (
                 f'while a robot moves, rules such as "{evaded[0]}" do not see inside the skill "{name}"; '
-                "write a rule that names it"
+                "name it in the rule as well"
             )
 
 
@@ -82,13 +82,17 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
         UserError: a rule names such a room with `^` or `$`, so that any further word of a request evades it.
     """
     regexes = [room for room in rooms if not PLAIN.fullmatch(room)]
+
+    def leads_to(room: str, request: str) -> bool:
+        return resolve_room(rooms, request) == room
+
     for rule in rules:
         for pattern in dict.fromkeys(_room_patterns(rule) if regexes else ()):
             for room in regexes:
                 text = Regex(pattern)
-                requests = [one for one in (*samples(room), *samples(pattern)) if found_in(room, one)]
+                requests = [one for one in (*samples(room), *samples(pattern)) if leads_to(room, one)]
                 matching = [one for one in requests if text.matches(Names(one, room))]
-                longer = [f"x {one} x" for one in matching if found_in(room, f"x {one} x")]
+                longer = [f"x {one} x" for one in matching if leads_to(room, f"x {one} x")]
                 if not all(text.matches(Names(one, room)) for one in longer):
                     raise UserError(
                         f'the rule "{rule.name}" names a room with ^ or $, '

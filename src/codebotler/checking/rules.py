@@ -73,6 +73,8 @@ class RuleFile(BaseModel):
         """The formula, or that of each name joined by `and`."""
         if self.for_each is not None and EACH not in text:
             raise file.wrong(f'"for_each" needs {EACH} in the formula, where its names belong', *at)
+        if self.for_each is None and EACH in text:
+            raise file.wrong(f'{EACH} in a formula needs "for_each" with the names that belong there', *at)
         parts = [_parsed(text.replace(EACH, name), file, at, skills) for name in self.for_each or [EACH]]
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 

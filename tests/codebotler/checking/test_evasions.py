@@ -98,7 +98,8 @@ NO_VAULT, NO_KNIFE = 'not tr.Exists(goto("vault"))', 'not tr.Exists(pick("knife"
     [
         ("@skill\n" + DRIVES, [NO_VAULT], True),
         ("@skill\n" + DRIVES, [NO_KNIFE], False),
-        ("@skill\n" + DRIVES, [NO_VAULT, 'not tr.Exists(tour("vault"))'], False),
+        ("@skill\n" + DRIVES, [NO_VAULT, 'not tr.AtLeast(tour(".*"), 4)'], True),
+        ("@skill\n" + DRIVES, [f'{NO_VAULT} and not tr.Exists(tour("vault"))'], False),
         ("@skill(event=None)\n" + DRIVES, [NO_VAULT], True),
         (HANDS_ON, [NO_VAULT], True),
         (HANDS_ON, [NO_KNIFE], True),
@@ -120,3 +121,8 @@ def test_an_own_skill_that_may_do_what_rules_forbid_is_told(
     told = list(evasions(rules, (), skills))
     assert len(told) == is_told
     assert all('"tour"' in sentence for sentence in told)
+
+
+def test_room_that_requests_reach_before_one_with_a_regex_may_be_named_with_anchors() -> None:
+    rooms = ["hall", "lab 1", "lab|workshop"]
+    assert list(evasions([rule('not tr.Exists(goto("^lab 1$"))')], rooms, SKILLS)) == []
