@@ -21,7 +21,7 @@ from codebotler.simulator.rule_guard import DRIVE, Rule
 from codebotler.simulator.rules import resolve_room
 
 ACTS = {"drive": DRIVE, "take": "pick", "put": "place", "look": "check", "ask": "ask"}
-"""What a skill can do to a robot, and the kind of event that it is."""
+"""The kind of event that each method of a simulated robot adds."""
 HARMLESS = {"room", "rooms", "state", "outcome", "truth", "fail"}
 
 

@@ -25,7 +25,7 @@ EXAMPLE = "def task_program():\n    if is_in_rom('mug'):\n        say('a mug')\n
 
 @dataclass(frozen=True)
 class TextFindings:
-    """What the text of a program shows without a run."""
+    """The certain errors of a program, found in its text without a run."""
 
     compiles: bool
     problems: tuple[Problem, ...]

@@ -238,7 +238,7 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
 
 
 def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """What is certainly wrong with a program, by line; it is compiled, and not run.
+    """Find the certain errors of a program, by line; it is compiled, and not run.
 
     Args:
         source: its text, from a trusted author or in a closed process.

@@ -65,7 +65,7 @@ def completion_data(
 
 
 def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None:
-    """What a suite says in a prompt, whatever a model was given; None if it has no such prompt."""
+    """Return the suite's own text of a prompt; None if it has no such prompt."""
     prompts = () if suite is None or task not in suite.tasks else suite.tasks[task].prompts
     return prompts[prompt] if prompt < len(prompts) else None
 

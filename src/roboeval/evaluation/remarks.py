@@ -42,7 +42,7 @@ class Cycle:
 
     @property
     def sentence(self) -> str:
-        """What was repeated, from which step on, and how often."""
+        """The repeated steps, the first of them, and how often they were repeated."""
         those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
         deeds = ", ".join(few([*map(_deed, self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."

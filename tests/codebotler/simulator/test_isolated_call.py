@@ -18,6 +18,7 @@ from codebotler.core import program as programs
 from codebotler.core.program import FILE, LONGEST
 from codebotler.prompts.extract import program_in, program_of
 from codebotler.simulator.isolated_call import IsolatedCallError, end_all
+from codebotler.simulator.worker import EngineError
 from roboeval.mutation.program_tree import changed, read
 from roboeval.training.rollouts import Rollout, judge
 
@@ -78,6 +79,13 @@ def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
     with pytest.raises(KeyboardInterrupt):
         call()
     assert closed.echo("a") == ["a"]
+
+
+def test_process_that_cannot_start_is_no_fault_of_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    end_all()
+    monkeypatch.setattr("codebotler.simulator.isolated_call.CODE", "raise SystemExit(1)")
+    with pytest.raises(EngineError):
+        closed.echo("a")
 
 
 def test_threads_call_at_the_same_time() -> None:
