@@ -62,7 +62,7 @@ class CompletionsModel:
         if finish_reason is None:
             raise broken_off(self.name, begun=bool(text))
         text = without_keys(text)
-        program = program_of(prompt.program_from(text)).source
+        program = program_of(prompt.program_from(text), continues=True).source
         return Reply(text, program, usage, time.monotonic() - start, finish_reason)
 
     async def close(self) -> None:

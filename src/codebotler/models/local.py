@@ -108,7 +108,9 @@ class LocalModel:
         text, usage, finish_reason = ending
         if rest := text[job.told :]:
             heard(rest)
-        program = program_of(text if self.is_chat else prompt.program_from(text)).source
+        program = program_of(
+            text if self.is_chat else prompt.program_from(text), continues=not self.is_chat
+        ).source
         return Reply(text, program, usage, time.monotonic() - start, finish_reason)
 
     async def close(self) -> None:

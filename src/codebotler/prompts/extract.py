@@ -16,24 +16,50 @@ from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 HELPER_ROUNDS = 20  # helpers of helpers, of which a reply to one instruction has two or three
 
 
-def program_of(reply: str) -> Program:
-    """The program in a model's whole reply.
-
-    Of several versions in code fences, the last complete one counts. Thoughts between `<think>` and
-    `</think>` are left out. Whole lines are kept or dropped: only what is certainly no code, and a next
-    example that a base model went on to write, is dropped. A program that was cut off stays cut off.
+@dataclass(frozen=True)
+class ReplyContent:
+    """What a model's reply holds.
 
     Args:
-        reply: code with or without fences and prose, or the indented body of `task_program` alone. One that
-            takes seconds to read is taken for the program as it is.
+        program: the text of the program; the rest of the reply where there is none.
+        reasoning: what the model thought aloud between markers; empty where it did not.
+        has_code: whether any of it, thoughts aside, may be code; False is certain.
+    """
+
+    program: str
+    reasoning: str
+    has_code: bool
+
+
+def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
+    """Find the program, the reasoning and any code in a model's whole reply; see `program_of`.
 
     Raises:
         EngineError: no isolated process can be started.
     """
     try:
-        return Program(extract(reply))
+        return ReplyContent(*extract(reply, continues))
     except IsolatedCallError:
-        return Program(reply)
+        return ReplyContent(reply, "", has_code=True)
+
+
+def program_of(reply: str, *, continues: bool = False) -> Program:
+    """The program in a model's whole reply.
+
+    Of several versions, the last complete one counts. Thoughts between markers such as `<think>` and
+    `</think>` are left out. Whole lines are kept or dropped: only what is certainly no code is dropped. A
+    program that was cut off stays cut off.
+
+    Args:
+        reply: code with or without fences and prose, or the indented body of `task_program` alone. One that
+            takes seconds to read is taken for the program as it is.
+        continues: whether a base model wrote it, which goes on from the prompt: then the first version
+            counts, and a next example that follows it is dropped.
+
+    Raises:
+        EngineError: no isolated process can be started.
+    """
+    return Program(read_reply(reply, continues=continues).program)
 
 
 def program_in(text: str) -> str:
@@ -57,16 +83,17 @@ def defines_task(text: str) -> bool:
 @isolated(
     "Here it is:\n```python\ndef task_program():\n    greet()\n```\n```\ndef greet():\n    say('hello')\n```"
 )
-def extract(reply: str) -> str:
-    """The text of the program in a reply."""
+def extract(reply: str, continues: bool = False) -> tuple[str, str, bool]:
+    """The text of the program in a reply, the reasoning, and whether there is any code."""
     lines = re.split(r"\r\n|\r|\n", reply)
     tree = _tree(lines)
     if tree is not None and len(entries(tree)) <= 1 and TASK in bound_names("\n".join(lines)):
-        return _joined([lines])
-    reply = _without_thoughts("\n".join(lines))
-    blocks = [*_blocks(reply.split("\n"))]
+        return _joined([lines]), "", True
+    answer, reasoning = _without_thoughts("\n".join(lines))
+    blocks = [*_blocks(answer.split("\n"))]
     chosen = _chosen(blocks)
-    return reply if chosen is None else _with_helpers(chosen, blocks)
+    program = answer if chosen is None else _with_helpers(chosen, blocks)
+    return program, reasoning, bool(blocks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,17 +145,21 @@ _PROSE = re.compile(
 _INTERJECTION = re.compile(r" ?[A-Z][a-z]+\s*$")
 
 
-def _without_thoughts(reply: str) -> str:
-    """The reply without thoughts; tags in a fence are code, unless the fence itself is in a thought."""
+def _without_thoughts(reply: str) -> tuple[str, str]:
+    """The reply without thoughts, and these; tags in a fence are code, unless the fence is in a thought."""
     kept = ""
+    thoughts = []
     start = 0
     for found in _ASIDE.finditer(reply):
         if found["thought"]:
             kept += reply[start : found.start()]
+            thoughts.append(re.sub(r"(?i)</?think(?:ing)?>", "", found["thought"]).strip())
         elif not found["end"] or start:
             continue
+        else:
+            thoughts.append(reply[: found.start()].strip())
         start = found.end()
-    return kept + reply[start:]
+    return kept + reply[start:], "\n\n".join(thoughts)
 
 
 # --- from lines to blocks of code

@@ -274,7 +274,7 @@ def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyP
     def work(number: int) -> int:
         read.clear()
         chain = [f"def f{i}():\n    return f{i + 1}()\n" for i in range(number)]
-        assert extract.function(blocks(USES_HELPER, "rooms = f0\n", *chain)).startswith(USES_HELPER)
+        assert extract.function(blocks(USES_HELPER, "rooms = f0\n", *chain))[0].startswith(USES_HELPER)
         return sum(read)
 
     monkeypatch.setattr("codebotler.prompts.extract.undefined_names", counted)
