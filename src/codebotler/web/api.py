@@ -136,7 +136,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         summary, events = _past(console, mission)
         file = io.BytesIO()
         folder = console.home / "missions" / summary.id
-        write_mcap(file, summary, events, folder=folder, clock=clock, skills=console.robot.skills)
+        write_mcap(file, summary, events, folder=folder, clock=clock)
         return _file(file.getvalue(), f"{summary.id}.mcap", "application/octet-stream")
 
 
