@@ -194,7 +194,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
         threading.Thread(target=session.stop, args=(by,), daemon=True).start()
         got.append(number)
         if len(got) > 1:
-            note(f"\nthe robot was told to stop; it has {GRACE:g} s to confirm")
+            note(f"\nasked the robot to stop; it has {GRACE:g} s to confirm")
 
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]
