@@ -6,19 +6,15 @@ import re
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from codebotler.cli.ending import STOPPED
+from codebotler.cli.model_options import model_settings, note_unsent, with_options_of
 from codebotler.cli.options import (
     BaseUrlOption,
-    MaxTokensOption,
     ModelOption,
-    SeedOption,
-    TemperatureOption,
-    TimeoutOption,
-    TopPOption,
 )
 from codebotler.core.errors import install_command
 from codebotler.core.words import counted
@@ -37,75 +33,92 @@ from roboeval.cli.options import (
     WorkersOption,
     command,
     load,
-    with_options_of,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.generate import Progress
+    from codebotler.models.base import Model
+    from roboeval.evaluation.generate import Pace, Progress
+    from roboeval.evaluation.requests import GenerationPlan
+    from roboeval.evaluation.runs.folder import Run
 
 
-def completed(
+class Requested(NamedTuple):
+    """A run, with the completions that it should have, and the model that writes them."""
+
+    run: Run
+    plan: GenerationPlan
+    model: Model
+    pace: Pace
+
+
+@with_options_of(model_settings)
+def requested(
     model: ModelOption = None,
     out: OutOption = None,
     num_completions: NumOption = 50,
-    temperature: TemperatureOption = 0.2,
-    top_p: TopPOption = 0.95,
-    max_tokens: MaxTokensOption = 512,
-    seed: SeedOption = None,
     suite: SuiteOption = "paper",
     tasks: TasksOption = None,
     concurrency: ConcurrencyOption = 8,
     requests_per_minute: RateOption = None,
     token_budget: BudgetOption = None,
-    timeout: TimeoutOption = 60.0,
     base_url: BaseUrlOption = None,
-) -> Path:
-    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
-    from codebotler.models.base import SamplingSettings
+    **sampling: Any,  # noqa: ANN401 - of several kinds
+) -> Requested:
+    """The run that options name, with the completions that it should have, and the model that writes them."""
     from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
-    from codebotler.models.recorded import NOTICE, is_recorded, recorded_model
-    from roboeval.evaluation.generate import Pace, generate_run
+    from codebotler.models.recorded import is_recorded, recorded_model
+    from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
 
     chosen = chosen_model(model, base_url)
-    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, chosen.base_url)
+    settings = chosen.with_its_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
     own = None if known.folder is None else known.folder / "solutions"  # which recorded models know as well
     knows_more = is_recorded(chosen.name) and chosen.base_url is None
     opened = recorded_model(chosen.name, own) if knows_more else open_model(chosen.name, settings)
+    note_unsent(settings, opened)
     run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", opened.name).strip("-.")))
+    return Requested(run, plan, opened, pace)
+
+
+def complete(requested: Requested) -> Path:
+    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
+    from codebotler.models.recorded import NOTICE, is_recorded
+    from roboeval.evaluation.generate import generate_run
+
+    run, plan, model, pace = requested
     meter = Meter()
     try:
         with meter:
-            progress = generate_run(run, plan, opened, settings, pace, on_progress=meter.show)
+            progress = generate_run(run, plan, model, pace, on_progress=meter.show)
     except KeyboardInterrupt:
         note(f"roboeval: {meter.after_a_stop()}")
         raise SystemExit(STOPPED) from None
     if progress.missing is not None:
         note(f"roboeval: {progress.missing}; the same command continues where it stopped")
         raise SystemExit(1)
-    if is_recorded(opened.name):
+    if is_recorded(model.name):
         note(NOTICE)
     return run.path
 
 
-@with_options_of(completed)
+@with_options_of(requested)
 def generate(*, suite: SuiteOption = "paper", **options: Any) -> None:  # noqa: ANN401 - of several kinds
     """Have a model write programs for a suite.
 
     After an interruption, the same command continues.
     """
-    path = completed(suite=suite, **options)
+    path = complete(requested(suite=suite, **options))
     note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
 
 
-@with_options_of(completed)
+@with_options_of(requested)
 def run(
     *,
     suite: SuiteOption = "paper",
@@ -125,7 +138,11 @@ def run(
     """
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
-    path = completed(suite=suite, tasks=tasks, **options)
+    from roboeval.evaluation.evaluate import expect_same_judge
+
+    what = requested(suite=suite, tasks=tasks, **options)
+    expect_same_judge(what.run, what.plan.suite)  # before anything is paid for
+    path = complete(what)
     evaluate(
         str(path),
         suite=suite,

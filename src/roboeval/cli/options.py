@@ -6,7 +6,6 @@ import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
-from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
@@ -148,18 +147,6 @@ BudgetOption = Annotated[
 
 
 Command = TypeVar("Command", bound=Callable[..., None])
-
-
-def with_options_of(called: Callable[..., object]) -> Callable[[Command], Command]:
-    """Give a command all options of a function to which it passes them on as `**options`."""
-
-    def extended(command: Command) -> Command:
-        inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
-        more = [one for name, one in own.items() if name not in inherited and one.kind is one.KEYWORD_ONLY]
-        command.__signature__ = Signature([*inherited.values(), *more])  # type: ignore[attr-defined]  # of a function
-        return command
-
-    return extended
 
 
 # --- what a user names
