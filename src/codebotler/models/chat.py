@@ -20,19 +20,11 @@ from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provi
 from pydantic_ai.settings import ModelSettings
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import (
-    DEMANDED_MAX_TOKENS,
-    Heard,
-    ModelError,
-    Reply,
-    SamplingSettings,
-    Usage,
-    reply_from,
-    unheard,
-)
+from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, unheard
 from codebotler.models.http_client import bound, cannot_open, limit_of, with_proxy, without_proxy
 from codebotler.models.keys import blank_is_unset, guard_logs, key_in, without_keys
 from codebotler.models.openai_stream import Chunks, make_lenient
+from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import (
     broken_off,
     error_in_reply,
@@ -132,18 +124,16 @@ class ChatModel:
         )
 
     def _error(self, error: Exception) -> ModelError:
-        is_hopeless = isinstance(
-            error, exceptions.ModelRequestRejectedError | exceptions.ModelQuotaExceededError
-        )
+        is_out_of_money = isinstance(error, exceptions.ModelQuotaExceededError)
         match error:
             case exceptions.ModelTimeoutError() | exceptions.ModelRequestTimeout():
                 return timed_out(self.name, self.settings.timeout)
             case exceptions.ModelHTTPError(status_code=status, body=body, retry_after=wait):
-                return refused(self.name, status, body, retry_after=wait, hopeless=is_hopeless)
+                return refused(self.name, status, body, retry_after=wait, hopeless=is_out_of_money)
             case exceptions.ModelAPIError(__cause__=openai.APIError(body=body)) if body is not None:
                 return error_in_reply(self.name, body)
             case exceptions.ModelAPIError() | exceptions.ContentFilterError() | exceptions.UserError():
-                may_pass = isinstance(error, exceptions.ModelAPIError) and not is_hopeless
+                may_pass = isinstance(error, exceptions.ModelAPIError) and not is_out_of_money
                 nobody = unreachable(self.name, error, self.settings.base_url)
                 return nobody or failure(self.name, error, may_pass=may_pass)
             case exceptions.UnexpectedModelBehavior():
