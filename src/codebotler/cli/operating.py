@@ -190,6 +190,7 @@ def serve_page(
 
 def virtual_robot(
     world: Annotated[Path, typer.Option(help="The world file in which the robot lives.")],
+    ros: Annotated[int, typer.Option(min=1, max=2, help="The version of ROS.")] = 1,
     port: Annotated[
         int | None,
         typer.Option(
@@ -200,13 +201,13 @@ def virtual_robot(
         float, typer.Option(help="The speed of the robot's clock as a multiple of real time, such as 20.")
     ] = 1.0,
     ros_python: Annotated[
-        Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
+        Path, typer.Option(help="The Python that has rclpy, or rospy, actionlib and rosmaster.")
     ] = options.ROS_PYTHON,
     skills: options.SkillsOption = None,
 ) -> None:
-    """Offer a simulated robot's skills on ROS 1.
+    """Offer a simulated robot's skills on ROS 1 or 2.
 
-    It starts a ROS master if none answers; Ctrl-C ends it.
+    On ROS 1, it starts a master if none answers; Ctrl-C ends it.
     """
     from contextlib import suppress
 
@@ -220,11 +221,12 @@ def virtual_robot(
 
     table = skills_from(*(skills or ()))
     known = World.read(world, table)
-    robot = VirtualRobot(known, speed=speed, port=port, python=ros_python, show=show, skills=table)
+    robot = VirtualRobot(known, speed=speed, ros=ros, port=port, python=ros_python, show=show, skills=table)
     try:
         started = robot.start()
-        what = "a ROS master was started" if started else "joined the ROS master"
-        note(f"{what} at {robot.address}; the robot is ready, Ctrl-C ends it")
+        what = "a ROS master was started at" if started else "joined the ROS master at"
+        what = what if ros == 1 else "joined the ROS 2 graph with ROS_DOMAIN_ID"
+        note(f"{what} {robot.address}; the robot is ready, Ctrl-C ends it")
         robot.wait()
     finally:
         robot.stop()

@@ -1,4 +1,4 @@
-"""The virtual robot: a simulated one that offers its skills on a real ROS 1 graph."""
+"""The virtual robot: a simulated one that offers its skills on a real ROS graph."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
 from codebotler.robots.ros.robot import actions_of
 from codebotler.robots.ros.ros1 import master_uri
+from codebotler.robots.ros.ros2 import domain_of, python_of
 from codebotler.robots.ros.worker import Message, RosWorker
 from codebotler.robots.simulated import Simulated
 
@@ -27,18 +28,20 @@ HEARS = 3600.0  # seconds of one wait for messages
 class VirtualRobot:
     """A robot with one body: goals are executed one after the other.
 
-    If no master answers, it starts one that is reached from this machine only.
+    On ROS 1, it starts a master that is reached from this machine only if none answers; on ROS 2, it is
+    reached from this machine only unless ROS_AUTOMATIC_DISCOVERY_RANGE is set.
 
     Args:
         world: where it is.
         speed: seconds of its clock per real second; None if nothing takes real time.
-        port: of the master; None for that of ROS_MASTER_URI.
-        python: an interpreter that has rospy, and rosmaster if a master must be started.
+        ros: 1 or 2.
+        port: of the master of ROS 1; None for that of ROS_MASTER_URI.
+        python: an interpreter that has rclpy, or rospy, and rosmaster if a master must be started.
         show: called with a line for each goal and for its end.
         skills: what it offers.
 
     Raises:
-        UserError: the speed is out of range, or ROS_MASTER_URI is invalid.
+        UserError: the speed is out of range, or ROS_MASTER_URI or ROS_DOMAIN_ID is invalid.
     """
 
     def __init__(
@@ -46,6 +49,7 @@ class VirtualRobot:
         world: World,
         *,
         speed: float | None = 1.0,
+        ros: int = 1,
         port: int | None = None,
         python: Path = ROS_PYTHON,
         show: Callable[[str], None] = lambda _: None,
@@ -53,7 +57,11 @@ class VirtualRobot:
     ) -> None:
         self._skills = skills
         self._speed, self._python, self._show = speed, python, show
-        self.address = master_uri(f"http://localhost:{port}" if port else "")
+        if ros == 1:
+            self.address = master_uri(f"http://localhost:{port}" if port else "")
+        else:
+            self.address, self._python = domain_of(), python_of(python)
+        self._ros = ros
         self._body = self._at_start(world)
         self._goals: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
@@ -69,13 +77,7 @@ class VirtualRobot:
         Raises:
             NotReadyError: there is no ROS, or no master and none can be started.
         """
-        where = urlsplit(self.address)
-        port = where.port if where.hostname in HERE else None
-        environment = {"ROS_MASTER_URI": self.address}
-        if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
-            environment["ROS_HOSTNAME"] = "localhost"
-        start = {"node": NODE, "actions": actions_of(self._body.skills), "port": port}
-        worker = self._worker = RosWorker(self._python, "servers.py", start, environment)
+        worker = self._worker = self._ros1_servers() if self._ros == 1 else self._ros2_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
         ]
@@ -100,6 +102,22 @@ class VirtualRobot:
             self._worker.leave()
         for thread in self._threads:
             thread.join(HEARS)
+
+    def _ros1_servers(self) -> RosWorker:
+        where = urlsplit(self.address)
+        port = where.port if where.hostname in HERE else None
+        environment = {"ROS_MASTER_URI": self.address}
+        if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
+            environment["ROS_HOSTNAME"] = "localhost"
+        start = {"node": NODE, "actions": actions_of(self._body.skills), "port": port}
+        return RosWorker(self._python, "servers.py", start, environment)
+
+    def _ros2_servers(self) -> RosWorker:
+        environment = {"ROS_DOMAIN_ID": self.address}
+        if "ROS_AUTOMATIC_DISCOVERY_RANGE" not in os.environ:
+            environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        start = {"node": NODE, "actions": actions_of(self._body.skills)}
+        return RosWorker(self._python, "ros2_servers.py", start, environment)
 
     def _at_start(self, world: World) -> Simulated:
         body = Simulated(world, speed=self._speed, skills=self._skills)

@@ -8,6 +8,7 @@ import queue
 import select
 import signal
 import subprocess
+import sys
 import threading
 import time
 from collections import deque
@@ -16,12 +17,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, TypeAlias, cast
 
+from codebotler.core.terminal import note
 from codebotler.robots.base import NotReadyError
 
 Message: TypeAlias = dict[str, Any]
 
+FROM_WHEELS = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"  # set where ROS from wheels has started Python once more
 WORKERS = Path(__file__).with_name("workers")
 READY = 30.0  # seconds within which it must report that it is ready
+BUILDS = 600.0  # seconds for that, if it says what it does meanwhile
 LEAVES = 4.0  # seconds that it may take to end by itself
 BEAT = 0.1  # seconds between two signs of life of this process, without which it stops the robot
 LAST_LINES = 5  # of its error output, kept for error messages
@@ -51,14 +55,14 @@ class RosWorker:
         self._cancel_sent, self._leaves = threading.Event(), threading.Event()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that the user names
-                [str(python), str(WORKERS / script)],
+                [executable(python), str(WORKERS / script)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 text=True,
                 encoding="utf-8",
                 errors="replace",
-                env={**os.environ, **environment, "PYTHONUNBUFFERED": "1"},
+                env={**outer_environment(), **environment, "PYTHONUNBUFFERED": "1"},
                 start_new_session=True,
             )
         except OSError as error:
@@ -127,6 +131,9 @@ class RosWorker:
             match message:
                 case {"is": "ready"}:
                     return message
+                case {"is": "progress", "text": str(text)}:
+                    note(text)
+                    until = time.monotonic() + BUILDS
                 case {"is": "not-ready", "text": str(text)}:
                     self.leave()
                     raise NotReadyError(text)
@@ -166,12 +173,32 @@ class RosWorker:
                 pipe.close()
 
 
+def executable(python: Path) -> str:
+    """An interpreter as a command; a name without a folder is looked for here first, then in PATH."""
+    return str(python.absolute() if python.exists() else python)
+
+
+def outer_environment() -> dict[str, str]:
+    """The environment without what ROS from wheels sets for this interpreter; another one may have its own."""
+    environment = dict(os.environ)
+    if environment.pop(FROM_WHEELS, None) is not None:
+        folders = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
+        others = [folder for folder in folders if folder and not Path(folder).is_relative_to(sys.prefix)]
+        environment["LD_LIBRARY_PATH"] = os.pathsep.join(others)
+    return environment
+
+
 def lacks(python: Path, modules: Sequence[str]) -> list[str] | None:
     """Which modules an interpreter lacks; None if it cannot be run. Nothing is imported."""
     code = "import sys, importlib.util as u; print(*(m for m in sys.argv[1:] if u.find_spec(m) is None))"
     try:
         done = subprocess.run(  # noqa: S603 - the interpreter that the user names
-            [str(python), "-c", code, *modules], capture_output=True, text=True, timeout=READY, check=True
+            [executable(python), "-c", code, *modules],
+            capture_output=True,
+            text=True,
+            timeout=READY,
+            check=True,
+            env=outer_environment(),
         )
     except (OSError, subprocess.SubprocessError):
         return None

@@ -47,6 +47,7 @@ class SkillWorker:
     graph: Any
     servers: dict[str, Any]
     settles = 0.0  # seconds that a connection with a server takes beyond the patience
+    silence_says = ""  # how the death of a server shows, if not by its silence
 
     def __init__(self, channel: Channel, start: Message) -> None:
         self.channel = channel
@@ -188,7 +189,8 @@ class SkillWorker:
         """Why a goal is not worth waiting for any longer."""
         server, late = goal.server.name, now - self.patience
         if max(goal.server.heard, sent) < now - self.silence:
-            return f"the action server at {server} has died: no status for {self.silence:g} s"
+            why = self.silence_says or f"no status for {self.silence:g} s"
+            return f"the action server at {server} has died: {why}"
         if goal.cancelled is not None and goal.cancelled < late:
             return f"{server} was told to stop, but did not confirm it within {self.patience:g} s"
         if not goal.is_acknowledged and sent < late:

@@ -21,7 +21,13 @@ from message_types import parts_of
 NEEDED = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
 """The packages whose messages are part of each action."""
 
-GENERATORS = ("generator_type_description", "generator_c", "typesupport_fastrtps_c", "typesupport_c", "generator_py")
+GENERATORS = (
+    "generator_type_description",
+    "generator_c",
+    "typesupport_fastrtps_c",
+    "typesupport_c",
+    "generator_py",
+)
 LIBRARIES = ("generator_c", "generator_py", "typesupport_c", "typesupport_fastrtps_c")
 RUNTIME = ("rosidl_runtime_c", "rosidl_typesupport_c", "rosidl_typesupport_fastrtps_c", "rcutils", "fastcdr")
 COMPILERS = {".c": "cc", ".cpp": "c++"}
@@ -54,6 +60,20 @@ def fields_of(definition: str) -> list[list[str]]:
     """The names of the fields of goal, result and feedback."""
     parts = (definition + "\n").split("---\n")
     return [[line.split()[1] for line in part.splitlines() if line.strip()] for part in parts]
+
+
+def plain(value: Any) -> Any:
+    """The value of a field as JSON has it; an array of numbers is none of Python's lists."""
+    return list(value) if hasattr(value, "typecode") else value
+
+
+def as_in(default: Any, value: Any) -> Any:
+    """A value of JSON as a field with this default takes it: a whole number may be meant as a float."""
+    if isinstance(default, float):
+        return float(value)
+    if getattr(default, "typecode", "") in {"d", "f"}:
+        return [float(each) for each in value]
+    return value
 
 
 def _module(package: str, definitions: Definitions, tell: Callable[[str], object]) -> Any:
@@ -137,8 +157,10 @@ class _Build:
             "c++", "-shared", "-s", "-Wl,--allow-shlib-undefined", "-o", str(self.made / module), *objects,
             "-L", str(self.prefix / "lib"), *libraries, *(f"-l{name}" for name in RUNTIME)
         )  # fmt: skip
-        for path in [*self.made.rglob("*")]:
-            if path.is_file() and path.suffix != ".py" and path.name != module:
+        for path in sorted(self.made.rglob("*"), reverse=True):
+            if path.is_dir() and not any(path.iterdir()):
+                path.rmdir()
+            elif path.is_file() and path.suffix != ".py" and path.name != module:
                 path.unlink()
 
     def _generate(self, definitions: Definitions) -> None:
@@ -213,7 +235,12 @@ class _Build:
         import numpy
 
         headers = self.prefix / "include"
-        folders = [self.work / "made", headers, Path(sysconfig.get_paths()["include"]), Path(numpy.get_include())]
+        folders = [
+            self.work / "made",
+            headers,
+            Path(sysconfig.get_paths()["include"]),
+            Path(numpy.get_include()),
+        ]
         folders += [path for path in headers.iterdir() if (path / path.name).is_dir()]
         done = self.work / (unit.name + ".o")
         includes = [argument for path in folders for argument in ("-I", str(path))]
@@ -221,9 +248,13 @@ class _Build:
         return str(done)
 
     def _run(self, *command: str) -> None:
-        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, check=False)
+        done = subprocess.run(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, check=False
+        )
         if done.returncode:
             sys.stderr.write(done.stdout)
             lines: Sequence[str] = done.stdout.splitlines() or [""]
             error = next((line for line in lines if "error" in line), lines[-1])
-            raise SetupError(f"{self.package} could not be compiled ({error.strip()}); is python3-dev installed?")
+            raise SetupError(
+                f"{self.package} could not be compiled ({error.strip()}); is python3-dev installed?"
+            )

@@ -1,96 +1,45 @@
-"""The worker for ROS 2, run by a Python (3.8 or later) that has rclpy.
-
-It was tested against a stand-in for rclpy only, never on a ROS 2 graph.
-"""
+"""The worker for ROS 2, run by a Python (3.8 or later) that has rclpy."""
 
 from __future__ import annotations
 
-import importlib
-import os
-import threading
 import time
+import uuid
 from typing import Any
 
-from channel import Message, SetupError, serve
-from goals import Goal, SkillWorker
-from message_types import parts_of
+from channel import Message, serve
+from goals import TICK, Goal, SkillWorker
+from ros2_graph import Ros2Graph
+from ros2_types import action_types, as_in, fields_of, plain
 
-DISCOVERY = 1.0  # seconds after which a node knows most others
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
+DISCOVERS = 3  # times the patience, for the first server to be discovered
+TELLS = 2.0  # seconds after which a search for servers is told
+AGAIN = 1.0  # seconds after which a result is asked for again
 
 
-class Ros2Graph:
-    """The ROS 2 graph, which has no master; whoever has our node's name drives the robot."""
+class Ros2Goal:
+    """What is known of a goal on ROS 2, besides what all goals have; only the executor's thread changes it."""
 
-    def __init__(self, name: str) -> None:
-        import rclpy
-        import rclpy.executors
-
-        self._rclpy, self.node = rclpy, name
-        rclpy.init(args=None, **_without_signals())
-        probe = rclpy.create_node(f"{name}_looks_{os.getpid()}")
-        time.sleep(DISCOVERY)
-        is_taken = name in probe.get_node_names()
-        probe.destroy_node()
-        if is_taken:
-            rclpy.shutdown()
-            raise SetupError(f"another codebotler is using this robot (the node {name}); stop it first")
-        self.ours = rclpy.create_node(name)
-        executor = rclpy.executors.SingleThreadedExecutor()
-        executor.add_node(self.ours)
-        threading.Thread(target=executor.spin, daemon=True).start()
-
-    def leave(self) -> None:
-        """Shut our node down."""
-        self._rclpy.shutdown()
-
-    def is_left(self) -> bool:
-        """Whether our node was shut down."""
-        return not self._rclpy.ok()
-
-    def why_left(self) -> str:
-        """Error message for a node that was shut down."""
-        return f"the node {self.node} was shut down; connect again"
-
-    def nodes_of(self, _server: str) -> list[str]:
-        """A stand-in for any node, since one may still be discovered."""
-        return ["a node to be discovered"]
-
-    def why_missing(self, server: str, type_name: str) -> str:
-        """Why there is no connection with an action server."""
-        kind = "/action/".join(parts_of(type_name))
-        return (
-            f"there is no action server of {kind} at {server}; start it, or compare "
-            "ROS_DOMAIN_ID and the definitions on both sides"
-        )
-
-
-def _without_signals() -> dict[str, Any]:
-    """Options that keep a recent rclpy from ending at a signal before the robot has stopped."""
-    try:
-        from rclpy.signals import SignalHandlerOptions
-    except ImportError:
-        return {}
-    return {"signal_handler_options": SignalHandlerOptions.NO}
+    def __init__(self) -> None:
+        self.uuid = list(uuid.uuid4().bytes)  # chosen here, so that it can be cancelled before it is accepted
+        self.is_sent = self.is_accepted = self.is_cancelling = False
+        self.asked = 0.0  # when its result was asked for
 
 
 class Ros2Server:
     """The action server of one skill, seen from a client."""
 
-    def __init__(self, node: Any, action: Message) -> None:
+    def __init__(self, graph: Ros2Graph, action: Message, spec: Any) -> None:
         import rclpy.action
         from action_msgs.srv import CancelGoal
 
         self.name: str = action["server"]
         self.type: str = action["type"]
-        goal, result, _ = action["definition"].split("---\n")
-        self.fields = [line.split()[1] for line in goal.splitlines()]
-        self.returns = [line.split()[1] for line in result.splitlines()]
-        package, name = parts_of(self.type)
-        self.spec = getattr(importlib.import_module(f"{package}.action"), name)
-        self.client = rclpy.action.ActionClient(node, self.spec, self.name)
-        self._cancel_all = node.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
-        self._request = CancelGoal.Request
+        self.fields, self.returns, _ = fields_of(action["definition"])
+        self.spec = spec
+        self.client = rclpy.action.ActionClient(graph.ours, spec, self.name)
+        self._graph, self._request = graph, CancelGoal.Request
+        self._cancels = graph.ours.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         self._heard = 0.0
 
     @property
@@ -106,49 +55,138 @@ class Ros2Server:
 
     def cancel(self) -> None:
         """Cancel all goals of all clients."""
-        self._cancel_all.call_async(self._request())
+        self._graph.soon(self._cancels.call_async, self._request())
+
+    def cancel_one(self, number: list[int]) -> Any:
+        """Ask to cancel a goal; the answer will be in what is returned. For the executor's thread."""
+        request = self._request()
+        request.goal_info.goal_id.uuid = number
+        return self._cancels.call_async(request)
 
 
 class Ros2Worker(SkillWorker):
     """Performs skills over ROS 2."""
 
+    graph: Ros2Graph
+    silence_says = "it has left the graph"
+
     def connect(self, start: Message) -> bool:
-        """Start our node, and a client for each server; an earlier worker that died leaves no sign."""
-        self.graph = Ros2Graph(start["node"])
+        """Start our node, and a client for each server; whether an earlier worker died without leaving."""
         actions = start["actions"]
-        self.servers = {skill: Ros2Server(self.graph.ours, action) for skill, action in actions.items()}
-        return False
+        specs = action_types(list(actions.values()), lambda text: self.channel.send("progress", text=text))
+        self.graph = Ros2Graph(start["node"])
+        left_behind = self.graph.enter()
+        self.servers = {
+            skill: Ros2Server(self.graph, action, specs[action["type"]]) for skill, action in actions.items()
+        }
+        for server in self.servers.values():
+            self.graph.hear_statuses(server.name, self._hear)
+        return left_behind
+
+    def missing(self) -> dict[str, str]:
+        """Why servers cannot be reached, by skill; servers are discovered one after the other."""
+        begun = changed = time.monotonic()
+        found, is_told = 0, False
+        while found < len(self.servers) and not self.graph.is_left():
+            now, before = time.monotonic(), found
+            found = sum(server.is_connected(self.silence) for server in self.servers.values())
+            changed = now if found != before else changed
+            if now - changed > self.patience * (1 if found else DISCOVERS):
+                break
+            if now - begun > TELLS and not is_told:
+                self.channel.send("progress", text="looking for the robot's action servers")
+                is_told = True
+            time.sleep(0.01)
+        return {
+            skill: self.graph.why_missing(server.name, server.type)
+            for skill, server in self.servers.items()
+            if not server.is_connected(self.silence)
+        }
 
     def send(self, goal: Goal, arguments: list[Any]) -> None:
-        """Send a goal."""
+        """Have the executor's thread send a goal: elsewhere, rclpy can lose the answer."""
         message = goal.server.spec.Goal()
         for field, value in zip(goal.server.fields, arguments):
-            setattr(message, field, value)
+            setattr(message, field, as_in(getattr(message, field), value))
+        goal.handle = Ros2Goal()
         goal.sent = time.monotonic()
-        sending = goal.server.client.send_goal_async(
-            message, feedback_callback=lambda m: self._feedback(goal, m.feedback)
-        )
-        sending.add_done_callback(lambda done: self._answered(goal, done.result()))
+        goal.stop = lambda: self.graph.soon(self._cancel, goal)
+        self.graph.soon(self._send, goal, message)
+
+    def look_after(self, goal: Goal, sent: float, now: float) -> None:
+        """Repeat what has no effect: a cancel may overtake its goal, and an answer may be lost."""
+        super().look_after(goal, sent, now)
+        if goal.is_over:
+            return
+        if goal.cancelled is not None and not goal.handle.is_cancelling and now - goal.cancelled > TICK:
+            self.graph.soon(self._cancel, goal)
+        if goal.status_ended is not None and now - max(goal.status_ended, goal.handle.asked) > AGAIN:
+            self.graph.soon(self._ask_result, goal)
+
+    def _send(self, goal: Goal, message: Any) -> None:
+        from unique_identifier_msgs.msg import UUID
+
+        if goal.cancelled is not None:
+            self.end(goal, "cancelled")
+            return
+        goal.handle.is_sent = True
+        goal.server.client.send_goal_async(
+            message,
+            feedback_callback=lambda m: self._feedback(goal, m.feedback),
+            goal_uuid=UUID(uuid=goal.handle.uuid),
+        ).add_done_callback(lambda done: self._answered(goal, done.result()))
 
     def _answered(self, goal: Goal, handle: Any) -> None:
-        """Note whether the server accepts the goal; one that was cancelled meanwhile is cancelled now."""
-        goal.is_acknowledged = True
-        if not handle.accepted:
+        """Note whether the server accepts the goal."""
+        if handle.accepted:
+            self._accept(goal)
+        else:
             self.end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
+
+    def _hear(self, server: str, statuses: Any) -> None:
+        """Note the status of the current goal, which the server publishes besides its answers."""
+        goal = self.goal
+        if goal is None or goal.is_over or goal.handle is None or goal.server.name != server:
             return
-        with goal.lock:
-            goal.handle = handle
-            goal.stop = handle.cancel_goal_async
-            if goal.cancelled is not None:
-                goal.stop()
-        handle.get_result_async().add_done_callback(lambda done: self._done(goal, done.result()))
+        for status in statuses.status_list:
+            if list(status.goal_info.goal_id.uuid) != goal.handle.uuid:
+                continue
+            self._accept(goal)
+            if status.status in {SUCCEEDED, CANCELED, ABORTED} and goal.status_ended is None:
+                goal.status_ended = time.monotonic()
+
+    def _accept(self, goal: Goal) -> None:
+        goal.is_acknowledged = True
+        if not goal.handle.is_accepted:
+            goal.handle.is_accepted = True
+            self._ask_result(goal)
+
+    def _ask_result(self, goal: Goal) -> None:
+        from rclpy.action.client import ClientGoalHandle
+        from unique_identifier_msgs.msg import UUID
+
+        goal.handle.asked = time.monotonic()
+        client = goal.server.client
+        accepted = goal.server.spec.Impl.SendGoalService.Response(accepted=True)
+        handle = ClientGoalHandle(client, UUID(uuid=goal.handle.uuid), accepted)
+        client._get_result_async(handle).add_done_callback(lambda done: self._done(goal, done.result()))
+
+    def _cancel(self, goal: Goal) -> None:
+        if not goal.handle.is_sent:
+            return  # it never will be
+        answer = goal.server.cancel_one(goal.handle.uuid)
+        answer.add_done_callback(lambda done: self._cancelling(goal, done.result()))
+
+    def _cancelling(self, goal: Goal, response: Any) -> None:
+        if response is not None and response.goals_canceling:
+            goal.handle.is_cancelling = True
 
     def _done(self, goal: Goal, response: Any) -> None:
         if goal.cancelled is not None or response.status == CANCELED:
             self.end(goal, "cancelled")
         elif response.status == SUCCEEDED:
             values = [getattr(response.result, field) for field in goal.server.returns]
-            self.end(goal, "result", value=values[0] if values else None)
+            self.end(goal, "result", value=plain(values[0]) if values else None)
         elif response.status == ABORTED:
             self.end(goal, "error", state="aborted", text="")
         else:

@@ -1,0 +1,111 @@
+"""The ROS 2 graph, which has no master: nodes discover each other."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from channel import SetupError
+from message_types import parts_of
+
+DISCOVERY = 1.0  # seconds after which a node knows most others
+ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
+TAKEN = "another codebotler is using this robot (the node {}); stop it first"
+
+
+class Ros2Graph:
+    """Our node, whose executor runs in a thread; whoever has our node's name drives the robot."""
+
+    def __init__(self, name: str, taken: str = TAKEN) -> None:
+        import rclpy
+        import rclpy.executors
+
+        self._rclpy, self.node, self._taken = rclpy, name, taken
+        self._is_left_behind = False
+        rclpy.init(args=None, **_without_signals())
+
+    def enter(self) -> bool:
+        """Start our node; whether an earlier one of its name had died without leaving."""
+        probe = self._rclpy.create_node(f"{self.node}_looks_{os.getpid()}")
+        time.sleep(DISCOVERY)
+        self._is_left_behind = self.node in probe.get_node_names()
+        if self._is_left_behind and self._answers(probe):
+            self._rclpy.shutdown()
+            raise SetupError(self._taken.format(self.node))
+        probe.destroy_node()
+        self.ours = self._rclpy.create_node(self.node)
+        self.executor = self._rclpy.executors.SingleThreadedExecutor()
+        self.executor.add_node(self.ours)
+        threading.Thread(target=self._spin, daemon=True).start()
+        return self._is_left_behind
+
+    def leave(self) -> None:
+        """Shut our node down."""
+        self._rclpy.shutdown()
+
+    def is_left(self) -> bool:
+        """Whether our node was shut down, or another one of its name has come."""
+        return not self._rclpy.ok() or self._has_double()
+
+    def why_left(self) -> str:
+        """Error message for a node that must not go on."""
+        if self._rclpy.ok():
+            return f"another node called {self.node} has come; stop it, and connect again"
+        return f"the node {self.node} was shut down; connect again"
+
+    def why_missing(self, server: str, type_name: str) -> str:
+        """Why there is no connection with an action server."""
+        kind = "/action/".join(parts_of(type_name))
+        return (
+            f"there is no action server of {kind} at {server}; start it, or compare "
+            "ROS_DOMAIN_ID and the definitions on both sides"
+        )
+
+    def soon(self, does: Callable[..., object], *arguments: Any) -> None:
+        """Have the executor's thread call something."""
+        self.executor.create_task(does, *arguments)
+
+    def hear_statuses(self, server: str, hear: Callable[[str, Any], None]) -> None:
+        """Call `hear` with an action server's name and each list of statuses that it publishes."""
+        from action_msgs.msg import GoalStatusArray
+        from rclpy.qos import qos_profile_action_status_default as qos
+
+        topic = f"{server}/_action/status"
+        self.ours.create_subscription(GoalStatusArray, topic, lambda told: hear(server, told), qos)
+
+    def _answers(self, probe: Any) -> bool:
+        """Whether the node of our name is alive; a dead one stays on the graph for a while."""
+        from rcl_interfaces.srv import ListParameters
+
+        client = probe.create_client(ListParameters, f"/{self.node}/list_parameters")
+        if not client.wait_for_service(timeout_sec=ANSWERS):
+            return False
+        answer = client.call_async(ListParameters.Request())
+        self._rclpy.spin_until_future_complete(probe, answer, timeout_sec=ANSWERS)
+        return bool(answer.done())
+
+    def _has_double(self) -> bool:
+        if self._is_left_behind:
+            return False
+        with suppress(Exception):  # the node may be shut down at this moment
+            return bool(self.ours.get_node_names().count(self.node) > 1)
+        return False
+
+    def _spin(self) -> None:
+        from rclpy.executors import ExternalShutdownException
+
+        with suppress(ExternalShutdownException):
+            self.executor.spin()
+
+
+def _without_signals() -> dict[str, Any]:
+    """Options that keep a recent rclpy from ending at a signal before the robot has stopped."""
+    try:
+        from rclpy.signals import SignalHandlerOptions
+    except ImportError:
+        return {}
+    return {"signal_handler_options": SignalHandlerOptions.NO}

@@ -1,0 +1,86 @@
+"""Action servers of a virtual robot on ROS 2: `python3 ros2_servers.py`, run by a Python that has rclpy.
+
+Goals and cancels are passed to the tool, which decides how each goal ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from channel import Channel, Message, serve
+from ros2_graph import Ros2Graph
+from ros2_types import action_types, as_in, fields_of, plain
+
+TAKEN = "there is another virtual robot (the node {}); stop it first"
+
+
+class Ros2ActionServers:
+    """One action server for each skill; the first line has the `node` and the `actions` by skill."""
+
+    def __init__(self, channel: Channel, start: Message) -> None:
+        import rclpy.action
+
+        self.channel = channel
+        self.ends: dict[str, Any] = {}  # futures by goal; only the executor's thread uses them
+        actions = start["actions"]
+        specs = action_types(list(actions.values()), lambda text: channel.send("progress", text=text))
+        self.graph = Ros2Graph(start["node"], TAKEN)
+        self.graph.enter()
+        self.servers = [
+            rclpy.action.ActionServer(
+                self.graph.ours,
+                specs[action["type"]],
+                action["server"],
+                self._executor(skill, specs[action["type"]], action["definition"]),
+                cancel_callback=self._cancel,
+            )
+            for skill, action in actions.items()
+        ]
+        channel.send("ready", has_master=False)
+
+    def obey(self, line: Message) -> None:
+        """End a goal."""
+        self.graph.soon(lambda: self.ends.pop(line["id"]).set_result(line))
+
+    def leave(self) -> None:
+        """Leave the graph."""
+        self.graph.leave()
+
+    def _executor(self, skill: str, spec: Any, definition: str) -> Callable[[Any], Awaitable[Any]]:
+        goals, results, _ = fields_of(definition)
+
+        async def execute(handle: Any) -> Any:
+            from rclpy.task import Future
+
+            number = _number_of(handle)
+            self.ends[number] = end = Future(executor=self.graph.executor)
+            arguments = [plain(getattr(handle.request, field)) for field in goals]
+            self.channel.send("goal", id=number, skill=skill, arguments=arguments)
+            line = await end
+            result = spec.Result()
+            if line["do"] == "succeed":
+                if results:
+                    setattr(result, results[0], as_in(getattr(result, results[0]), line["value"]))
+                handle.succeed()
+            elif line["do"] == "abort":
+                handle.abort()
+            else:
+                handle.canceled()
+            return result
+
+        return execute
+
+    def _cancel(self, handle: Any) -> Any:
+        from rclpy.action import CancelResponse
+
+        self.channel.send("cancel", id=_number_of(handle))
+        return CancelResponse.ACCEPT
+
+
+def _number_of(handle: Any) -> str:
+    return bytes(handle.goal_id.uuid).hex()
+
+
+if __name__ == "__main__":
+    serve(Ros2ActionServers)
