@@ -25,7 +25,7 @@ class Ros2Graph:
         import rclpy.executors
 
         self._rclpy, self.node, self._taken = rclpy, name, taken
-        self._is_left_behind = False
+        self._is_left_behind = self._has_ended = False
         rclpy.init(args=None, **_without_signals())
 
     def enter(self) -> bool:
@@ -40,19 +40,27 @@ class Ros2Graph:
         self.ours = self._rclpy.create_node(self.node)
         self.executor = self._rclpy.executors.SingleThreadedExecutor()
         self.executor.add_node(self.ours)
-        threading.Thread(target=self._spin, daemon=True).start()
         return self._is_left_behind
+
+    def spin(self) -> None:
+        """Start the executor's thread, once all clients and servers are made.
+
+        rclpy shows them to the executor before it has finished making them, which would end the thread.
+        """
+        threading.Thread(target=self._spin, daemon=True).start()
 
     def leave(self) -> None:
         """Shut our node down."""
         self._rclpy.shutdown()
 
     def is_left(self) -> bool:
-        """Whether our node was shut down, or another one of its name has come."""
-        return not self._rclpy.ok() or self._has_double()
+        """Whether our node hears nothing any more, or another one of its name has come."""
+        return not self._rclpy.ok() or self._has_ended or self._has_double()
 
     def why_left(self) -> str:
         """Error message for a node that must not go on."""
+        if self._has_ended:
+            return f"the node {self.node} has failed in rclpy; connect again"
         if self._rclpy.ok():
             return f"another node called {self.node} has come; stop it, and connect again"
         return f"the node {self.node} was shut down; connect again"
@@ -98,8 +106,12 @@ class Ros2Graph:
     def _spin(self) -> None:
         from rclpy.executors import ExternalShutdownException
 
-        with suppress(ExternalShutdownException):
+        try:
             self.executor.spin()
+        except ExternalShutdownException:
+            return
+        finally:
+            self._has_ended = True
 
 
 def _without_signals() -> dict[str, Any]:

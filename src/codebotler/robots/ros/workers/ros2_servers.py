@@ -37,6 +37,7 @@ class Ros2ActionServers:
             )
             for skill, action in actions.items()
         ]
+        self.graph.spin()
         channel.send("ready", has_master=False)
 
     def obey(self, line: Message) -> None:

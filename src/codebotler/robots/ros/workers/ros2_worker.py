@@ -81,6 +81,7 @@ class Ros2Worker(SkillWorker):
         }
         for server in self.servers.values():
             self.graph.hear_statuses(server.name, self._hear)
+        self.graph.spin()
         return left_behind
 
     def missing(self) -> dict[str, str]:
