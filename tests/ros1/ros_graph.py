@@ -35,12 +35,19 @@ def free_port() -> int:
 
 
 class Process:
-    """A script under the Python that has rospy; it ends with its input, and says JSON, line by line."""
+    """A script under a Python that has ROS; it ends with its input, and says JSON, line by line."""
 
-    def __init__(self, script: Path, *arguments: str, master: str = "", **environment: str) -> None:
+    def __init__(
+        self,
+        script: Path,
+        *arguments: str,
+        python: Path = ROS_PYTHON,
+        master: str = "",
+        **environment: str,
+    ) -> None:
         self.said: queue.Queue[list[Any]] = queue.Queue()
         self.process = subprocess.Popen(
-            [str(ROS_PYTHON), str(script), *arguments],
+            [str(python), str(script), *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -1,4 +1,4 @@
-"""The robot on ROS 2, against a stand-in for rclpy: no ROS 2 graph was at hand."""
+"""The robot on ROS 2 and all that can go wrong, on a real graph with real action servers of rclpy."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import ast
 import os
 import re
 import signal
+import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,132 +20,254 @@ from codebotler.robots.base import CancelledError, NotReadyError, Options, Pictu
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import ros2
 from codebotler.robots.ros.robot import RosRobot, Waits
-from codebotler.robots.ros.ros2 import NOTE, readiness
 from codebotler.robots.ros.worker import WORKERS
-
-STUB = Path(__file__).parent / "stub"
-WAITS = Waits(patience=1.0, silence=0.5, longest=20.0)
-
-
-@pytest.fixture(autouse=True)
-def notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    path = tmp_path / "notes"
-    path.touch()
-    monkeypatch.setenv("NOTES", str(path))
-    monkeypatch.setenv("PYTHONPATH", str(STUB))
-    return path
+from ros2_scene import ROS2_PYTHON, Scene
+from ros_graph import GO_TO, SAY, started
 
 
-@pytest.fixture
-def robot() -> Iterator[RosRobot]:
-    robot = ros2.robot(Options(ros_python=Path(sys.executable)), WAITS)
+def test_goal_is_executed_and_the_result_comes_back(scene: Scene) -> None:
+    server = scene.serve(*SKILLS.rows)
+    robot = scene.robot()
     robot.connect()
-    yield robot
-    robot.disconnect()
-
-
-def until(noted: Callable[[], bool]) -> None:
-    ends = time.monotonic() + 60
-    while not noted():
-        assert time.monotonic() < ends
-        time.sleep(0.01)
-
-
-def stopped(robot: RosRobot, notes: Path, goal: str) -> BaseException | None:
-    """What a goal ends with that is cancelled once it is sent."""
-    ended: list[BaseException] = []
-
-    def run() -> None:
-        try:
-            robot.perform("go_to", [goal])
-        except (CancelledError, RobotLostError) as error:
-            ended.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    until(lambda: f"goal {goal}\n" in notes.read_text())
-    robot.cancel()
-    thread.join()
-    return ended[0] if ended else None
-
-
-def test_goal_is_executed_and_the_result_comes_back(robot: RosRobot, notes: Path) -> None:
-    told: list[str | Picture] = []
     assert robot.missing == {}
-    assert robot.perform("go_to", ["feedback"], told.append) is None
-    assert told == ["near: the hall"]
-    assert robot.perform("get_current_location", []) == "hall"
-    assert robot.perform("get_all_rooms", []) == ["hall", "lab"]
-    assert robot.perform("is_in_room", ["mug"]) is True
-    assert robot.perform("ask", ["ann", "tea?", ("yes", "no")]) == "yes"
-    assert "goal ann tea? ['yes', 'no']\n" in notes.read_text()
+    assert robot.perform("go_to", ["the hall"]) is None
+    server.expect("goal", "the hall")
+    assert robot.perform("get_current_location", []) == ""
+    assert robot.perform("get_all_rooms", []) == []
+    assert robot.perform("is_in_room", ["mug"]) is False
+    assert robot.perform("ask", ["ann", "Tea, „ann”?", ("yes", "no")]) == ""
 
 
 @pytest.mark.parametrize("state", ["abort", "reject"])
-def test_rejected_or_aborted_goal_is_a_robot_error(robot: RosRobot, state: str) -> None:
+def test_rejected_or_aborted_goal_is_a_robot_error(scene: Scene, state: str) -> None:
+    scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
     with pytest.raises(RobotError) as error:
         robot.perform("go_to", [state])
     assert error.value.kind == "GoToInvalidLocation"
     assert f"/go_to_server {state}ed " in str(error.value)
+    robot.perform("go_to", ["the hall"])
 
 
-def test_cancel_reaches_the_server(robot: RosRobot, notes: Path) -> None:
-    assert isinstance(stopped(robot, notes, "never"), CancelledError)
-    assert "cancel never\n" in notes.read_text()
+def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_connect(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        robot.cancel()
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], CancelledError)
+    with pytest.raises(CancelledError):
+        robot.perform("go_to", ["the hall"])
+    robot.connect()
+    robot.perform("go_to", ["the hall"])
+    server.expect("goal", "the hall")
 
 
-def test_cancel_before_the_server_has_taken_the_goal(robot: RosRobot, notes: Path) -> None:
-    assert isinstance(stopped(robot, notes, "slow"), CancelledError)
-    assert "cancel never\n" in notes.read_text()
+def test_cancel_before_the_server_has_accepted_the_goal(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["slow"])) as ended:
+        server.expect("taking")
+        robot.cancel()
+        server.expect("goal", "slow")
+        server.expect("cancel", "slow")
+    assert isinstance(ended["error"], CancelledError)
 
 
-def test_goal_that_somebody_else_cancels_is_cancelled(robot: RosRobot) -> None:
+def test_stop_at_any_moment_leaves_no_goal_running(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
+    for moment in range(0, 30, 3):
+        with started(lambda: robot.perform("go_to", ["never"])) as ended:
+            time.sleep(moment / 1000)
+            robot.cancel()
+        assert isinstance(ended["error"], CancelledError)
+        time.sleep(0.05)
+        heard = [server.said.get()[0] for _ in range(server.said.qsize())]
+        assert heard in ([], ["goal", "cancel"]), moment
+        robot._stopped = False  # connected as it is
+
+
+def test_goal_that_somebody_else_cancels_is_cancelled(scene: Scene) -> None:
+    scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
     with pytest.raises(CancelledError):
         robot.perform("go_to", ["by somebody else"])
 
 
-def test_robot_that_does_not_stop_is_said_not_to(robot: RosRobot, notes: Path) -> None:
-    error = stopped(robot, notes, "never, whatever you say")
-    assert isinstance(error, RobotLostError)
-    assert re.search(r"told to stop.* 1 s", error.sentence)
+def test_robot_that_answers_after_a_stop_answers_in_vain(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["late"])) as ended:
+        server.expect("goal", "late")
+        robot.cancel()
+    assert isinstance(ended["error"], CancelledError)
 
 
-def test_server_that_dies_or_takes_no_notice(robot: RosRobot) -> None:
+def test_robot_that_does_not_stop_is_said_not_to(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    robot = scene.robot(Waits(patience=1.0, silence=0.5, longest=20.0))
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
+        server.expect("goal", "never, whatever you say")
+        robot.cancel()
+    assert isinstance(ended["error"], RobotLostError)
+    assert re.search(r"told to stop.* 1 s", ended["error"].sentence)
+
+
+def test_goal_that_does_not_end_is_cancelled(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    robot = scene.robot(Waits(patience=1.5, silence=0.5, longest=1.0))
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"/go_to_server .*\b1 s\b.*cancelled"):
+        robot.perform("go_to", ["never"])
+    server.expect("goal", "never")
+    server.expect("cancel", "never")
+
+
+def test_goal_of_which_the_server_takes_no_notice(scene: Scene) -> None:
+    scene.serve(SAY)
+    robot = scene.robot(Waits(patience=1.0, silence=0.5, longest=20.0))
+    robot.connect()
     with pytest.raises(RobotLostError, match=r"accept the goal .*1 s"):
         robot.perform("say", ["ignore"])
-    with pytest.raises(RobotLostError, match=r"/go_to_server has died.* 0\.5 s"):
-        robot.perform("go_to", ["die"])
 
 
-def test_missing_server_and_second_tool(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LACKS", "/pick_server")
-    robot = ros2.robot(Options(ros_python=Path(sys.executable)), WAITS)
+def test_missing_server_is_known_before_motion_and_looked_for_again(scene: Scene) -> None:
+    scene.serve(GO_TO)
+    robot = scene.robot()
     robot.connect()
-    assert set(robot.missing) == {"pick"}
-    assert "robot_actions_pkg/action/Pick" in robot.missing["pick"]
-    robot.disconnect()
-    monkeypatch.setenv("NODES", "camera codebotler")
-    with pytest.raises(NotReadyError, match="node codebotler"):
-        robot.connect()
+    assert set(robot.missing) == set(SKILLS) - {"go_to"}
+    assert "robot_actions_pkg/action/Say at /say_server" in robot.missing["say"]
+    server = scene.serve(SAY)
+    robot.perform("say", ["hello"])
+    server.expect("goal", "hello")
 
 
-def test_killed_worker_is_replaced_by_one_that_cancels_all(robot: RosRobot, notes: Path) -> None:
-    def kill() -> None:
-        until(lambda: "goal never\n" in notes.read_text())
+def test_robot_without_any_server_is_not_ready(scene: Scene) -> None:
+    with pytest.raises(NotReadyError, match=r"no action server .*/"):
+        scene.robot(Waits(patience=0.5, silence=0.5, longest=20.0)).connect()
+
+
+def test_server_that_dies_in_a_goal_is_noticed_and_may_come_back(scene: Scene) -> None:
+    scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"/go_to_server has died: .*graph"):
+        robot.perform("go_to", ["die"])
+    server = scene.serve(GO_TO)
+    robot.perform("go_to", ["the hall"])
+    server.expect("goal", "the hall")
+
+
+def test_second_tool_is_refused_and_the_first_goes_on(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    first = scene.robot()
+    first.connect()
+    with pytest.raises(NotReadyError, match="another codebotler .*node codebotler"):
+        scene.robot().connect()
+    first.perform("go_to", ["the hall"])
+    server.expect("goal", "the hall")
+
+
+def test_killed_worker_is_replaced_by_one_that_cancels_all(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
         assert robot._worker is not None
         os.kill(robot._worker._process.pid, signal.SIGKILL)
-
-    killer = threading.Thread(target=kill)
-    killer.start()
-    with pytest.raises(RobotLostError, match="cancelled all goals"):
-        robot.perform("go_to", ["never"])
-    killer.join()
-    assert notes.read_text().count("cancel all /") == len(SKILLS)
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], RobotLostError)
+    assert "cancelled all goals" in ended["error"].sentence
 
 
-def test_it_is_said_how_far_it_was_tested() -> None:
-    assert readiness(Path(sys.executable)).note == NOTE == readiness(Path("/nowhere")).note
-    assert "never on a ROS 2 graph" in NOTE
+TOOL = """
+import sys
+from pathlib import Path
+from codebotler.robots.base import Options
+from codebotler.robots.ros import ros2
+robot = ros2.robot(Options(ros_python=Path(sys.argv[1])))
+robot.connect()
+robot.perform("go_to", ["never"])
+"""
+
+
+def begun_tool() -> subprocess.Popen[bytes]:
+    source = str(Path(__file__).parents[2] / "src")
+    return subprocess.Popen(
+        [sys.executable, "-c", TOOL, str(ROS2_PYTHON)], env={**os.environ, "PYTHONPATH": source}
+    )
+
+
+def test_killed_tool_leaves_no_moving_robot(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    with begun_tool() as tool:
+        server.expect("goal", "never")
+        tool.kill()
+        killed = time.monotonic()
+        server.expect("cancel", "never")
+        assert time.monotonic() - killed < 2
+
+
+def test_suspended_tool_stops_the_robot(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    with begun_tool() as tool:
+        server.expect("goal", "never")
+        tool.send_signal(signal.SIGSTOP)
+        server.expect("cancel", "never")
+        tool.kill()
+
+
+def test_installed_package_is_preferred_and_its_feedback_is_told(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert GO_TO.ros is not None
+    definition = "string location\n---\n---\nstring near\n"
+    monkeypatch.setenv("PYTHONPATH", installed("robot_actions_pkg", {"GoTo": definition}))
+    scene.serve_as([["GoTo", "/go_to_server", definition]])
+    robot = scene.robot(skills=SkillTable((GO_TO,)))
+    robot.connect()
+    told: list[str | Picture] = []
+    robot.perform("go_to", ["feedback"], told.append)
+    assert told == ["near: the hall"]
+
+
+BUILD = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from ros2_types import built
+print("at", built(sys.argv[2], json.loads(sys.argv[3])))
+"""
+
+
+def installed(package: str, definitions: dict[str, str]) -> str:
+    """Build a package as if it was installed; what is then on the path."""
+    import json
+
+    done = subprocess.run(
+        [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS), package, json.dumps(definitions)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.splitlines()[-1].removeprefix("at ")
+
+
+def test_many_goals_in_a_row_and_none_is_lost(scene: Scene) -> None:
+    scene.serve(GO_TO)
+    robot = scene.robot()
+    robot.connect()
+    for number in range(200):
+        robot.perform("go_to", [str(number)])
 
 
 def test_address_is_a_domain() -> None:
@@ -154,5 +276,6 @@ def test_address_is_a_domain() -> None:
         open_robot("ros2", Options(address="robot"))
 
 
-def test_worker_is_read_by_python_3_8() -> None:
-    ast.parse((WORKERS / "ros2_worker.py").read_text(), feature_version=(3, 8))
+@pytest.mark.parametrize("path", sorted(WORKERS.glob("ros2_*.py")), ids=lambda path: path.stem)
+def test_workers_are_read_by_python_3_8(path: Path) -> None:
+    ast.parse(path.read_text(), feature_version=(3, 8))

@@ -77,6 +77,15 @@ class Ros2Graph:
         """Have the executor's thread call something."""
         self.executor.create_task(does, *arguments)
 
+    def resolve(self, future: Any, value: Any) -> None:
+        """Give a future its value, and have the executor look again who waits for it."""
+
+        def resolve() -> None:
+            future.set_result(value)
+            self.soon(lambda: None)
+
+        self.soon(resolve)
+
     def hear_statuses(self, server: str, hear: Callable[[str, Any], None]) -> None:
         """Call `hear` with an action server's name and each list of statuses that it publishes."""
         from action_msgs.msg import GoalStatusArray

@@ -22,7 +22,7 @@ class Ros2ActionServers:
         import rclpy.action
 
         self.channel = channel
-        self.ends: dict[str, Any] = {}  # futures by goal; only the executor's thread uses them
+        self.ends: dict[str, Any] = {}  # futures by goal
         actions = start["actions"]
         specs = action_types(list(actions.values()), lambda text: channel.send("progress", text=text))
         self.graph = Ros2Graph(start["node"], TAKEN)
@@ -42,7 +42,7 @@ class Ros2ActionServers:
 
     def obey(self, line: Message) -> None:
         """End a goal."""
-        self.graph.soon(lambda: self.ends.pop(line["id"]).set_result(line))
+        self.graph.resolve(self.ends.pop(line["id"]), line)
 
     def leave(self) -> None:
         """Leave the graph."""

@@ -1,0 +1,53 @@
+"""A real ROS 2 graph, on loopback only: action servers in processes of their own, and robots."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from codebotler.core.skills.table import Skill
+from codebotler.robots.base import Options
+from codebotler.robots.ros import ros2
+from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.worker import WORKERS
+from ros_graph import Process
+
+HERE = Path(__file__).parent
+SERVER = HERE / "ros2_action_servers.py"
+PROFILE = HERE / "loopback.xml"
+ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or ros2.python_of())
+SHORT = Waits(patience=3.0, silence=0.5, longest=20.0)
+
+
+class Scene:
+    """Who is on the graph."""
+
+    def __init__(self) -> None:
+        self.processes: list[Process] = []
+        self.robots: list[RosRobot] = []
+
+    def serve(self, *skills: Skill, **environment: str) -> Process:
+        """An action server for each skill; what a goal says is how it goes."""
+        actions = [[s.ros.full_type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
+        return self.serve_as(actions, **environment)
+
+    def serve_as(self, actions: list[list[str]], **environment: str) -> Process:
+        """An action server for each type, name and definition."""
+        server = Process(SERVER, str(WORKERS), json.dumps(actions), python=ROS2_PYTHON, **environment)
+        self.processes.append(server)
+        server.expect("ready")
+        return server
+
+    def robot(self, waits: Waits = SHORT, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
+        robot = ros2.robot(Options(**{"ros_python": ROS2_PYTHON, **options}), waits)
+        self.robots.append(robot)
+        return robot
+
+    def end(self) -> None:
+        for robot in self.robots:
+            robot.disconnect()
+        for process in self.processes:
+            process.end()
+

@@ -1,3 +1,0 @@
-class CancelGoal:
-    class Request:
-        pass

@@ -1,5 +1,0 @@
-from enum import IntEnum
-
-
-class SignalHandlerOptions(IntEnum):
-    NO = 0
