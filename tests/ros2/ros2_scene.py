@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from codebotler.core.skills.table import Skill
+from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import Options
 from codebotler.robots.ros import ros2
 from codebotler.robots.ros.robot import RosRobot, Waits
@@ -27,9 +27,11 @@ class Scene:
     def __init__(self) -> None:
         self.processes: list[Process] = []
         self.robots: list[RosRobot] = []
+        self.served: list[Skill] = []
 
     def serve(self, *skills: Skill, **environment: str) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
+        self.served.extend(skill for skill in skills if skill not in self.served)
         actions = [[s.ros.full_type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
         return self.serve_as(actions, **environment)
 
@@ -41,7 +43,8 @@ class Scene:
         return server
 
     def robot(self, waits: Waits = SHORT, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
-        robot = ros2.robot(Options(**{"ros_python": ROS2_PYTHON, **options}), waits)
+        skills = options.pop("skills", None) or SkillTable(tuple(self.served))  # others would be waited for
+        robot = ros2.robot(Options(ros_python=ROS2_PYTHON, skills=skills, **options), waits)
         self.robots.append(robot)
         return robot
 
@@ -50,4 +53,3 @@ class Scene:
             robot.disconnect()
         for process in self.processes:
             process.end()
-

@@ -16,6 +16,7 @@ import pytest
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import ros2
@@ -142,7 +143,7 @@ def test_goal_of_which_the_server_takes_no_notice(scene: Scene) -> None:
 
 def test_missing_server_is_known_before_motion_and_looked_for_again(scene: Scene) -> None:
     scene.serve(GO_TO)
-    robot = scene.robot()
+    robot = scene.robot(skills=SKILLS)
     robot.connect()
     assert set(robot.missing) == set(SKILLS) - {"go_to"}
     assert "robot_actions_pkg/action/Say at /say_server" in robot.missing["say"]
@@ -153,7 +154,7 @@ def test_missing_server_is_known_before_motion_and_looked_for_again(scene: Scene
 
 def test_robot_without_any_server_is_not_ready(scene: Scene) -> None:
     with pytest.raises(NotReadyError, match=r"no action server .*/"):
-        scene.robot(Waits(patience=0.5, silence=0.5, longest=20.0)).connect()
+        scene.robot(Waits(patience=0.5, silence=0.5, longest=20.0), skills=SKILLS).connect()
 
 
 def test_server_that_dies_in_a_goal_is_noticed_and_may_come_back(scene: Scene) -> None:
@@ -195,7 +196,9 @@ import sys
 from pathlib import Path
 from codebotler.robots.base import Options
 from codebotler.robots.ros import ros2
-robot = ros2.robot(Options(ros_python=Path(sys.argv[1])))
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
+robot = ros2.robot(Options(ros_python=Path(sys.argv[1]), skills=SkillTable((SKILLS["go_to"],))))
 robot.connect()
 robot.perform("go_to", ["never"])
 """

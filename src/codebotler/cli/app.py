@@ -159,6 +159,14 @@ def skills(
     new: Annotated[
         Path | None, typer.Option("--new", help="Write a commented start of such a file.", metavar="FILE")
     ] = None,
+    ros_package: Annotated[
+        Path | None,
+        typer.Option(
+            "--ros-package",
+            help="Write the skills' actions as ROS 2 packages into this folder.",
+            metavar="FOLDER",
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """Show skills as models see them, and try them.
@@ -167,6 +175,7 @@ def skills(
     """
     from codebotler.cli.skills import data, view, write_new
     from codebotler.core.skills.files import skills_from
+    from codebotler.core.skills.ros_package import write_ros_packages
     from codebotler.core.terminal import print_json, print_rich
 
     if new is not None:
@@ -174,7 +183,10 @@ def skills(
         note(f"{new} is written; `codebotler skills {new}` shows what is in it")
         return
     table = skills_from(*([] if file is None else [file]))
-    if json:
+    if ros_package is not None:
+        written = write_ros_packages(table, ros_package)
+        note(f"written: {', '.join(map(str, written))}; build them with colcon")
+    elif json:
         print_json(data(table))
     else:
         print_rich(view(table))

@@ -1,0 +1,88 @@
+"""The actions of skills as ROS 2 packages, which their users build with colcon."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.table import SkillTable
+
+VERSION = "1.0.0"
+PACKAGE_XML = """\
+<?xml version="1.0"?>
+<package format="3">
+  <name>{package}</name>
+  <version>{version}</version>
+  <description>Actions of a robot's skills.</description>
+  <maintainer email="robot@example.com">The makers of the robot</maintainer>
+  <license>MIT</license>
+
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+  <depend>action_msgs</depend>
+  <exec_depend>rosidl_default_runtime</exec_depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"""
+CMAKE = """\
+cmake_minimum_required(VERSION 3.8)
+project({package})
+
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+
+rosidl_generate_interfaces(${{PROJECT_NAME}}
+{files}
+)
+
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+"""
+
+
+def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
+    """The files of a ROS 2 package for each package that the actions of some skills belong to, by name.
+
+    Args:
+        skills: those without an action are left out.
+    """
+    packages: dict[str, dict[str, str]] = {}
+    for skill in skills.rows:
+        if skill.ros is not None:
+            actions = packages.setdefault(skill.ros.package, {})
+            actions[f"action/{skill.ros.type}.action"] = skill.ros.definition
+    return {package: dict(_files(package, actions)) for package, actions in packages.items()}
+
+
+def write_ros_packages(skills: SkillTable, folder: Path) -> list[Path]:
+    """Write the ROS 2 packages of some skills into a folder; the folders of the packages.
+
+    Args:
+        skills: at least one of them with an action.
+        folder: such as the `src` of a workspace; packages that are there are written anew.
+
+    Raises:
+        UserError: no skill has an action.
+        OSError: a file cannot be written.
+    """
+    packages = ros_packages(skills)
+    if not packages:
+        raise UserError('no skill has a ROS action; add one, as in ros="lab_msgs/OpenDoor:/open_door"')
+    for package, files in packages.items():
+        for name, text in files.items():
+            path = folder / package / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+    return [folder / package for package in packages]
+
+
+def _files(package: str, actions: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    names = sorted(actions)
+    yield "package.xml", PACKAGE_XML.format(package=package, version=VERSION)
+    yield "CMakeLists.txt", CMAKE.format(package=package, files="\n".join(f'  "{name}"' for name in names))
+    yield from ((name, actions[name]) for name in names)
