@@ -30,7 +30,8 @@ def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
     number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_DOMAIN_ID", str(DOMAIN + number))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        # The profile keeps all traffic on loopback; LOCALHOST would add sockets on other addresses to it.
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
         patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros2")))
         patch.setenv("FASTDDS_DEFAULT_PROFILES_FILE", str(PROFILE))
         yield

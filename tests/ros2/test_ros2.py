@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,8 +19,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros import ros2
-from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.robot import Waits
 from codebotler.robots.ros.worker import WORKERS
 from ros2_scene import ROS2_PYTHON, Scene
 from ros_graph import GO_TO, SAY, started
@@ -172,7 +171,7 @@ def test_second_tool_is_refused_and_the_first_goes_on(scene: Scene) -> None:
     server = scene.serve(GO_TO)
     first = scene.robot()
     first.connect()
-    with pytest.raises(NotReadyError, match="another codebotler .*node codebotler"):
+    with pytest.raises(NotReadyError, match=r"another codebotler .*node codebotler"):
         scene.robot().connect()
     first.perform("go_to", ["the hall"])
     server.expect("goal", "the hall")
@@ -231,7 +230,7 @@ def test_suspended_tool_stops_the_robot(scene: Scene) -> None:
 
 
 def test_installed_package_is_preferred_and_its_feedback_is_told(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert GO_TO.ros is not None
     definition = "string location\n---\n---\nstring near\n"
@@ -254,8 +253,6 @@ print("at", built(sys.argv[2], json.loads(sys.argv[3])))
 
 def installed(package: str, definitions: dict[str, str]) -> str:
     """Build a package as if it was installed; what is then on the path."""
-    import json
-
     done = subprocess.run(
         [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS), package, json.dumps(definitions)],
         capture_output=True,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -41,7 +41,7 @@ def test_own_skills_have_packages_of_their_own(tmp_path: Path) -> None:
     lab = tmp_path / "src" / "lab_msgs"
     expected = "string name\nfloat64 share\n---\nint64[] result\n---\n"
     assert (lab / "action" / "Mix.action").read_text() == expected
-    assert ElementTree.parse(lab / "package.xml").findtext("name") == "lab_msgs"
+    assert ET.parse(lab / "package.xml").findtext("name") == "lab_msgs"
     assert '"action/Mix.action"' in (lab / "CMakeLists.txt").read_text()
 
 

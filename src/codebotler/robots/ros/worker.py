@@ -179,7 +179,7 @@ def executable(python: Path) -> str:
 
 
 def outer_environment() -> dict[str, str]:
-    """The environment without what ROS from wheels sets for this interpreter; another one may have its own."""
+    """The environment without what ROS from wheels has set for this interpreter alone."""
     environment = dict(os.environ)
     if environment.pop(FROM_WHEELS, None) is not None:
         folders = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)

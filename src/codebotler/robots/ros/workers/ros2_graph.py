@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import socket
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -14,6 +16,7 @@ from message_types import parts_of
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
+LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
 TAKEN = "another codebotler is using this robot (the node {}); stop it first"
 
 
@@ -29,7 +32,12 @@ class Ros2Graph:
         rclpy.init(args=None, **_without_signals())
 
     def enter(self) -> bool:
-        """Start our node; whether an earlier one of its name had died without leaving."""
+        """Start our node; whether an earlier one of its name had died without leaving.
+
+        On one machine, no two workers pass; between machines, two that start together may, and then both
+        notice each other and stop.
+        """
+        self._lock = self._locked()
         probe = self._rclpy.create_node(f"{self.node}_looks_{os.getpid()}")
         time.sleep(DISCOVERY)
         self._is_left_behind = self.node in probe.get_node_names()
@@ -93,6 +101,21 @@ class Ros2Graph:
 
         topic = f"{server}/_action/status"
         self.ours.create_subscription(GoalStatusArray, topic, lambda told: hear(server, told), qos)
+
+    def _locked(self) -> socket.socket:
+        """A socket that only one process of this machine can have, for as long as it lives."""
+        lock = socket.socket(socket.AF_UNIX)
+        until = time.monotonic() + LEAVES
+        while sys.platform == "linux":
+            try:
+                lock.bind(f"\0codebotler ROS 2 {os.environ.get('ROS_DOMAIN_ID', '0')} {self.node}")
+                break
+            except OSError:
+                if time.monotonic() > until:
+                    self._rclpy.shutdown()
+                    raise SetupError(self._taken.format(self.node)) from None
+                time.sleep(0.1)
+        return lock
 
     def _answers(self, probe: Any) -> bool:
         """Whether the node of our name is alive; a dead one stays on the graph for a while."""

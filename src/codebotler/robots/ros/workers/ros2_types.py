@@ -44,7 +44,7 @@ def action_types(actions: list[Message], tell: Callable[[str], object] = lambda 
     Raises:
         SetupError: an installed package differs, or one that is missing cannot be built.
     """
-    packages: Dict[str, Definitions] = {}
+    packages: dict[str, Definitions] = {}
     for action in actions:
         package, name = parts_of(action["type"])
         packages.setdefault(package, {})[name] = action["definition"]
@@ -232,14 +232,14 @@ class _Build:
             yield from (path for path in files if path not in together)
 
     def _compiled(self, unit: Path) -> str:
-        import numpy
+        from numpy import get_include
 
         headers = self.prefix / "include"
         folders = [
             self.work / "made",
             headers,
             Path(sysconfig.get_paths()["include"]),
-            Path(numpy.get_include()),
+            Path(get_include()),
         ]
         folders += [path for path in headers.iterdir() if (path / path.name).is_dir()]
         done = self.work / (unit.name + ".o")
@@ -248,8 +248,8 @@ class _Build:
         return str(done)
 
     def _run(self, *command: str) -> None:
-        done = subprocess.run(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, check=False
+        done = subprocess.run(  # noqa: S603 - the compiler, on what was generated
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
         )
         if done.returncode:
             sys.stderr.write(done.stdout)

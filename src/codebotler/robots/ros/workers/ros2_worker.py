@@ -18,7 +18,7 @@ AGAIN = 1.0  # seconds after which a result is asked for again
 
 
 class Ros2Goal:
-    """What is known of a goal on ROS 2, besides what all goals have; only the executor's thread changes it."""
+    """What a goal has on ROS 2 beside what all goals have; only the executor's thread changes it."""
 
     def __init__(self) -> None:
         self.uuid = list(uuid.uuid4().bytes)  # chosen here, so that it can be cancelled before it is accepted

@@ -14,7 +14,7 @@ from codebotler.robots.ros.robot import RosRobot, Waits
 from codebotler.robots.ros.worker import WORKERS
 from ros_graph import Process
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1] / "ros2"
 SERVER = HERE / "ros2_action_servers.py"
 PROFILE = HERE / "loopback.xml"
 ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or ros2.python_of())
