@@ -7,6 +7,7 @@
 #     test-suites          the tasks of both suites as data: linted, and judged on programs with known verdicts
 #     test-guide           README, guides and examples: every command on them runs, and prints what they say
 #     test-ros1            robots on ROS 1, for which the system's Python must have rospy (`codebotler robots` tells)
+#     test-ros2            robots on ROS 2, whose packages come into an environment of their own, ROS2_VENV
 #     test-browser         the page in Chromium, also with a robot on ROS 1; SHOTS names a folder for screenshots
 #     test-faulty-server   4,000 completions of a server that fails one request in ten
 #     test-transformers, -pyrobosim, -inspect, -ray
@@ -26,6 +27,7 @@ PACKAGE ?= .
 VENV ?= .venv
 EXTRAS ?= [all]
 EXTRAS_VENV ?= .venv-extras
+ROS2_VENV ?= .venv-ros2
 ENVIRONMENTS = trl verifiers openenv
 ENVIRONMENTS_IN ?= .
 environment = $(abspath $(ENVIRONMENTS_IN))/.venv-$(1)/bin/python
@@ -39,15 +41,17 @@ DOTS = while read -r; do printf .; done; echo
 SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
 INSTRUCTION = Look into every printer room for a stapler. To each printer room that has none, bring one stapler \
 from the supply room.
+# As in the extra of this name.
+ROS2 = "ros-rclpy>=9.1.2" ros-rmw-fastrtps-cpp ros-rosidl-generator-py ros-rosidl-typesupport-c
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
 # What `make test` leaves to a target of its own, since it takes long or needs more than is installed.
-APART = tests/browser tests/guide tests/ros1 tests/suites tests/codebotler/models/test_local.py \
+APART = tests/browser tests/guide tests/ros1 tests/ros2 tests/suites tests/codebotler/models/test_local.py \
 	tests/codebotler/perception/test_zeroshot.py tests/codebotler/robots/test_pyrobosim.py \
 	tests/roboeval/evaluation/test_inspect.py tests/roboeval/evaluation/test_ray.py
 
-.PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-browser pictures test-transformers test-environments \
+.PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-ros2 test-browser pictures test-transformers test-environments \
 	test-pyrobosim test-inspect test-ray test-faulty-server messages faults fuzz lint bench clean
 
 demo: $(VENV)/installed
@@ -70,7 +74,7 @@ test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)
 	$(if $(TESTS),,$(BIN)/python -m pytest tests/guide/test_pages.py -k own-skills)
 
-test-all: test test-slow test-suites test-guide test-ros1 test-browser test-faulty-server test-transformers test-pyrobosim \
+test-all: test test-slow test-suites test-guide test-ros1 test-ros2 test-browser test-faulty-server test-transformers test-pyrobosim \
 	test-inspect test-ray test-environments
 
 test-slow: $(VENV)/tested
@@ -84,6 +88,9 @@ test-guide: $(VENV)/tested
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 3 tests/ros1
+
+test-ros2: $(VENV)/tested $(ROS2_VENV)/made
+	ROS2_PYTHON="$(abspath $(ROS2_VENV))/bin/python" $(BIN)/python -m pytest --no-skips --numprocesses 2 tests/ros2
 
 test-browser: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 2 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
@@ -179,6 +186,14 @@ $(VENV)/tested: $(VENV)/installed
 	@$(PIP) install --constraint constraints.txt --group test | { $(DOTS); }
 	@touch $@
 
+# Apart, since what comes with ROS starts Python anew each time, to set where its libraries are.
+$(ROS2_VENV)/made:
+	@echo "making an environment with ROS 2 in $(ROS2_VENV), which takes a minute"
+	@$(PYTHON) -m venv --clear $(ROS2_VENV)
+	@$(ROS2_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(ROS2_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile $(ROS2) | { $(DOTS); }
+	@touch $@
+
 # Of what is installed here, most is never imported: --no-compile saves minutes.
 $(EXTRAS_VENV)/tested: $(SOURCES) constraints-extras.txt
 	@$(CHECK_PYTHON)
@@ -200,5 +215,5 @@ $(VENV)/documented: $(VENV)/installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(EXTRAS_VENV) build dist .hypothesis .mypy_cache \
+	rm -rf $(VENV) $(EXTRAS_VENV) $(ROS2_VENV) build dist .hypothesis .mypy_cache \
 		.pytest_cache .ruff_cache .import_linter_cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,25 @@ ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or ros2.python_of())
 SHORT = Waits(patience=3.0, silence=0.5, longest=20.0)
 
 
+BUILD = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from ros2_types import built
+print("at", built(sys.argv[2], json.loads(sys.argv[3])))
+"""
+
+
+def installed(package: str, definitions: dict[str, str]) -> str:
+    """Build a package unless that was done before; what is on the path if it is installed."""
+    done = subprocess.run(
+        [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS), package, json.dumps(definitions)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.splitlines()[-1].removeprefix("at ")
+
+
 class Scene:
     """Who is on the graph."""
 
@@ -29,15 +49,15 @@ class Scene:
         self.robots: list[RosRobot] = []
         self.served: list[Skill] = []
 
-    def serve(self, *skills: Skill, **environment: str) -> Process:
+    def serve(self, *skills: Skill) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
         self.served.extend(skill for skill in skills if skill not in self.served)
         actions = [[s.ros.full_type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
-        return self.serve_as(actions, **environment)
+        return self.serve_as(actions)
 
-    def serve_as(self, actions: list[list[str]], **environment: str) -> Process:
+    def serve_as(self, actions: list[list[str]]) -> Process:
         """An action server for each type, name and definition."""
-        server = Process(SERVER, str(WORKERS), json.dumps(actions), python=ROS2_PYTHON, **environment)
+        server = Process(SERVER, str(WORKERS), json.dumps(actions), python=ROS2_PYTHON)
         self.processes.append(server)
         server.expect("ready")
         return server

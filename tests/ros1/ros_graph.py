@@ -9,7 +9,7 @@ import signal
 import socket
 import subprocess
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ class Process:
         *arguments: str,
         python: Path = ROS_PYTHON,
         master: str = "",
-        **environment: str,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         self.said: queue.Queue[list[Any]] = queue.Queue()
         self.process = subprocess.Popen(
@@ -51,7 +51,7 @@ class Process:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env={**os.environ, "ROS_MASTER_URI": master, **environment},
+            env={**os.environ, "ROS_MASTER_URI": master, **(environment or {})},
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -100,7 +100,7 @@ class Graph:
     def serve(self, *skills: Skill, **environment: str) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
         actions = [[s.ros.type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
-        server = Process(SERVER, str(WORKERS), json.dumps(actions), master=self.uri, **environment)
+        server = Process(SERVER, str(WORKERS), json.dumps(actions), environment=environment, master=self.uri)
         self.processes.append(server)
         server.expect("ready")
         return server

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.ros.ros2 import INSTALL, NEEDS
 from codebotler.robots.ros.worker import lacks
-from ros2_scene import PROFILE, ROS2_PYTHON, Scene
+from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
 
 HERE = Path(__file__).parent
 DOMAIN = 40  # and the number of the test process: each has a graph of its own
@@ -34,6 +35,8 @@ def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
         patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros2")))
         patch.setenv("FASTDDS_DEFAULT_PROFILES_FILE", str(PROFILE))
+        actions = [skill.ros for skill in SKILLS.rows if skill.ros is not None]
+        installed("robot_actions_pkg", {action.type: action.definition for action in actions})
         yield
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import os
 import re
 import signal
@@ -21,7 +20,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, Options, Pictu
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros.robot import Waits
 from codebotler.robots.ros.worker import WORKERS
-from ros2_scene import ROS2_PYTHON, Scene
+from ros2_scene import ROS2_PYTHON, Scene, installed
 from ros_graph import GO_TO, SAY, started
 
 
@@ -241,25 +240,6 @@ def test_installed_package_is_preferred_and_its_feedback_is_told(
     told: list[str | Picture] = []
     robot.perform("go_to", ["feedback"], told.append)
     assert told == ["near: the hall"]
-
-
-BUILD = """
-import json, sys
-sys.path.insert(0, sys.argv[1])
-from ros2_types import built
-print("at", built(sys.argv[2], json.loads(sys.argv[3])))
-"""
-
-
-def installed(package: str, definitions: dict[str, str]) -> str:
-    """Build a package as if it was installed; what is then on the path."""
-    done = subprocess.run(
-        [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS), package, json.dumps(definitions)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return done.stdout.splitlines()[-1].removeprefix("at ")
 
 
 def test_many_goals_in_a_row_and_none_is_lost(scene: Scene) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import inspect
 import json
 import os
 import shutil
@@ -114,7 +115,7 @@ def built(package: str, definitions: Definitions, tell: Callable[[str], object] 
 
     shares = {name: Path(share(name)) for name in (*NEEDED, *("rosidl_" + name for name in GENERATORS))}
     versions = [(folder / "package.xml").read_text() for folder in shares.values()]
-    parts = [package, definitions, sysconfig.get_config_var("SOABI"), versions, Path(__file__).read_text()]
+    parts = [package, definitions, sysconfig.get_config_var("SOABI"), versions, inspect.getsource(_Build)]
     key = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "codebotler" / "ros2"
     folder = home / f"{package}-{key}"
