@@ -72,8 +72,12 @@ class Server:
             handle.succeed()
         return self.spec.Result()
 
+    def end_for(self, handle: Any) -> Any:
+        """The future of a goal, which may be cancelled before it is executed."""
+        return self.ends.setdefault(bytes(handle.goal_id.uuid), Future(executor=executor))
+
     async def end_of(self, handle: Any, text: str) -> None:
-        end = self.ends[bytes(handle.goal_id.uuid)] = Future(executor=executor)
+        end = self.end_for(handle)
         if text == "by somebody else":
             self.cancels.call_async(CancelGoal.Request())
         await end
@@ -87,7 +91,7 @@ class Server:
         tell("cancel", text)
         if text == REFUSES:
             return CancelResponse.REJECT
-        end = self.ends[bytes(handle.goal_id.uuid)]
+        end = self.end_for(handle)
         threading.Timer(0.3 if text == "late" else 0, resolve, [end]).start()
         return CancelResponse.ACCEPT
 

@@ -81,14 +81,14 @@ def test_stop_at_any_moment_leaves_no_goal_running(scene: Scene) -> None:
     server = scene.serve(GO_TO)
     robot = scene.robot()
     robot.connect()
-    for moment in range(0, 30, 3):
+    for moment in range(30):
         with started(lambda: robot.perform("go_to", ["never"])) as ended:
             time.sleep(moment / 1000)
             robot.cancel()
         assert isinstance(ended["error"], CancelledError)
         time.sleep(0.05)
-        heard = [server.said.get()[0] for _ in range(server.said.qsize())]
-        assert heard in ([], ["goal", "cancel"]), moment
+        heard = {server.said.get()[0] for _ in range(server.said.qsize())}
+        assert heard in (set(), {"goal", "cancel"}), moment  # in any order, and cancelled more than once
         robot._stopped = False  # connected as it is
 
 
