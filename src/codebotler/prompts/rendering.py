@@ -72,6 +72,16 @@ class Prompt:
             text=self.text.removesuffix(self.opening) + text + "\n",
         )
 
+    def after_no_program(self, why: str) -> Prompt:
+        """The request once more after a reply without a program; base models get the same one again.
+
+        Args:
+            why: what was wrong with the reply, in a sentence.
+        """
+        *before, request = self.messages
+        asked = f"{request.text}\n\n{_filled('no-program', why=why)}"
+        return replace(self, messages=(*before, replace(request, text=asked)))
+
     def program_from(self, reply: str) -> str:
         """The program in a base model's continuation of `text`, without whatever follows it."""
         if re.match(rf"\s*(```|(async )?def {TASK}\b)", reply):

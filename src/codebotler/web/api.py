@@ -61,7 +61,13 @@ class Approval(_Form):
 class Again(_Form):
     """A request for another program."""
 
-    repair: bool = Field(default=False, description="Whether to send the model the program and its problems.")
+    repair: bool = Field(
+        default=False,
+        description="Whether to send the model the program and its problems, or why there is none.",
+    )
+    max_tokens: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="Another limit for replies, such as `higher_limit` of `no_program`."
+    )
 
 
 class AnyText(JSONResponse):
@@ -153,7 +159,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         """Have the model write another program, which is then checked."""
         session = _at_hand(console, mission)
         with _refusing():
-            session.ask_again(repair=again.repair)
+            session.ask_again(repair=again.repair, max_tokens=again.max_tokens)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")
@@ -248,9 +254,10 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "instruction": view.instruction,
         "model": view.model,
         "author": view.author,
-        "program": view.program,
+        "program": view.arriving.code if view.is_written else view.program,
         "digest": view.digest,
         "is_written": view.is_written,
+        "no_program": None if view.programless is None else asdict(view.programless),
         "problems": list(view.problems),
         "unknown_rooms": list(view.unknown_rooms),
         "remarks": list(view.remarks),

@@ -22,6 +22,7 @@ HEADLINES: Mapping[Phase, str] = {
     "": "No mission yet",
     "writing": "The program is being written",
     "checking": "The program is being checked",
+    "no-program": "There is no program yet",
     State.CHECKED: "Ready: waiting for your approval",
     State.APPROVED: "Starting",
 }
@@ -56,7 +57,7 @@ class RobotPane:
         """Show a view."""
         self._tell_interrupted(self._console.interrupted)
         progress = view.progress
-        self._state.say(HEADLINES.get(view.phase) or view.phase.capitalize())
+        self._state.say(_headline(view))
         self._state.classes(replace=f"headline {view.phase or 'none'}")
         doing = progress.doing
         self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
@@ -113,6 +114,12 @@ class RobotPane:
             for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
             Button("Dismiss", self._console.dismiss, "plain")
+
+
+def _headline(view: SessionView) -> str:
+    if view.phase == State.CHECKED and view.problems:
+        return "The program has problems" if view.can_run else "The program cannot run"
+    return HEADLINES.get(view.phase) or view.phase.capitalize()
 
 
 def map_state(view: SessionView, world: World) -> MapState:
