@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from inspect import Signature, signature
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
-from codebotler.models.base import PAPER_MAX_TOKENS, Model, SamplingSettings
-from codebotler.models.recorded import is_recorded
+from codebotler.models.sampling import PAPER_MAX_TOKENS, SamplingSettings
+
+if TYPE_CHECKING:
+    from codebotler.models.base import Model
 
 Command = TypeVar("Command", bound=Callable[..., object])
 
@@ -112,6 +114,8 @@ def _json_object(text: str) -> dict[str, Any]:
 
 def note_unsent(asked: SamplingSettings, model: Model) -> None:
     """Say which settings a model does not take, so that they are not sent."""
+    from codebotler.models.recorded import is_recorded
+
     names = ("temperature", "top_p")
     unsent = [name for name in names if getattr(model.settings, name) is None is not getattr(asked, name)]
     if unsent and not is_recorded(model.name):

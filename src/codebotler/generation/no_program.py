@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from codebotler.core.words import brief
-from codebotler.models.base import DEMANDED_MAX_TOKENS, Reply, SamplingSettings
+from codebotler.models.base import Reply
 from codebotler.models.no_program import IN_WORDS, NoProgram
+from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
 
 RAISED = 4  # times the limit at which a reply was cut off
 MOST_QUOTED = 200  # characters of a refusal

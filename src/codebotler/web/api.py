@@ -63,7 +63,7 @@ class Again(_Form):
 
     repair: bool = Field(
         default=False,
-        description="Whether to send the model the program and its problems, or why there is none.",
+        description="Whether to send the model the program and its problems.",
     )
     max_tokens: Annotated[int, Field(ge=1)] | None = Field(
         default=None, description="Another limit for replies, such as `higher_limit` of `no_program`."
