@@ -100,8 +100,10 @@ def test_attempts_are_told_as_they_end_also_where_a_later_one_fails() -> None:
         "program": "bad 0",
         "problems": ["line 1 says bad 0"],
         "raw_reply": "bad 0",
-        "usage": {"input_tokens": 3, "output_tokens": 4},
+        "no_program": None,
+        "usage": {"input_tokens": 3, "output_tokens": 4, "reasoning_tokens": None},
         "latency_s": 0.25,
         "finish_reason": "stop",
+        "reasoning": "",
     }
     assert rows[0]["prompt"][0]["role"] == "system"
