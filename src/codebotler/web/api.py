@@ -65,8 +65,9 @@ class Again(_Form):
         default=False,
         description="Whether to send the model the program and its problems.",
     )
-    max_tokens: Annotated[int, Field(ge=1)] | None = Field(
-        default=None, description="Another limit for replies, such as `higher_limit` of `no_program`."
+    max_tokens: Annotated[int, Field(ge=0)] = Field(
+        default=0,
+        description="Another limit for replies, such as `higher_limit` of `no_program`; 0 for none.",
     )
 
 
@@ -159,7 +160,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         """Have the model write another program, which is then checked."""
         session = _at_hand(console, mission)
         with _refusing():
-            session.ask_again(repair=again.repair, max_tokens=again.max_tokens)
+            session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")

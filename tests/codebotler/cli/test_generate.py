@@ -243,7 +243,7 @@ def test_a_reply_that_was_cut_off_names_the_option_that_helps(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("repair", [False, True])
-def test_a_reply_without_a_program_is_asked_for_again(repair: bool, tmp_path: Path) -> None:
+def test_a_reply_without_a_program_is_asked_for_again(*, repair: bool, tmp_path: Path) -> None:
     with Server(answer=lambda _: FINE) as server:
         server.faults.append(Fault.WITHOUT_CODE)
         ended = written(server, "--retries", "1", *["--repair"] * repair, cwd=tmp_path)

@@ -82,7 +82,7 @@ def test_a_refusal_is_quoted_and_kept_short() -> None:
 
 
 @pytest.mark.parametrize("repair", [False, True])
-def test_a_reply_without_a_program_is_not_checked_and_asked_for_again(repair: bool) -> None:
+def test_a_reply_without_a_program_is_not_checked_and_asked_for_again(*, repair: bool) -> None:
     prose = reply_from("I am afraid that I cannot do that.", Usage(), 0.0, "stop")
     model = Scripted([prose, reply(PROGRAM, None)])
     generation = made(model, retries=1, repair=repair)

@@ -59,9 +59,9 @@ class ProgramPane:
             with self._approval:
                 self._despite = ui.checkbox("Run it despite the problems", on_change=self._ticked)
                 self._run = Button("Run it on the robot", self._approve, "go")
+                self._raise = Button("", self._raise_limit, "plain")
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
                 self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
-                self._raise = Button("", self._raise_limit, "plain")
             self._board = ui.element("div").classes("storyboard")
         self._view = console.view
         ui.run_javascript(f"programEditor.start({self._editor.id})")

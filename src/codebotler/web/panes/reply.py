@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nicegui import html
 
+from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.view import SessionView
 from codebotler.web.frame import PlainText
 
@@ -23,9 +24,18 @@ class ReplyPane:
         """Show a view."""
         none = None if view.is_over or view.is_written else view.programless
         self._why.say("" if none is None else none.sentence)
-        arrived = view.arriving.text if view.is_written else ""
-        self._text.say(_end_of(arrived) if none is None else _start_of(none.text))
-        self._reasoning.say("" if none is None else _start_of(none.reasoning))
+        self._text.say(_end_of(view.arriving.text) if view.is_written else _text_of(none))
+        self._reasoning.say(_reasoning_of(none))
+
+
+def _text_of(none: ProgramlessReply | None) -> str:
+    """The text of a reply, unless the sentence about it has all of it."""
+    return "" if none is None or none.sentence.endswith(none.text.strip()) else _start_of(none.text)
+
+
+def _reasoning_of(none: ProgramlessReply | None) -> str:
+    """The thoughts before a reply, unless they are a part of its text."""
+    return "" if none is None or none.reasoning in none.text else _start_of(none.reasoning)
 
 
 class _Folded:
