@@ -102,7 +102,7 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
 def tell_missing(robot: Robot) -> None:
     """Say what a robot lacks, as far as that is known before it is connected."""
     if robot.missing:
-        note(f"{robot.name} lacks {listed(list(robot.missing))}; programs that need them fail")
+        note(f"{robot.name} has no {listed(list(robot.missing))}; models read of its other skills only")
 
 
 def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], Check]:

@@ -98,7 +98,7 @@ def missing_skills(program: str, robot: Robot) -> list[str]:
     """A sentence for each skill that a program calls and a connected robot lacks."""
     called = called_skills(tree_of(program), robot.skills)
     return [
-        f"line {line}: the robot cannot {skill}: {visible(robot.missing[skill])}"
+        f"line {line}: This robot has no `{skill}` skill: {visible(robot.missing[skill])}"
         for skill, line in sorted(called.items(), key=lambda item: item[1])
         if skill in robot.missing
     ]

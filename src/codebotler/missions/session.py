@@ -328,7 +328,8 @@ class MissionSession:
     async def _written(self, model: Model, before: SessionView, how: Again) -> Generation:
         rooms = () if before.room_map is None else before.room_map.rooms
         rules = [rule.says for rule in self._view.rules_in_force]
-        prompt = prompt_for(self._order.instruction, rooms=rooms, rules=rules, skills=self._robot.skills)
+        skills = self._robot.skills.without(self._robot.missing)
+        prompt = prompt_for(self._order.instruction, rooms=rooms, rules=rules, skills=skills)
         if how.repair and before.problems:
             prompt = prompt.after(before.program, before.problems)
         elif how.repair and before.programless is not None:

@@ -151,6 +151,19 @@ def test_a_model_is_told_the_robots_own_words(
     assert ('"cellar"' in capsys.readouterr().out) is bool(status)
 
 
+def test_a_model_is_offered_no_skill_that_the_robot_lacks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = Writing('def task_program():\n    go_to("hall")\n    pick("mug")\n')
+    robot = Answering(knowing(["hall"], "hall"))
+    robot.missing = {"pick": "no server listens"}
+    assert run_mission(robot, Request("bring the mug", yes=True), tmp_path, lambda _: model) == 1
+    asked = "\n".join(message.text for message in model.asked[0].messages)
+    assert "def place(" in asked
+    assert "pick(" not in asked
+    assert "line 3: This robot has no `pick` skill: no server listens" in capsys.readouterr().err
+
+
 def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
     robot = Simulated(World((Room("hall"), Room("kitchen|cafe")), "hall"), speed=None)
     robot.connect()
