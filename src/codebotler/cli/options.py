@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from codebotler import __version__
 from codebotler.core.terminal import note, print_text
+
+if TYPE_CHECKING:
+    from codebotler.core.skills.table import SkillTable
+    from codebotler.core.world import World
 
 
 def robot_names(incomplete: str) -> list[str]:
@@ -107,14 +111,19 @@ NoTokenOption = Annotated[
 ]
 
 
-def world_or_office(robot: str, world: Path | None) -> Path | None:
-    """The world file that is named, or else an office for the simulated robot."""
+def world_or_office(robot: str, file: Path | None, skills: SkillTable) -> World | None:
+    """The world in the file that is named, or else an office for the simulated robot."""
+    from codebotler.core.world import World
     from codebotler.robots.simulated import OFFICE
 
-    if world is not None or robot != "sim":
-        return world
-    note("the robot works in an example office; --world FILE names another world")
-    return OFFICE
+    file = OFFICE if file is None and robot == "sim" else file
+    return None if file is None else World.read(file, skills)
+
+
+def note_office(robot: str, file: Path | None) -> None:
+    """Say that the simulated robot works in an office where no file names a world."""
+    if file is None and robot == "sim":
+        note("the robot works in an example office; --world FILE names another world")
 
 
 def command_line(name: str, about: str) -> typer.Typer:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from codebotler.checking.evasions import evasions
 from codebotler.checking.problems import Check
-from codebotler.checking.rule_review import unknown_rooms_in
+from codebotler.checking.rule_rooms import expect_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import Generation, write_program
@@ -248,8 +248,8 @@ class MissionSession:
             self._show(room_map=rooms_to_check(room_map, self._remark))
             rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
             regexes = () if room_map is None or room_map.plain else rooms
-            unknown = unknown_rooms_in(rules, rooms) if rooms else ()
-            for sentence in (*unknown, *evasions(rules, regexes, self._robot.skills)):
+            expect_rooms(rules, rooms)
+            for sentence in evasions(rules, regexes, self._robot.skills):
                 self._remark(sentence)
             if order.has_program:
                 self._take(mission, order.program)
@@ -359,7 +359,8 @@ class MissionSession:
             mission.draft(program, view.author)
             check = self._check(program, view.room_map, view.rules_in_force)
             missing = tuple(missing_skills(program, self._robot))
-            unknown = unknown_rooms(program, view.room_map) if view.room_map and not check.problems else ()
+            known = None if check.problems else view.room_map
+            unknown = unknown_rooms(program, known, self._robot.skills) if known else ()
             checked = replace(
                 view, check=check, missing_skills=missing, unknown_rooms=tuple(unknown), busy=""
             )

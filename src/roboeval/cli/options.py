@@ -159,7 +159,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS
     from roboeval.suites.house import HouseRules
-    from roboeval.suites.load import load_suite
+    from roboeval.suites.load import load_suite, rooms_in
 
     read = load_suite(suite, skills=skills_from(*(skills or ())))
     if rules is not None and read.house is not None:
@@ -168,10 +168,9 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
         )
     if rules is None:
         return read
-    house = HouseRules.read(rules, read.skills)
-    worlds = [scenario.world for task in read.tasks.values() for scenario in task.scenarios]
-    rooms = dict.fromkeys(room.name for world in worlds for room in world.rooms)
-    for sentence in evasions(house.rules, [*rooms], SKILLS):  # in simulation, rules see inside own skills
+    rooms = rooms_in(read.tasks.values())
+    house = HouseRules.read(rules, read.skills, rooms)
+    for sentence in evasions(house.rules, rooms, SKILLS):  # in simulation, rules see inside own skills
         note(sentence)
     return read.with_house_rules(house)
 

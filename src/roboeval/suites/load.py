@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from os import PathLike
@@ -198,12 +198,14 @@ def _suite_of(
     words = head.rules.words_for_people
     own = [folder / name for name in head.skills]
     skills = skills.with_skills(skills_from(*own)) if own else skills
-    house = None if head.house_rules is None else HouseRules.of_suite(folder / head.house_rules, skills)
     lenders = [_lender(file, head.instructions, path) if head.instructions else None for path in paths]
     tasks = [
         read_task(document, path, skills, lender=lender, count=count, seed=seed, words=words)
         for document, path, lender in zip(documents, paths, lenders, strict=True)
     ]
+    house = None
+    if head.house_rules is not None:
+        house = HouseRules.of_suite(folder / head.house_rules, skills, rooms_in(tasks))
     drawn = any(task.drawn for task in tasks)
     return Suite(
         name=head.name,
@@ -220,6 +222,12 @@ def _suite_of(
         seed=seed if drawn else None,
         skills=skills,
     )
+
+
+def rooms_in(tasks: Iterable[Task]) -> list[str]:
+    """The names of all rooms in the worlds of tasks."""
+    worlds = (scenario.world for task in tasks for scenario in task.scenarios)
+    return list(dict.fromkeys(room.name for world in worlds for room in world.rooms))
 
 
 def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
