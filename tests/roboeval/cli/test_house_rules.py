@@ -143,3 +143,14 @@ def test_a_suite_with_rules_of_its_own_takes_no_others(folder: Path) -> None:
     told = refused(*hasty, "--rules", "house.yaml", cwd=folder)
     assert "has house rules of its own, which would not count; leave out --rules" in str(told)
     assert not (folder / "run").exists()
+
+
+def test_a_room_that_no_world_of_the_suite_has_is_refused(folder: Path) -> None:
+    path = folder / "house.yaml"
+    path.write_text(RULES.replace('not tr.AtLeast(check("person"), 3)', 'not tr.Exists(goto("kichen"))'))
+    arguments = ("evaluate", "recorded:careful", "--rules", "house.yaml", *TASKS)
+    refusal = refused(*arguments, cwd=folder)
+    assert refusal.at == ("house.yaml", 9)
+    assert '"kitchen"' in refusal.sentence
+    path.write_text(path.read_text().replace("says: Look", "any: true\n    says: Look"))
+    assert roboeval(*arguments, cwd=folder).status == 0
