@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
@@ -32,10 +33,12 @@ from roboeval.cli.options import (
     TasksOption,
     WorkersOption,
     command,
+    engine_named,
     load,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
+from roboeval.cli.rounds import further_rounds
 
 if TYPE_CHECKING:
     from codebotler.models.base import Model
@@ -51,6 +54,7 @@ class Requested(NamedTuple):
     plan: GenerationPlan
     model: Model
     pace: Pace
+    open_again: Callable[[], Model]
 
 
 @with_options_of(model_settings)
@@ -81,10 +85,14 @@ def requested(
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
     own = None if known.folder is None else known.folder / "solutions"  # which recorded models know as well
     knows_more = is_recorded(chosen.name) and chosen.base_url is None
-    opened = recorded_model(chosen.name, own) if knows_more else open_model(chosen.name, settings)
+
+    def open_chosen() -> Model:
+        return recorded_model(chosen.name, own) if knows_more else open_model(chosen.name, settings)
+
+    opened = open_chosen()
     note_unsent(settings, opened)
     run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", opened.name).strip("-.")))
-    return Requested(run, plan, opened, pace)
+    return Requested(run, plan, opened, pace, open_chosen)
 
 
 def complete(requested: Requested) -> Path:
@@ -92,7 +100,7 @@ def complete(requested: Requested) -> Path:
     from codebotler.models.recorded import NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
-    run, plan, model, pace = requested
+    run, plan, model, pace, _ = requested
     meter = Meter()
     try:
         with meter:
@@ -129,6 +137,13 @@ def run(
     with_report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write the report, to the folder report of the run.")
     ] = True,
+    repair: Annotated[
+        int,
+        typer.Option(min=0, help="Rounds in which the model repairs programs that the check rejects."),
+    ] = 0,
+    retries: Annotated[
+        int, typer.Option(min=0, help="Rounds in which rejected programs are requested again.")
+    ] = 0,
     json: JsonOption = False,
     **options: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
@@ -136,6 +151,10 @@ def run(
 
     It prints the tables. After an interruption, the same command continues.
     """
+    if repair and retries:
+        fail("--repair and --retries exclude each other; give one of them")
+    if json and (repair or retries):
+        fail("--json prints the first programs only; leave it out, and evaluate each round's folder with it")
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
@@ -152,11 +171,24 @@ def run(
         one_process_per_run=one_process_per_run,
         json=json,
     )
+    paths = [path]
+    if repair or retries:
+        with engine_named("local", workers, require_isolation=require_isolation) as engine_for:
+            paths += further_rounds(
+                what.run,
+                what.plan,
+                repair or retries,
+                repairs=bool(repair),
+                engine=lambda: engine_for(0),
+                complete=lambda run, plan: complete(
+                    what._replace(run=run, plan=plan, model=what.open_again())
+                ),
+            )
     if not with_report:
         return
     folder = path / "report"
     try:
-        report([path], folder, suite=suite, workers=workers)
+        report(paths, folder, suite=suite, workers=workers)
     except KeyboardInterrupt:
         again = command("report", path, "--out", folder, suite=suite)
         note(f"roboeval: stopped; verdicts are in {path}; `{again}` writes the report")

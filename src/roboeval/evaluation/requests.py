@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import platform
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,7 +17,7 @@ from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.core.words import brief
 from codebotler.models.base import Model
 from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts import template_hash
+from codebotler.prompts import Prompt, prompt_for, template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
@@ -43,6 +43,23 @@ class GenerationPlan:
     def instruction(self, key: Key) -> str:
         """The instruction that a completion is for."""
         return self.suite.tasks[key[0]].prompts[key[1]]
+
+    def prompt(self, key: Key) -> Prompt:
+        """The request for a completion."""
+        rules, skills = self.suite.house_sentences, self.suite.skills
+        return prompt_for(self.instruction(key), rules=rules, skills=skills)
+
+    def sample(self, key: Key) -> int:
+        """The number of the sample, from which its seed comes."""
+        return key[2]
+
+    def given(self) -> Iterable[Completion]:
+        """Completions that are taken over from elsewhere."""
+        return ()
+
+    def mark(self) -> Mapping[str, int]:
+        """What rows of completions.jsonl say besides the reply."""
+        return {}
 
     def completed(self, run: Run) -> Iterator[Completion]:
         """The completions that a run has; raises UserError if one's instruction is no longer the suite's."""
@@ -110,6 +127,7 @@ def with_batch(
     batch = {
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
         "num_completions": plan.num_completions,
+        **plan.mark(),
         "settings": asdict(settings),
         "codebotler": __version__,
         "python": platform.python_version(),

@@ -163,7 +163,7 @@ def test_a_model_is_offered_no_skill_that_the_robot_lacks(
     asked = "\n".join(message.text for message in model.asked[0].messages)
     assert "def place(" in asked
     assert "pick(" not in asked
-    assert "line 3: This robot has no `pick` skill: no server listens" in capsys.readouterr().err
+    assert "line 3: this robot has no `pick` skill: no server listens" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("any_room", [False, True])
