@@ -45,7 +45,7 @@ def test_a_reply_without_a_program_says_why_and_can_be_asked_for_again(
         model.faults.extend([fault, fault])
         page = opened(server)
         ask(page)
-        expect(page.locator(".program .trouble:visible")).to_have_text(WORDS[fault])
+        expect(page.locator(".programless")).to_have_text(WORDS[fault])
         expect(page.locator(".headline")).to_have_text("There is no program yet")
         expect(page.get_by_role("button", name="Run it on the robot")).to_be_hidden()
         expect(page.get_by_text("SyntaxError")).to_have_count(0)
@@ -56,7 +56,7 @@ def test_a_reply_without_a_program_says_why_and_can_be_asked_for_again(
         button(page, "Ask for the program only")
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
-        expect(page.locator(".program .trouble")).to_be_hidden()
+        expect(page.locator(".programless")).to_be_hidden()
         first, again, repaired = (request.body["messages"] for request in model.requests)
         assert first == again != repaired
         page.context.close()
@@ -66,7 +66,7 @@ def test_a_filtered_request_is_not_sent_with_advice(tmp_path: Path, opened: Open
     with Server(fault=lambda _: Fault.FILTERED) as model, serving(tmp_path, model) as server:
         page = opened(server)
         ask(page)
-        expect(page.locator(".program .trouble:visible")).to_contain_text("A content filter blocked")
+        expect(page.locator(".programless")).to_contain_text("A content filter blocked")
         expect(page.get_by_text("The prompt triggered the content policy")).to_be_visible()
         expect(page.get_by_role("button", name="Ask again", exact=True)).to_be_visible()
         expect(page.get_by_role("button", name="Ask for the program only")).to_be_hidden()
@@ -85,7 +85,7 @@ def test_a_reply_that_was_cut_off_is_asked_for_with_a_higher_limit(
     ):
         page = opened(server, size=PHONE)
         ask(page)
-        expect(page.locator(".program .trouble:visible")).to_have_text("The reply was cut off at 16 tokens.")
+        expect(page.locator(".programless")).to_have_text("The reply was cut off at 16 tokens.")
         shoot(page, "no-program-cut-off-phone")
         page.set_viewport_size({"width": DESK[0], "height": DESK[1]})
         shoot(page, "no-program-cut-off")
@@ -104,12 +104,12 @@ def test_a_program_stays_approvable_where_the_next_reply_holds_none(
         ask(page)
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         button(page, "Ask again")
-        expect(page.locator(".program .trouble:visible")).to_contain_text("The model refused")
+        expect(page.locator(".programless")).to_contain_text("The model refused")
         expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
         shoot(page, "no-program-but-one-before")
         button(page, "Run it on the robot")
         expect(page.locator(".headline")).to_have_text("Done")
-        expect(page.locator(".program .trouble")).to_be_hidden()
+        expect(page.locator(".programless")).to_be_hidden()
         page.context.close()
 
 

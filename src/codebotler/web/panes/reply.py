@@ -16,7 +16,7 @@ class ReplyPane:
     """Shows what a model says besides a program, and why there is no program."""
 
     def __init__(self) -> None:
-        self._why = PlainText("p", "", "trouble").props("role=alert")
+        self._why = PlainText("p", "", "programless").props("role=alert")
         self._text = _Folded("What the model says", is_open=True)
         self._reasoning = _Folded("What the model thought before", is_open=False)
 
