@@ -104,7 +104,7 @@ def test_a_program_stays_approvable_where_the_next_reply_holds_none(
         ask(page)
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         button(page, "Ask again")
-        expect(page.locator(".programless")).to_contain_text("The model refused")
+        expect(page.locator(".programless")).to_contain_text("The program from before is kept.")
         expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
         shoot(page, "no-program-but-one-before")
         button(page, "Run it on the robot")

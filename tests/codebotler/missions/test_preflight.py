@@ -175,7 +175,7 @@ def test_a_rule_with_a_misspelt_room_lets_no_mission_begin(tmp_path: Path, *, an
     if any_room:
         assert run_mission(robot, request, tmp_path, nobody) == 0
     else:
-        with pytest.raises(UserError, match="bobs office.*bob's office"):
+        with pytest.raises(UserError, match=r"bobs office.*bob's office"):
             run_mission(robot, request, tmp_path, nobody)
         (mission,) = missions(tmp_path)
         assert (mission.state, robot.connections) == (State.FAILED, 0)

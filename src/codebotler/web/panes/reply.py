@@ -22,8 +22,10 @@ class ReplyPane:
 
     def show(self, view: SessionView) -> None:
         """Show a view."""
-        none = None if view.is_over or view.is_written else view.programless
-        self._why.say("" if none is None else none.sentence)
+        waits = (view.may_be_approved or view.waits_for_program) and not view.is_written
+        none = view.programless if waits else None
+        kept = " The program from before is kept." if view.program else ""
+        self._why.say("" if none is None else none.sentence + kept)
         self._text.say(_end_of(view.arriving.text) if view.is_written else _text_of(none))
         self._reasoning.say(_reasoning_of(none))
 
