@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 from urllib.parse import urlsplit
 
 from codebotler.core.errors import UserError
+from codebotler.models.no_program import NoProgram, is_cut_off, why_no_program
 from codebotler.prompts import Prompt
+from codebotler.prompts.extract import read_reply
 
 Heard: TypeAlias = Callable[[str], None]
 HOTTEST = 100  # a higher temperature is a typo
+PAPER_MAX_TOKENS = 512
+"""The limit for a reply in the paper's experiments, in tokens; also for base models, which may never end."""
+DEMANDED_MAX_TOKENS = 16_384
+"""The limit for a chat reply where one is demanded and the user names none, in tokens."""
 
 
 @dataclass(frozen=True)
 class SamplingSettings:
-    """How a model is asked.
+    """The settings of requests; what is None is not sent.
 
     Args:
         temperature: from 0 (always the likeliest token) up to about 2; None leaves it to the model.
-        top_p: the share of likely tokens to draw from, above 0 and up to 1; None leaves it to the model.
-        max_tokens: the limit for a reply, in tokens, at least 1.
+        top_p: the share of likely tokens to sample from, above 0 and up to 1; None leaves it to the model.
+        max_tokens: the limit for a reply, in tokens, at least 1; None leaves it to a chat model, and is
+            512 for a base model.
         seed: fixes the random numbers, where a model takes a seed; reply number n gets `seed + n`.
         timeout: the limit for one whole request, in seconds.
         base_url: where the model is served, such as `http://localhost:8000/v1`; None for the provider's own.
+        reasoning_effort: how much a reasoning model thinks, in its provider's words, such as `low`.
+        extra_body: further fields of the JSON that is sent.
 
     Raises:
         UserError: a value is out of its range.
@@ -34,17 +43,19 @@ class SamplingSettings:
 
     temperature: float | None = 0.2
     top_p: float | None = 0.95
-    max_tokens: int = 512
+    max_tokens: int | None = None
     seed: int | None = None
-    timeout: float = 60.0
+    timeout: float = 600.0
     base_url: str | None = None
+    reasoning_effort: str | None = None
+    extra_body: Mapping[str, Any] | None = field(default=None, hash=False)
 
     def __post_init__(self) -> None:
         if self.temperature is not None and not 0 <= self.temperature <= HOTTEST:
             raise UserError(f"the temperature is {self.temperature:g}, but must be between 0 and {HOTTEST}")
         if self.top_p is not None and not 0 < self.top_p <= 1:
             raise UserError(f"top-p is {self.top_p:g}, but it must be above 0 and at most 1")
-        if self.max_tokens < 1:
+        if self.max_tokens is not None and self.max_tokens < 1:
             raise UserError(f"the limit of tokens is {self.max_tokens}, but it must be at least 1")
         if not 0 < self.timeout < math.inf:
             raise UserError(f"the timeout is {self.timeout:g} seconds, but it must be above 0")
@@ -54,6 +65,12 @@ class SamplingSettings:
     def seed_of(self, number: int) -> int | None:
         """The seed for reply number `number`, counted from 0."""
         return None if self.seed is None else self.seed + number
+
+    def for_base_model(self, name: str) -> SamplingSettings:
+        """The settings with a base model's limit; raises UserError for what only chat models take."""
+        if self.reasoning_effort is not None:
+            raise UserError(f"{name} is a base model, which takes no reasoning effort")
+        return replace(self, max_tokens=self.max_tokens or PAPER_MAX_TOKENS)
 
 
 def _check_url(url: str) -> None:
@@ -77,10 +94,17 @@ def _check_url(url: str) -> None:
 
 @dataclass(frozen=True)
 class Usage:
-    """The tokens that a request took; None where the model does not count them."""
+    """The tokens that a request took; None where the model does not count them.
+
+    Args:
+        input_tokens: the tokens of the prompt.
+        output_tokens: the tokens of the reply, with its reasoning.
+        reasoning_tokens: the tokens of the reasoning alone.
+    """
 
     input_tokens: int | None = None
     output_tokens: int | None = None
+    reasoning_tokens: int | None = None
 
     @property
     def total(self) -> int:
@@ -93,11 +117,14 @@ class Reply:
     """A model's reply.
 
     Args:
-        text: the whole reply.
+        text: the reply as it came, with calls of tools as text; of a refused request what the server said.
         program: the program in it; any text, which need not even parse.
         usage: the tokens that it took.
         latency_s: the seconds from the request to the end of the reply.
-        finish_reason: why it ended, such as `stop` or `length`; None where the model does not say.
+        finish_reason: why it ended, as the server said it, such as `stop` or `length`; None if it said
+            nothing.
+        reasoning: what the model thought before it answered, where the server shows it.
+        no_program: why it holds no program; None if it does, or if that is uncertain.
     """
 
     text: str = field(repr=False)
@@ -105,6 +132,45 @@ class Reply:
     usage: Usage
     latency_s: float
     finish_reason: str | None
+    reasoning: str = field(default="", repr=False)
+    no_program: NoProgram | None = None
+
+    @property
+    def is_cut_off(self) -> bool:
+        """Whether it ended at the limit of tokens, whether or not its program is whole."""
+        return is_cut_off(self.finish_reason)
+
+
+def reply_from(
+    text: str,
+    usage: Usage,
+    latency_s: float,
+    finish_reason: str | None,
+    *,
+    opening: Prompt | None = None,
+    reasoning: str = "",
+    said: NoProgram | None = None,
+    has_answer: bool = True,
+) -> Reply:
+    """A reply with its program.
+
+    Args:
+        text: the reply as it came.
+        usage: the tokens that it took.
+        latency_s: the seconds that it took.
+        finish_reason: why it ended, as the server said it.
+        opening: the prompt that a base model goes on from; None for a chat model.
+        reasoning: what the server sent as the model's thoughts, apart from the text.
+        said: the kind of reply without a program that the server made known in another way.
+        has_answer: whether the text is the model's answer, in which a program may be.
+    """
+    answer = text if has_answer else ""
+    found = read_reply(
+        answer if opening is None else opening.program_from(answer), continues=opening is not None
+    )
+    why = why_no_program(found.program, finish_reason, has_code=found.has_code and has_answer, said=said)
+    thoughts = "\n".join(filter(None, (reasoning, found.reasoning)))
+    return Reply(text, found.program, usage, latency_s, finish_reason, thoughts, why)
 
 
 def unheard(_piece: str) -> None:
@@ -120,6 +186,10 @@ class Model(Protocol):
     @property
     def name(self) -> str:
         """The name on a command line and in a run, such as `openai-chat:gpt-5.1`."""
+
+    @property
+    def settings(self) -> SamplingSettings:
+        """The settings that it really sends: what its provider does not take is None."""
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
         """Request one reply.
@@ -147,14 +217,20 @@ class ModelError(Exception):
         sentence: what went wrong and, where it helps, the mend; it holds no keys.
         may_pass: whether the same request may succeed later.
         retry_after: the seconds to wait that the server asks for, if it does.
+        is_refusal: whether the server refused this prompt, rather than failed.
     """
 
-    def __init__(self, sentence: str, *, may_pass: bool, retry_after: float | None = None) -> None:
+    def __init__(
+        self, sentence: str, *, may_pass: bool, retry_after: float | None = None, is_refusal: bool = False
+    ) -> None:
         super().__init__(sentence)
         self.sentence, self.may_pass, self.retry_after = sentence, may_pass, retry_after
+        self.is_refusal = is_refusal
 
     def __reduce__(self) -> tuple[object, ...]:
-        made = partial(type(self), may_pass=self.may_pass, retry_after=self.retry_after)
+        made = partial(
+            type(self), may_pass=self.may_pass, retry_after=self.retry_after, is_refusal=self.is_refusal
+        )
         return made, (self.sentence,), vars(self)
 
 

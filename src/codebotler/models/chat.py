@@ -6,22 +6,38 @@ import difflib
 import inspect
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, cast
 
+import openai
+from openai.types import CompletionUsage
 from pydantic_ai import exceptions, messages
 from pydantic_ai.direct import model_request_stream
 from pydantic_ai.models import Model, infer_model, known_model_names
-from pydantic_ai.models.openai import OpenAIChatModel
+from pydantic_ai.models.openai import OpenAIChatModel, OpenAIResponsesModel, OpenAIStreamedResponse
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.base import (
+    DEMANDED_MAX_TOKENS,
+    Heard,
+    ModelError,
+    Reply,
+    SamplingSettings,
+    Usage,
+    reply_from,
+    unheard,
+)
+from codebotler.models.http_client import bound, cannot_open, limit_of, with_proxy, without_proxy
 from codebotler.models.keys import blank_is_unset, guard_logs, key_in, without_keys
-from codebotler.models.reply_limit import bound, limit_of
+from codebotler.models.openai_stream import Chunks, make_lenient
 from codebotler.models.server_errors import (
     broken_off,
+    error_in_reply,
     failure,
+    is_filtered,
     model_error_in,
     refused,
     timed_out,
@@ -29,9 +45,9 @@ from codebotler.models.server_errors import (
     unreachable,
 )
 from codebotler.prompts import Message, PictureMessage, Prompt
-from codebotler.prompts.extract import program_of
 
 OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and the like
+OPENAI = "://api.openai.com/"
 VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")
 KEY_VARIABLE = re.compile(r"\b[A-Z][A-Z0-9]*_[A-Z0-9_]*(?:KEY|TOKEN)[A-Z0-9_]*")
 INSTALL = re.compile(r'pip install "?[\w\[\],.-]+"?')
@@ -48,22 +64,10 @@ class ChatModel:
         provider, _, model = name.partition(":")
         if provider == "openai" and settings.base_url is not None:
             name = f"{OWN_SERVER}:{model}"
-        self.name, self.settings = name, settings
+        self.name = name
         self._model = _model(name, settings)
-        asked = ModelSettings(
-            max_tokens=settings.max_tokens,
-            timeout=settings.timeout,
-            max_retries=0,
-            request_timeout=settings.timeout,
-        )
-        if settings.temperature is not None:
-            asked["temperature"] = settings.temperature
-        if settings.top_p is not None:
-            asked["top_p"] = settings.top_p
-        for guarantee in ("timeout", "max_retries"):  # pydantic-ai warns of what it cannot keep
-            if guarantee in self._model.unsupported_settings:
-                del asked[guarantee]
-        self._asked = asked
+        self.settings = taken_settings(self._model, name, settings)
+        self._asked = _request_settings(self._model, self.settings)
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
@@ -73,14 +77,16 @@ class ChatModel:
         if (seed := self.settings.seed_of(number)) is not None:
             asked = ModelSettings(**asked, seed=seed)
         try:
-            response = await self._response(messages_of(prompt.messages), asked, heard)
+            response, chunks = await self._response(messages_of(prompt.messages), asked, heard)
         except ModelError:
             raise
         except Exception as error:  # noqa: BLE001 - each provider's library has errors of its own
-            raise (model_error_in(error) or self._error(error)) from None
-        text = without_keys(response.text or "")
-        latency = time.monotonic() - start
-        return Reply(text, program_of(text).source, _usage(response), latency, response.finish_reason)
+            failed = model_error_in(error) or with_proxy(self._error(error), self.settings.base_url)
+            if not _is_filtered(error):
+                raise failed from None
+            latency = time.monotonic() - start
+            return reply_from(failed.sentence, Usage(), latency, None, said="filtered", has_answer=False)
+        return self._reply(response, chunks, time.monotonic() - start)
 
     async def close(self) -> None:
         """Close the connections."""
@@ -89,8 +95,11 @@ class ChatModel:
 
     async def _response(
         self, asked: list[messages.ModelMessage], settings: ModelSettings, heard: Heard
-    ) -> messages.ModelResponse:
+    ) -> tuple[messages.ModelResponse, Chunks | None]:
         async with model_request_stream(self._model, asked, model_settings=settings) as stream:
+            chunks = None
+            if isinstance(stream, OpenAIStreamedResponse):
+                chunks = stream._response = Chunks(stream._response)  # type: ignore[assignment]  # noqa: SLF001
             async for event in stream:
                 match event:
                     case messages.PartStartEvent(part=messages.TextPart(content=piece)) if piece:
@@ -100,11 +109,27 @@ class ChatModel:
             response = stream.get()
         # A stream that ends too early, but in good order, differs from a whole one only by what it lacks; for
         # chat completions pydantic-ai makes up a reason for the end.
-        details = response.provider_details or {}
-        is_made_up = isinstance(self._model, OpenAIChatModel) and "finish_reason" not in details
-        if is_made_up or response.finish_reason is None or response.state != "complete":
+        ended = response.finish_reason is not None if chunks is None else chunks.is_whole
+        if not ended or response.state != "complete":
             raise broken_off(self.name, begun=bool(response.parts))
-        return response
+        return response, chunks
+
+    def _reply(self, response: messages.ModelResponse, chunks: Chunks | None, latency_s: float) -> Reply:
+        details = response.provider_details or {}
+        refusal = details.get("refusal") or ""
+        calls = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
+        texts = [response.text or "", str(refusal), *map(_call_in_words, calls)]
+        thoughts = [p.content for p in response.parts if isinstance(p, messages.ThinkingPart) and p.content]
+        said = chunks and chunks.finish_reason
+        return reply_from(
+            without_keys("\n".join(filter(None, texts))),
+            _usage(response) if chunks is None else _usage_in_chunk(chunks.usage),
+            latency_s,
+            said or details.get("finish_reason") or (None if chunks else response.finish_reason),
+            reasoning=without_keys("\n".join(thoughts)),
+            said="refusal" if refusal else "tool-call" if calls else None,
+            has_answer=bool(response.text),
+        )
 
     def _error(self, error: Exception) -> ModelError:
         is_hopeless = isinstance(
@@ -115,11 +140,12 @@ class ChatModel:
                 return timed_out(self.name, self.settings.timeout)
             case exceptions.ModelHTTPError(status_code=status, body=body, retry_after=wait):
                 return refused(self.name, status, body, retry_after=wait, hopeless=is_hopeless)
-            case exceptions.ModelAPIError():
+            case exceptions.ModelAPIError(__cause__=openai.APIError(body=body)) if body is not None:
+                return error_in_reply(self.name, body)
+            case exceptions.ModelAPIError() | exceptions.ContentFilterError() | exceptions.UserError():
+                may_pass = isinstance(error, exceptions.ModelAPIError) and not is_hopeless
                 nobody = unreachable(self.name, error, self.settings.base_url)
-                return nobody or failure(self.name, error, may_pass=not is_hopeless)
-            case exceptions.ContentFilterError() | exceptions.UserError():
-                return failure(self.name, error, may_pass=False)
+                return nobody or failure(self.name, error, may_pass=may_pass)
             case exceptions.UnexpectedModelBehavior():
                 return broken_off(self.name, begun=False)
         is_transport = isinstance(error, OSError) or type(error).__module__.split(".")[0] in TRANSPORTS
@@ -149,11 +175,86 @@ def _user_part(message: Message) -> messages.UserPromptPart:
     return messages.UserPromptPart([message.text, picture])
 
 
+def _is_filtered(error: Exception) -> bool:
+    if isinstance(error, exceptions.ModelHTTPError):
+        return is_filtered(error.status_code, error.body)
+    return isinstance(error, exceptions.ContentFilterError)
+
+
+def _call_in_words(call: messages.ToolCallPart) -> str:
+    return f"[tool call] {call.tool_name}({call.args_as_json_str()})"
+
+
 def _usage(response: messages.ModelResponse) -> Usage:
     usage = response.usage
     if usage.unmeasured_requests or not (usage.input_tokens or usage.output_tokens):
         return Usage()
-    return Usage(usage.input_tokens, usage.output_tokens)
+    return Usage(usage.input_tokens, usage.output_tokens, usage.details.get("reasoning_tokens"))
+
+
+def _usage_in_chunk(usage: CompletionUsage | None) -> Usage:
+    if usage is None:
+        return Usage()
+    details = usage.completion_tokens_details
+    reasoning = None if details is None else details.reasoning_tokens
+    return Usage(usage.prompt_tokens, usage.completion_tokens, reasoning)
+
+
+# --- settings
+
+
+def taken_settings(model: Model, name: str, settings: SamplingSettings) -> SamplingSettings:
+    """The settings without what a model does not take, and with the limit that its provider demands."""
+    profile: Mapping[str, Any] = model.profile
+    if model.system == "anthropic":
+        if profile.get("anthropic_disallows_sampling_settings"):
+            settings = replace(settings, temperature=None, top_p=None)
+        elif settings.temperature is not None:  # newer models refuse both together
+            settings = replace(settings, top_p=None)
+        return replace(settings, max_tokens=settings.max_tokens or DEMANDED_MAX_TOKENS)
+    if isinstance(model, OpenAIChatModel | OpenAIResponsesModel):
+        if _reasons(profile, settings.reasoning_effort):
+            settings = replace(settings, temperature=None, top_p=None)
+        refused_settings = profile.get("openai_unsupported_model_settings", ())
+        if "temperature" in refused_settings:
+            settings = replace(settings, temperature=None)
+        if "top_p" in refused_settings:
+            settings = replace(settings, top_p=None)
+        return settings
+    if settings.reasoning_effort is not None and not profile.get("supports_thinking"):
+        raise UserError(f"{name} takes no reasoning effort; leave it out")
+    return settings
+
+
+def _reasons(profile: Mapping[str, Any], effort: str | None) -> bool:
+    """Whether a model of OpenAI's reasons when it is asked so; then it refuses sampling settings."""
+    if not profile.get("openai_supports_reasoning"):
+        return False
+    efforts = profile.get("openai_reasoning_efforts")
+    can_be_off = (
+        profile.get("openai_supports_reasoning_effort_none") if efforts is None else "none" in efforts
+    )
+    if effort is None:
+        return not can_be_off or bool(profile.get("thinking_enabled_by_default"))
+    return not (can_be_off and effort == "none")
+
+
+def _request_settings(model: Model, settings: SamplingSettings) -> ModelSettings:
+    """The settings as pydantic-ai takes them; what is None is left out."""
+    is_openai = isinstance(model, OpenAIChatModel | OpenAIResponsesModel)
+    given: dict[str, Any] = {
+        "max_tokens": settings.max_tokens,
+        "temperature": settings.temperature,
+        "top_p": settings.top_p,
+        "openai_reasoning_effort" if is_openai else "thinking": settings.reasoning_effort,
+        "extra_body": None if settings.extra_body is None else dict(settings.extra_body),
+        "max_retries": 0,
+        "timeout": settings.timeout,
+        "request_timeout": settings.timeout,
+    }
+    unkept = {"timeout", "max_retries"} & model.unsupported_settings  # pydantic-ai warns of them
+    kept = {key: value for key, value in given.items() if value is not None and key not in unkept}
+    return cast("ModelSettings", kept)
 
 
 # --- opening
@@ -166,9 +267,14 @@ def _model(name: str, settings: SamplingSettings) -> Model:
         for variable in variables:
             key_in(variable)
         with blank_is_unset(variables):
-            return infer_model(
-                name, lambda wanted: _bounded(_provider(wanted, settings.base_url), name, settings)
-            )
+            with without_proxy(settings.base_url):
+                model = infer_model(
+                    name, lambda wanted: _bounded(_provider(wanted, settings.base_url), name, settings)
+                )
+            if settings.base_url is not None and isinstance(model, OpenAIChatModel):
+                # Own servers know `max_tokens`, and many of them ignore OpenAI's newer name for it.
+                model.profile["openai_chat_supports_max_completion_tokens"] = OPENAI in settings.base_url
+            return model
     except UserError:
         raise
     except ImportError as error:
@@ -178,7 +284,7 @@ def _model(name: str, settings: SamplingSettings) -> Model:
     except Exception as error:  # noqa: BLE001 - each provider's library has errors of its own
         missing = VARIABLE.search(str(error))
         if missing is None:
-            raise UserError(f"{name} cannot be used: {told(error)}") from None
+            raise cannot_open(name, error) from None
         raise UserError(f"{name} needs the key in {missing[1]}; set it in the environment") from None
 
 
@@ -212,10 +318,17 @@ def _provider(name: str, base_url: str | None) -> Provider[object]:
 
 def _bounded(provider: Provider[object], name: str, settings: SamplingSettings) -> Provider[object]:
     """The provider, with a limit on the replies that its client takes, and any client that replaces it."""
+    if isinstance(client := provider.client, openai.AsyncOpenAI):
+        make_lenient(client)
     first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - no public way
     if first is None or make is None:  # it uses no client of HTTP, or a library keeps that to itself
         return provider
     limit = limit_of(settings.max_tokens)
+
+    def bounded() -> Any:  # noqa: ANN401 - see bound
+        with without_proxy(settings.base_url):
+            return bound(make(), name, limit)
+
     bound(first, name, limit)
-    provider._http_client_factory = lambda: bound(make(), name, limit)  # noqa: SLF001 - it has no other way
+    provider._http_client_factory = bounded  # noqa: SLF001 - it has no other way
     return provider

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import re
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from urllib.parse import quote
@@ -95,7 +96,11 @@ _REDACTION = _Redaction()
 
 
 def guard_logs() -> None:
-    """Take keys out of the logs of the libraries that talk to models; to be called once they are imported."""
+    """Take keys out of the logs of the libraries that talk to models, and silence their warnings.
+
+    Call it once they are imported. What a model does not take is told by ourselves.
+    """
+    warnings.filterwarnings("ignore", module="|".join(LOGGERS))
     known = logging.root.manager.loggerDict
     for name in [*LOGGERS, *(name for name in known if name.startswith(tuple(f"{top}." for top in LOGGERS)))]:
         logging.getLogger(name).addFilter(_REDACTION)

@@ -6,7 +6,7 @@ import asyncio
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,11 +15,19 @@ import torch
 import transformers
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.base import (
+    DEMANDED_MAX_TOKENS,
+    Heard,
+    ModelError,
+    Reply,
+    SamplingSettings,
+    Usage,
+    reply_from,
+    unheard,
+)
 from codebotler.models.keys import guard_logs
 from codebotler.models.server_errors import failure, told
 from codebotler.prompts import Message, Prompt
-from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import task_end
 
 BLOCK = 10  # replies to a prompt that share a seed; runs usually have a multiple of ten for each prompt
@@ -85,6 +93,14 @@ class LocalModel:
         if self.tokenizer.pad_token_id is None:
             self.tokenizer.pad_token = self.tokenizer.eos_token or self.tokenizer.convert_ids_to_tokens(0)
         self.is_chat = bool(self.tokenizer.chat_template)
+        if settings.reasoning_effort is not None or settings.extra_body is not None:
+            raise UserError(
+                f"{self.name} runs on this machine and takes no --reasoning-effort or --extra-body"
+            )
+        if self.is_chat:
+            self.settings = replace(settings, max_tokens=settings.max_tokens or DEMANDED_MAX_TOKENS)
+        else:
+            self.settings = settings.for_base_model(self.name)
         ends = model.generation_config.eos_token_id
         ends = ends if isinstance(ends, list) else [ends]
         self.ends = {*ends, self.tokenizer.eos_token_id} - {None}
@@ -108,10 +124,8 @@ class LocalModel:
         text, usage, finish_reason = ending
         if rest := text[job.told :]:
             heard(rest)
-        program = program_of(
-            text if self.is_chat else prompt.program_from(text), continues=not self.is_chat
-        ).source
-        return Reply(text, program, usage, time.monotonic() - start, finish_reason)
+        opening = None if self.is_chat else prompt
+        return reply_from(text, usage, time.monotonic() - start, finish_reason, opening=opening)
 
     async def close(self) -> None:
         """Release the memory of the model."""
@@ -211,7 +225,7 @@ class LocalModel:
             sequences = self.model.generate(
                 **tokens,
                 **self._sampling(),
-                max_new_tokens=min(self.settings.max_tokens, self.longest - start),
+                max_new_tokens=min(self.settings.max_tokens or DEMANDED_MAX_TOKENS, self.longest - start),
                 num_beams=1,
                 pad_token_id=self.tokenizer.pad_token_id,
                 eos_token_id=sorted(self.ends) or None,

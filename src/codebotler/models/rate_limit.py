@@ -16,7 +16,16 @@ from tenacity import (
 )
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.base import (
+    BudgetSpentError,
+    Heard,
+    Model,
+    ModelError,
+    Reply,
+    SamplingSettings,
+    Usage,
+    unheard,
+)
 from codebotler.prompts import Prompt
 
 LOG = logging.getLogger("codebotler.models")
@@ -84,6 +93,11 @@ class RateLimited:
         """The name of the model."""
         return self.model.name
 
+    @property
+    def settings(self) -> SamplingSettings:
+        """The settings that the model sends."""
+        return self.model.settings
+
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
         """Request one reply, with further tries.
 
@@ -112,7 +126,12 @@ class RateLimited:
                 if times == 1:
                     raise
                 sentence = f"{error.sentence} (tried {times} times)"
-                raise ModelError(sentence, may_pass=error.may_pass, retry_after=error.retry_after) from None
+                raise ModelError(
+                    sentence,
+                    may_pass=error.may_pass,
+                    retry_after=error.retry_after,
+                    is_refusal=error.is_refusal,
+                ) from None
 
     async def close(self) -> None:
         """Close the model."""
@@ -140,6 +159,7 @@ class RateLimited:
         self.usage = Usage(
             _sum(self.usage.input_tokens, reply.usage.input_tokens),
             _sum(self.usage.output_tokens, reply.usage.output_tokens),
+            _sum(self.usage.reasoning_tokens, reply.usage.reasoning_tokens),
         )
         self.spent += reply.usage.total or _estimate(prompt, len(reply.text))
         return reply

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.yaml_files import YamlFile
-from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
 from codebotler.prompts import Prompt
 
 FOLDER = Path(__file__).with_name("recorded")
@@ -85,6 +85,7 @@ class RecordedModel:
     name: str  # such as `recorded:careful`
     replies: Mapping[str, tuple[Solution, ...]] = field(repr=False)  # by instruction, at least one each
     offered: tuple[str, ...] = field(default=(), repr=False)  # instructions that make sense by themselves
+    settings: SamplingSettings = field(default_factory=partial(SamplingSettings, None, None))
 
     def solution(self, instruction: str, index: int) -> Solution:
         """The reply for completion number `index`, counted from 0; they come round again."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 
 from codebotler.core.words import brief
 from codebotler.models.base import ModelError
 from codebotler.models.keys import redacted
 
-SERVER_ERROR = 500
+SUCCESS, SERVER_ERROR = 299, 500
 LATER = (408, 409, 425, 429)  # the statuses below 500 that may pass
 MENDS = {
     401: "; is the right key in the environment?",
@@ -17,6 +18,12 @@ MENDS = {
 }
 NO_CONNECTION = "ConnectError"  # of httpx or httpx2, whichever a provider's library has
 MOST = 300  # characters of what a server says
+OF_PROMPT = (400, 413, 422)  # the statuses that may be about this one prompt
+FILTER = re.compile(
+    r"content[\s_-]*(?:filter|management|policy)|safety system|data_inspection", re.IGNORECASE
+)
+PASSING = re.compile(r"rate_?limit|overload|unavailable|server_?error|internal|timeout", re.IGNORECASE)
+"""Found in the types and codes of errors that may pass."""
 
 
 def failure(name: str, what: str | Exception, *, may_pass: bool) -> ModelError:
@@ -67,7 +74,24 @@ def refused(
     said = f" ({text})" if (text := told(body)) else ""
     sentence = f"{name}: the server answered with status {status}{said}{MENDS.get(status, '')}"
     may_pass = not hopeless and (status >= SERVER_ERROR or status in LATER)
-    return ModelError(sentence, may_pass=may_pass, retry_after=retry_after)
+    return ModelError(
+        sentence, may_pass=may_pass, retry_after=retry_after, is_refusal=not hopeless and status in OF_PROMPT
+    )
+
+
+def error_in_reply(name: str, body: object) -> ModelError:
+    """The error that a server sends in the place of a reply, with a status of success."""
+    said = body if isinstance(body, Mapping) else {}
+    code = next((said[key] for key in ("code", "status") if said.get(key)), None)
+    if str(code).isdigit() and int(str(code)) > SUCCESS:
+        return refused(name, int(str(code)), body)
+    may_pass = bool(PASSING.search(f"{code} {said.get('type')}"))
+    return ModelError(f"{name}: the server sent an error: {told(body) or 'no text'}", may_pass=may_pass)
+
+
+def is_filtered(status: int | None, body: object) -> bool:
+    """Whether a refused request was refused by a filter of contents, by the word of the server."""
+    return status in OF_PROMPT and FILTER.search(str(body)) is not None
 
 
 def told(said: object) -> str:

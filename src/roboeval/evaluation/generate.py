@@ -129,6 +129,10 @@ class _LoggedModel:
     def name(self) -> str:
         return self.model.name
 
+    @property
+    def settings(self) -> SamplingSettings:
+        return self.model.settings
+
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
         self.log.sent(_KEY.get())
         try:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import openai
 import pytest
 
-from codebotler.models import reply_limit
+from codebotler.models import http_client
 from codebotler.models.base import Model, ModelError, Reply, SamplingSettings, Usage
 from codebotler.models.open import open_model
 from codebotler.prompts import Message, Prompt, prompt_for
@@ -263,7 +263,7 @@ def test_more_than_a_reply_can_be_is_not_read(
 ) -> None:
     for key in ("ANTHROPIC_API_KEY", "GOOGLE_API_KEY", "OPENAI_API_KEY"):
         monkeypatch.setenv(key, "a key of nobody")
-    monkeypatch.setattr(reply_limit, "FLOOR", 200_000)
+    monkeypatch.setattr(http_client, "FLOOR", 200_000)
     server.faults.append(fault)
     with pytest.raises(
         ModelError, match="200,000 bytes" if fault is Fault.ENDLESS else "compressed"
@@ -276,8 +276,8 @@ def test_more_than_a_reply_can_be_is_not_read(
 
 
 def test_a_limit_follows_the_tokens() -> None:
-    assert reply_limit.limit_of(1) == reply_limit.FLOOR
-    assert reply_limit.limit_of(100_000) == 100_000 * reply_limit.PER_TOKEN > reply_limit.FLOOR
+    assert http_client.limit_of(1) == http_client.FLOOR
+    assert http_client.limit_of(100_000) == 100_000 * http_client.PER_TOKEN > http_client.FLOOR
 
 
 @both

@@ -1,0 +1,69 @@
+"""Why a reply holds no program, as far as the server says it or the text leaves no doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, TypeAlias, get_args
+
+from codebotler.prompts.extract import defines_task
+from codebotler.simulator.isolated_call import IsolatedCallError
+
+NoProgram: TypeAlias = Literal["cut-off", "tool-call", "refusal", "filtered", "empty", "no-code"]
+"""The kinds of replies without a program."""
+
+NO_PROGRAM_KINDS: tuple[NoProgram, ...] = get_args(NoProgram)
+IN_WORDS: Mapping[NoProgram, str] = {
+    "cut-off": "The reply was cut off before the program was complete.",
+    "tool-call": "The model called a tool instead of writing a program.",
+    "refusal": "The model refused.",
+    "filtered": "A content filter blocked the request or the reply.",
+    "empty": "The reply is empty.",
+    "no-code": "The reply holds no code.",
+}
+
+_CUT_OFF = {"length", "max_tokens", "max_output_tokens", "max_length", "model_length", "token_limit"}
+_BY_REASON: Mapping[str, NoProgram] = {
+    **dict.fromkeys(_CUT_OFF, "cut-off"),
+    **dict.fromkeys(("tool_call", "tool_calls", "tool_use", "function_call"), "tool-call"),
+    **dict.fromkeys(("malformed_function_call", "unexpected_tool_call"), "tool-call"),
+    "refusal": "refusal",
+    **dict.fromkeys(("content_filter", "content_filtered", "safety", "recitation", "blocklist"), "filtered"),
+    **dict.fromkeys(("prohibited_content", "spii", "language", "guardrail_intervened"), "filtered"),
+}
+"""What servers say about the end of a reply, in lower case."""
+
+
+def is_cut_off(finish_reason: str | None) -> bool:
+    """Whether a reply ended at the limit of tokens, by the word of its server."""
+    return (finish_reason or "").lower() in _CUT_OFF
+
+
+def why_no_program(
+    program: str, finish_reason: str | None, *, has_code: bool, said: NoProgram | None = None
+) -> NoProgram | None:
+    """Why a reply holds no program; None if it holds one, or something that may be meant as one.
+
+    A reply that was cut off behind a whole program holds one.
+
+    Args:
+        program: what was taken for the program.
+        finish_reason: why the reply ended, as the server said it; None if it said nothing.
+        has_code: whether there is any code in the reply.
+        said: the kind that the server made known in another way, such as a field for refusals.
+
+    Raises:
+        EngineError: no isolated process can be started.
+    """
+    kind = said or _BY_REASON.get((finish_reason or "").lower())
+    if kind is not None and not (program.strip() and _is_whole(program)):
+        return kind
+    if has_code or kind is not None:
+        return None
+    return "no-code" if program.strip() else "empty"
+
+
+def _is_whole(program: str) -> bool:
+    try:
+        return defines_task(program)
+    except IsolatedCallError:
+        return False
