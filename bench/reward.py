@@ -22,8 +22,8 @@ from codebotler.simulator.pool import SHARED, WorkerPool, cores
 from completions import models
 from roboeval import Completion, evaluate, load_suite, recorded_completions, reward
 from roboeval.evaluation.runs.completions import read_completions
+from roboeval.suites.families.tasks import trained_task
 from roboeval.suites.load import Suite
-from roboeval.training.families import trained_task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 

@@ -26,15 +26,19 @@ from roboeval.cli.evaluate import evaluate
 from roboeval.cli.options import (
     BudgetOption,
     ConcurrencyOption,
+    FamiliesOption,
+    GenerationSeedOption,
     IsolationOption,
     JsonOption,
     NumOption,
+    NumTasksOption,
     OutOption,
     ProcessOption,
     RateOption,
     SuiteOption,
     TasksOption,
     WorkersOption,
+    chosen_suite,
     command,
     load,
     with_options_of,
@@ -66,20 +70,21 @@ def completed(
     from codebotler.models.base import SamplingSettings
     from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
-    from codebotler.models.recorded import NOTICE, is_recorded, recorded_model
+    from codebotler.models.recorded import NOTICE, is_recorded
     from roboeval.evaluation.generate import Pace, generate_run
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+    from roboeval.evaluation.runs.source import recorded_model_for
 
     chosen = chosen_model(model, base_url)
     settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, chosen.base_url)
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    own = None if known.folder is None else known.folder / "solutions"  # which recorded models know as well
     knows_more = is_recorded(chosen.name) and chosen.base_url is None
-    opened = recorded_model(chosen.name, own) if knows_more else open_model(chosen.name, settings)
-    run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", opened.name).strip("-.")))
+    opened = recorded_model_for(chosen.name, known) if knows_more else open_model(chosen.name, settings)
+    folder = re.sub(r"[^\w.]+", "-", opened.name).strip("-.")
+    run = Run(out or Path("runs", folder if known.families is None else f"{folder}-{known.name}"))
     meter = Meter()
     try:
         with meter:
@@ -96,11 +101,19 @@ def completed(
 
 
 @with_options_of(completed)
-def generate(*, suite: SuiteOption = "paper", **options: Any) -> None:  # noqa: ANN401 - of several kinds
+def generate(
+    *,
+    suite: SuiteOption = "paper",
+    families: FamiliesOption = None,
+    num_tasks: NumTasksOption = None,
+    seed: GenerationSeedOption = None,
+    **options: Any,  # noqa: ANN401 - of several kinds
+) -> None:
     """Have a model write programs for a suite.
 
     After an interruption, the same command continues.
     """
+    suite, options["seed"] = chosen_suite(suite, families, num_tasks, seed)
     path = completed(suite=suite, **options)
     note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
 
@@ -109,6 +122,9 @@ def generate(*, suite: SuiteOption = "paper", **options: Any) -> None:  # noqa: 
 def run(
     *,
     suite: SuiteOption = "paper",
+    families: FamiliesOption = None,
+    num_tasks: NumTasksOption = None,
+    seed: GenerationSeedOption = None,
     tasks: TasksOption = None,
     workers: WorkersOption = None,
     require_isolation: IsolationOption = False,
@@ -125,6 +141,7 @@ def run(
     """
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
+    suite, options["seed"] = chosen_suite(suite, families, num_tasks, seed)
     path = completed(suite=suite, tasks=tasks, **options)
     evaluate(
         str(path),

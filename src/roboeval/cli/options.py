@@ -55,6 +55,13 @@ def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
 
 
+def split_names(incomplete: str) -> list[str]:
+    """The splits of families."""
+    from roboeval.suites.families.suite import SPLITS
+
+    return [name for name in SPLITS if name.startswith(incomplete)]
+
+
 def engine_names(incomplete: str) -> list[str]:
     """The engines."""
     return [name for name in ("local", "ray") if name.startswith(incomplete)]
@@ -133,6 +140,22 @@ WorldsOption = Annotated[
 SeedOption = Annotated[
     int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
 ]
+FamiliesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SPLIT",
+        help="Fresh tasks of families, from train, validation or test; --seed makes others.",
+        autocompletion=split_names,
+    ),
+]
+NumTasksOption = Annotated[
+    int | None,
+    typer.Option(min=1, max=100, help="With --families: how many tasks; by default one of each family."),
+]
+GenerationSeedOption = Annotated[
+    int | None,
+    typer.Option(help="The random seed, if the model takes one; with --families, of the tasks instead."),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
     Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=named("a run"))
@@ -187,6 +210,22 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
     for sentence in evasions(house.rules, [*rooms], SKILLS):  # in simulation, rules see inside own skills
         note(sentence)
     return read.with_house_rules(house)
+
+
+def chosen_suite(
+    suite: str, families: str | None, num_tasks: int | None, seed: int | None
+) -> tuple[str, int | None]:
+    """The suite that a command names, or that its families make of a seed, and the seed for the model."""
+    from roboeval.suites.families.suite import FamilyTasks
+    from roboeval.suites.families.tasks import family_names
+
+    if families is None:
+        if num_tasks is not None:
+            fail("--num-tasks needs --families; add it")
+        return suite, seed
+    if suite != "paper":
+        fail("--families makes a suite of its own; leave out --suite")
+    return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name, None
 
 
 def command(

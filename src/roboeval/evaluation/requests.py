@@ -78,6 +78,7 @@ def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: SamplingS
     metadata = fixed | {
         "num_completions": plan.num_completions,
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
+        **_families(plan.suite),
         "base_url": settings.base_url,
         "codebotler": __version__,
         "python": platform.python_version(),
@@ -97,6 +98,13 @@ def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: SamplingS
         why = "is missing, so that the settings of the completions are unknown"
         raise UserError(f"{why}; name another folder", file=run.about)
     return metadata
+
+
+def _families(suite: Suite) -> dict[str, Any]:
+    """From which families the tasks were made, and what a later version must make of them."""
+    if suite.families is None:
+        return {}
+    return {"families": {**asdict(suite.families), "version": suite.version, "digest": suite.digest}}
 
 
 def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> None:

@@ -6,14 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
 from codebotler.core.errors import UserError, expect_list
-from codebotler.core.words import listed
 from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import prompt_for
-from roboeval.training.families import family_file, family_names, trained_prompts, trained_task
-
-SIZE = 1_000_000_000
-SPLITS = {"train": 0, "validation": SIZE, "test": 2 * SIZE}
-"""The first seed of each split, which has so many."""
+from roboeval.suites.families.suite import first_seed
+from roboeval.suites.families.tasks import family_file, family_names, trained_prompts, trained_task
 
 Form: TypeAlias = Literal["chat", "text"]
 Completion: TypeAlias = str | Sequence[Mapping[str, Any]]
@@ -47,19 +43,11 @@ def load_prompts(
     Raises:
         UserError: there is no such split or family, or the count or the seed is out of range.
     """
-    if split not in SPLITS:
-        raise UserError(f'there is no split "{split}"; there is {listed(list(SPLITS))}')
+    first = first_seed(split, seed, count, "prompt")
     expect_list(only, "the families")
     for name in only:
         family_file(name)
-    if count < 1:
-        raise UserError(f"the number of prompts is {count}, but it must be at least 1")
-    if not 0 <= seed * count <= SIZE - count:
-        raise UserError(
-            f"the seed is {seed}, but with {count:,} prompts it must be from 0 to {SIZE // count - 1:,}"
-        )
     names = tuple(only) or family_names()
-    first = SPLITS[split] + seed * count
     rows: list[dict[str, Any]] = []
     for number in range(first, first + count):
         if len(rows) < len(names):  # once for each family, whose file may be wrong

@@ -10,9 +10,9 @@ import pytest
 
 from codebotler.core.errors import UserError
 from hacking import earned, hacks, honest, taken_back
+from roboeval.suites.families.tasks import TAKES_BACK, family_names, trained_prompts, trained_task
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
-from roboeval.training.families import TAKES_BACK, family_names, trained_prompts, trained_task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 

@@ -14,10 +14,11 @@ from codebotler.core.errors import UserError
 from codebotler.simulator.pool import AHEAD, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
+from roboeval.suites.families.suite import SPLITS
+from roboeval.suites.families.tasks import TrainedTask, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.training import prompts, rollouts
-from roboeval.training.families import TrainedTask, trained_task
-from roboeval.training.prompts import SPLITS, load_prompts, program_in
+from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
 FAMILY = "BringThing"

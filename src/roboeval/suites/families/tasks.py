@@ -112,7 +112,7 @@ class TrainedTask:
 @cache
 def family_names() -> tuple[str, ...]:
     """The names of all families that are here, sorted."""
-    return tuple(sorted(path.stem for path in (FOLDER / "families").glob("*.yaml")))
+    return tuple(sorted(path.stem for path in (FOLDER / "templates").glob("*.yaml")))
 
 
 def family_file(family: str) -> Path:
@@ -130,7 +130,7 @@ def family_file(family: str) -> Path:
         raise UserError(
             f'there is no family "{family}"; there is {listed(family_names())}, or a .yaml file of your own'
         )
-    return FOLDER / "families" / f"{family}.yaml"
+    return FOLDER / "templates" / f"{family}.yaml"
 
 
 def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask:
@@ -197,7 +197,7 @@ def _made(family: str, seed: int, worlds: int) -> TrainedTask:
     if isinstance(content.get("prompts"), list):  # else the sentence about it comes when the task is read
         content["prompts"] = [*_phrasings(template, chosen, random)]
     task_file = file.part("task", content)
-    head = _head()
+    head = suite_file()
     rules = head.rules
     task = _without_denial(
         read_task(
@@ -337,5 +337,6 @@ def _words() -> Mapping[str, list[str]]:
 
 
 @cache
-def _head() -> SuiteFile:
+def suite_file() -> SuiteFile:
+    """The rules by which tasks of families are judged, and their version."""
     return YamlFile.read(FOLDER / "training.yaml").validate(SuiteFile)
