@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
 from codebotler.prompts import Prompt
 
 PROGRAM = 'def task_program():\n    say("{number}")\n'
@@ -32,6 +32,7 @@ class Scripted:
     log: Path | None = None
     text: str = PROGRAM
     name: str = "scripted:one"
+    settings: SamplingSettings = field(default_factory=SamplingSettings)
     asked: list[tuple[str, int]] = field(default_factory=list)
     under_way: int = 0
     most: int = 0

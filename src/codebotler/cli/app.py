@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from codebotler.cli import options
 from codebotler.cli.ending import obey
+from codebotler.cli.model_options import model_settings, with_options_of
 from codebotler.cli.operating import missions, robots, run, serve_page, virtual_robot
 from codebotler.core.terminal import note, noting_all
 
 
+@with_options_of(model_settings)
 def generate(
     instruction: Annotated[str, typer.Argument(help="What the robot should do, in plain words.")],
     model: options.ModelOption = None,
@@ -21,14 +23,10 @@ def generate(
     repair: options.RepairOption = False,
     record: options.RecordOption = None,
     show_prompt: options.ShowPromptOption = False,
-    temperature: options.TemperatureOption = 0.2,
-    top_p: options.TopPOption = 0.95,
-    max_tokens: options.MaxTokensOption = 512,
-    seed: options.SeedOption = None,
-    timeout: options.TimeoutOption = 60.0,
     base_url: options.BaseUrlOption = None,
     rules: options.RulesOption = None,
     skills: options.SkillsOption = None,
+    **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Have a model write a program, and print it.
 
@@ -38,11 +36,11 @@ def generate(
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world import World
-    from codebotler.models.base import SamplingSettings
     from codebotler.models.chosen import chosen_model
     from codebotler.prompts import prompt_for
 
     chosen = chosen_model(model, base_url)
+    settings = chosen.with_its_server(model_settings(**sampling))
     table = skills_from(*(skills or ()))
     known = None if world is None else World.read(world, table)
     house_rules = rules_for(known, rules, table)
@@ -55,7 +53,6 @@ def generate(
     if show_prompt:
         show(prompt, chosen.name)
         return
-    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, chosen.base_url)
     tries = int(repair) if retries is None else retries
     accepted = write(
         prompt,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from codebotler.cli import options
+from codebotler.cli.model_options import model_settings, with_options_of
 from codebotler.core.terminal import note, print_text
 
 
+@with_options_of(model_settings)
 def run(
     program: Annotated[
         str,
@@ -35,6 +37,7 @@ def run(
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
     rules: options.RulesOption = None,
     skills: options.SkillsOption = None,
+    **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
@@ -46,7 +49,6 @@ def run(
     from codebotler.core.files import home
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world import World
-    from codebotler.models.base import SamplingSettings
     from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
     from codebotler.robots.base import Options
@@ -56,7 +58,7 @@ def run(
     table = skills_from(*(skills or ()))
     house_rules = () if rules is None else read_rules(rules, table)
     request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
-    asked = SamplingSettings(base_url=chosen.base_url)
+    asked = chosen.with_its_server(model_settings(**sampling))
     world = options.world_or_office(robot, world)
     settings = Options(
         world=None if world is None else World.read(world, table),
@@ -122,6 +124,7 @@ def robots(
         print_rich(robots_view(found))
 
 
+@with_options_of(model_settings)
 def serve_page(
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
@@ -149,6 +152,7 @@ def serve_page(
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
     rules: options.RulesOption = None,
     skills: options.SkillsOption = None,
+    **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Serve the web page for operating a robot.
 
@@ -177,7 +181,7 @@ def serve_page(
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
     settings = Options(known, speed or None, address, ros_python, table)
     shown = Face(face_timeout) if face else None
-    opened = opener(models, base_url)
+    opened = opener(models, base_url, model_settings(**sampling))
     body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
     tell_missing(body)
     console = Console(body, home(), opened, models=models, world=known, face=shown, rules=house_rules)

@@ -79,14 +79,6 @@ RecordOption = Annotated[Path | None, typer.Option(help="Add a line of JSON for 
 ShowPromptOption = Annotated[
     bool, typer.Option("--show-prompt", help="Print the prompt without asking a model.")
 ]
-TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
-TopPOption = Annotated[
-    float,
-    typer.Option(help="Sample only from the likeliest tokens whose probabilities add up to this (top-p)."),
-]
-MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
-SeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
-TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
 BaseUrlOption = Annotated[
     str | None, typer.Option(help="The address of the model's server, such as http://localhost:8000/v1.")
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 from urllib.parse import urlsplit
@@ -120,7 +120,7 @@ class Reply:
         text: the reply as it came, with calls of tools as text; of a refused request what the server said.
         program: the program in it; any text, which need not even parse.
         usage: the tokens that it took.
-        latency_s: the seconds from the request to the end of the reply.
+        latency_s: the seconds from the request to the end of the reply; None where nobody measured them.
         finish_reason: why it ended, as the server said it, such as `stop` or `length`; None if it said
             nothing.
         reasoning: what the model thought before it answered, where the server shows it.
@@ -130,7 +130,7 @@ class Reply:
     text: str = field(repr=False)
     program: str = field(repr=False)
     usage: Usage
-    latency_s: float
+    latency_s: float | None
     finish_reason: str | None
     reasoning: str = field(default="", repr=False)
     no_program: NoProgram | None = None
@@ -140,11 +140,23 @@ class Reply:
         """Whether it ended at the limit of tokens, whether or not its program is whole."""
         return is_cut_off(self.finish_reason)
 
+    def data(self) -> dict[str, Any]:
+        """The reply as rows of JSON have it."""
+        return {
+            "program": self.program,
+            "no_program": self.no_program,
+            "finish_reason": self.finish_reason,
+            "usage": asdict(self.usage),
+            "latency_s": None if self.latency_s is None else round(self.latency_s, 3),
+            "raw_reply": self.text,
+            "reasoning": self.reasoning,
+        }
+
 
 def reply_from(
     text: str,
     usage: Usage,
-    latency_s: float,
+    latency_s: float | None,
     finish_reason: str | None,
     *,
     opening: Prompt | None = None,
@@ -157,7 +169,7 @@ def reply_from(
     Args:
         text: the reply as it came.
         usage: the tokens that it took.
-        latency_s: the seconds that it took.
+        latency_s: the seconds that it took; None where nobody measured them.
         finish_reason: why it ended, as the server said it.
         opening: the prompt that a base model goes on from; None for a chat model.
         reasoning: what the server sent as the model's thoughts, apart from the text.

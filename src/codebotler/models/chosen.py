@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -21,10 +21,22 @@ RECORDED = "recorded:careful"
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """A model with the address of its server, or None for the provider's own."""
+    """A model, and how it is asked unless a command says otherwise.
+
+    Args:
+        name: as `open_model` takes it.
+        base_url: the address of its server; None for the provider's own.
+        max_tokens: the limit for a reply, in tokens; None for the default.
+    """
 
     name: str
     base_url: str | None = None
+    max_tokens: int | None = None
+
+    def with_its_server(self, settings: SamplingSettings) -> SamplingSettings:
+        """The settings with its address, and with its limit unless they have one."""
+        limit = settings.max_tokens or self.max_tokens
+        return replace(settings, base_url=self.base_url, max_tokens=limit)
 
 
 class ConfigFile(BaseModel):
@@ -34,33 +46,40 @@ class ConfigFile(BaseModel):
 
     model: Annotated[str, Field(min_length=1)]
     base_url: str | None = None
+    max_tokens: Annotated[int, Field(ge=1)] | None = None
 
 
 def chosen_model(name: str | None = None, base_url: str | None = None) -> ChosenModel:
     """The model that is named, or else that of CODEBOTLER_MODEL, that of config.yaml, or the recorded one.
 
-    The address of config.yaml belongs to its model: it is used for that model only, however it is named.
+    The address and the limit of config.yaml belong to its model: they are used for that model only, however
+    it is named.
 
     Raises:
         UserError: config.yaml is wrong.
     """
-    if name is not None and (base_url is not None or is_recorded(name)):
+    if name is not None and is_recorded(name):
         return ChosenModel(name, base_url)
     file = config_file()
     config = ConfigFile(model=RECORDED)
     if file is not None and file.is_file():
         config = YamlFile.read(file).validate(ConfigFile)
     name = name or os.environ.get(VARIABLE, "").strip() or config.model
-    return ChosenModel(name, base_url or (config.base_url if name == config.model else None))
+    if name != config.model:
+        return ChosenModel(name, base_url)
+    return ChosenModel(name, base_url or config.base_url, config.max_tokens)
 
 
-def opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:
+def opener(models: Sequence[str], base_url: str | None, settings: SamplingSettings) -> Callable[[str], Model]:
     """What opens models by their names; names that make no sense are refused at once."""
     for each in models:
         kind_of(each)
     if base_url is not None:
         expect_server(*models)
-    return lambda name: open_model(
-        name,
-        SamplingSettings(base_url=chosen_model(name, base_url).base_url if runs_on_server(name) else None),
-    )
+
+    def opened(name: str) -> Model:
+        if not runs_on_server(name):
+            return open_model(name, settings)
+        return open_model(name, chosen_model(name, base_url).with_its_server(settings))
+
+    return opened

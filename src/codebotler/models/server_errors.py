@@ -22,6 +22,7 @@ OF_PROMPT = (400, 413, 422)  # the statuses that may be about this one prompt
 FILTER = re.compile(
     r"content[\s_-]*(?:filter|management|policy)|safety system|data_inspection", re.IGNORECASE
 )
+MONEY = re.compile(r"\b(?:credit|billing|balance|quota|payment)", re.IGNORECASE)
 PASSING = re.compile(r"rate_?limit|overload|unavailable|server_?error|internal|timeout", re.IGNORECASE)
 """Found in the types and codes of errors that may pass."""
 
@@ -74,9 +75,8 @@ def refused(
     said = f" ({text})" if (text := told(body)) else ""
     sentence = f"{name}: the server answered with status {status}{said}{MENDS.get(status, '')}"
     may_pass = not hopeless and (status >= SERVER_ERROR or status in LATER)
-    return ModelError(
-        sentence, may_pass=may_pass, retry_after=retry_after, is_refusal=not hopeless and status in OF_PROMPT
-    )
+    is_refusal = not hopeless and status in OF_PROMPT and not MONEY.search(said)
+    return ModelError(sentence, may_pass=may_pass, retry_after=retry_after, is_refusal=is_refusal)
 
 
 def error_in_reply(name: str, body: object) -> ModelError:

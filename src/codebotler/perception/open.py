@@ -7,7 +7,7 @@ from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of
 from codebotler.perception.base import Detector
 
-LOOKING = SamplingSettings(temperature=0.0, top_p=None, max_tokens=2000, timeout=30.0)
+LOOKING = SamplingSettings(temperature=0.0, top_p=None, timeout=30.0)
 """How a chat model is asked by default; a reasoning model thinks within the tokens, too."""
 
 LEAST_SCORE = 0.1

@@ -6,19 +6,15 @@ import re
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from codebotler.cli.ending import STOPPED
+from codebotler.cli.model_options import model_settings, note_unsent, with_options_of
 from codebotler.cli.options import (
     BaseUrlOption,
-    MaxTokensOption,
     ModelOption,
-    SeedOption,
-    TemperatureOption,
-    TimeoutOption,
-    TopPOption,
 )
 from codebotler.core.errors import install_command
 from codebotler.core.words import counted
@@ -27,7 +23,6 @@ from roboeval.cli.options import (
     BudgetOption,
     ConcurrencyOption,
     FamiliesOption,
-    GenerationSeedOption,
     IsolationOption,
     JsonOption,
     NumOption,
@@ -38,93 +33,105 @@ from roboeval.cli.options import (
     SuiteOption,
     TasksOption,
     WorkersOption,
-    chosen_suite,
     command,
     load,
-    with_options_of,
+    suite_of_families,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.generate import Progress
+    from codebotler.models.base import Model
+    from roboeval.evaluation.generate import Pace, Progress
+    from roboeval.evaluation.requests import GenerationPlan
+    from roboeval.evaluation.runs.folder import Run
 
 
-def completed(
+class Requested(NamedTuple):
+    """A run, with the completions that it should have, and the model that writes them."""
+
+    run: Run
+    plan: GenerationPlan
+    model: Model
+    pace: Pace
+    suite: str  # as --suite takes it
+
+
+@with_options_of(model_settings)
+def requested(
     model: ModelOption = None,
     out: OutOption = None,
     num_completions: NumOption = 50,
-    temperature: TemperatureOption = 0.2,
-    top_p: TopPOption = 0.95,
-    max_tokens: MaxTokensOption = 512,
-    seed: SeedOption = None,
     suite: SuiteOption = "paper",
+    families: FamiliesOption = None,
+    num_tasks: NumTasksOption = None,
     tasks: TasksOption = None,
     concurrency: ConcurrencyOption = 8,
     requests_per_minute: RateOption = None,
     token_budget: BudgetOption = None,
-    timeout: TimeoutOption = 60.0,
     base_url: BaseUrlOption = None,
-) -> Path:
-    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
-    from codebotler.models.base import SamplingSettings
+    **sampling: Any,  # noqa: ANN401 - of several kinds
+) -> Requested:
+    """The run that options name, with the completions that it should have, and the model that writes them."""
     from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
-    from codebotler.models.recorded import NOTICE, is_recorded
-    from roboeval.evaluation.generate import Pace, generate_run
+    from codebotler.models.recorded import is_recorded
+    from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
     from roboeval.evaluation.runs.source import recorded_model_for
 
+    if families is not None or num_tasks is not None:
+        suite = suite_of_families(suite, families, num_tasks, sampling["seed"])
+        sampling["seed"] = None
     chosen = chosen_model(model, base_url)
-    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, chosen.base_url)
+    settings = chosen.with_its_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
     knows_more = is_recorded(chosen.name) and chosen.base_url is None
     opened = recorded_model_for(chosen.name, known) if knows_more else open_model(chosen.name, settings)
+    note_unsent(settings, opened)
     folder = re.sub(r"[^\w.]+", "-", opened.name).strip("-.")
-    run = Run(out or Path("runs", folder if known.families is None else f"{folder}-{known.name}"))
+    run = Run(out or Path("runs", folder if known.families is None else f"{folder}-{suite}"))
+    return Requested(run, plan, opened, pace, suite)
+
+
+def complete(requested: Requested) -> Path:
+    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
+    from codebotler.models.recorded import NOTICE, is_recorded
+    from roboeval.evaluation.generate import generate_run
+
+    run, plan, model, pace, _ = requested
     meter = Meter()
     try:
         with meter:
-            progress = generate_run(run, plan, opened, settings, pace, on_progress=meter.show)
+            progress = generate_run(run, plan, model, pace, on_progress=meter.show)
     except KeyboardInterrupt:
         note(f"roboeval: {meter.after_a_stop()}")
         raise SystemExit(STOPPED) from None
     if progress.missing is not None:
         note(f"roboeval: {progress.missing}; the same command continues where it stopped")
         raise SystemExit(1)
-    if is_recorded(opened.name):
+    if is_recorded(model.name):
         note(NOTICE)
     return run.path
 
 
-@with_options_of(completed)
-def generate(
-    *,
-    suite: SuiteOption = "paper",
-    families: FamiliesOption = None,
-    num_tasks: NumTasksOption = None,
-    seed: GenerationSeedOption = None,
-    **options: Any,  # noqa: ANN401 - of several kinds
-) -> None:
+@with_options_of(requested)
+def generate(**options: Any) -> None:  # noqa: ANN401 - of several kinds
     """Have a model write programs for a suite.
 
     After an interruption, the same command continues.
     """
-    suite, options["seed"] = chosen_suite(suite, families, num_tasks, seed)
-    path = completed(suite=suite, **options)
-    note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
+    what = requested(**options)
+    path = complete(what)
+    note(f"the completions are in {path}; `{command('evaluate', path, suite=what.suite)}` judges them")
 
 
-@with_options_of(completed)
+@with_options_of(requested)
 def run(
     *,
-    suite: SuiteOption = "paper",
-    families: FamiliesOption = None,
-    num_tasks: NumTasksOption = None,
-    seed: GenerationSeedOption = None,
     tasks: TasksOption = None,
     workers: WorkersOption = None,
     require_isolation: IsolationOption = False,
@@ -141,8 +148,12 @@ def run(
     """
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
-    suite, options["seed"] = chosen_suite(suite, families, num_tasks, seed)
-    path = completed(suite=suite, tasks=tasks, **options)
+    from roboeval.evaluation.evaluate import expect_same_judge
+
+    what = requested(tasks=tasks, **options)
+    suite = what.suite
+    expect_same_judge(what.run, what.plan.suite)  # before anything is paid for
+    path = complete(what)
     evaluate(
         str(path),
         suite=suite,

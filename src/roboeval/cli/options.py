@@ -6,7 +6,6 @@ import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
-from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
 
@@ -144,17 +143,13 @@ FamiliesOption = Annotated[
     str | None,
     typer.Option(
         metavar="SPLIT",
-        help="Fresh tasks of families, from train, validation or test; --seed makes others.",
+        help="Fresh tasks of families, from train, validation or test; --seed chooses them.",
         autocompletion=split_names,
     ),
 ]
 NumTasksOption = Annotated[
     int | None,
     typer.Option(min=1, max=100, help="With --families: how many tasks; by default one of each family."),
-]
-GenerationSeedOption = Annotated[
-    int | None,
-    typer.Option(help="The random seed, if the model takes one; with --families, of the tasks instead."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
@@ -171,18 +166,6 @@ BudgetOption = Annotated[
 
 
 Command = TypeVar("Command", bound=Callable[..., None])
-
-
-def with_options_of(called: Callable[..., object]) -> Callable[[Command], Command]:
-    """Give a command all options of a function to which it passes them on as `**options`."""
-
-    def extended(command: Command) -> Command:
-        inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
-        more = [one for name, one in own.items() if name not in inherited and one.kind is one.KEYWORD_ONLY]
-        command.__signature__ = Signature([*inherited.values(), *more])  # type: ignore[attr-defined]  # of a function
-        return command
-
-    return extended
 
 
 # --- what a user names
@@ -212,20 +195,16 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
     return read.with_house_rules(house)
 
 
-def chosen_suite(
-    suite: str, families: str | None, num_tasks: int | None, seed: int | None
-) -> tuple[str, int | None]:
-    """The suite that a command names, or that its families make of a seed, and the seed for the model."""
+def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
+    """The name of the suite that families make of a seed, which stands in the place of --suite."""
     from roboeval.suites.families.suite import FamilyTasks
     from roboeval.suites.families.tasks import family_names
 
     if families is None:
-        if num_tasks is not None:
-            fail("--num-tasks needs --families; add it")
-        return suite, seed
+        fail("--num-tasks needs --families; add it")
     if suite != "paper":
         fail("--families makes a suite of its own; leave out --suite")
-    return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name, None
+    return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
 def command(

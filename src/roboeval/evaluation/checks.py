@@ -14,7 +14,7 @@ from codebotler.checking.sampled import CheckSettings
 from codebotler.core.files import Appender, to_line, to_text, write_whole
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.engines import PYTHON, OpenEngine, Work
+from roboeval.evaluation.engines import PYTHON_VERSION, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import read_checks
@@ -36,7 +36,7 @@ def check_programs(
         "samples": samples,
         "seed": seed,
         "codebotler": __version__,
-        "python": PYTHON,
+        "python": PYTHON_VERSION,
     }
     if suite.house is not None:
         metadata["house_rules"] = suite.house.digest

@@ -13,7 +13,7 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool, without_filter
 from codebotler.simulator.worker import EngineError, Worker
 
-PYTHON = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
+PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
 Ran = TypeVar("Ran")
 Value = TypeVar("Value")

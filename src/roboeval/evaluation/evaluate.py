@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Generator, Iterable, Iterator, Mapping
-from itertools import chain, islice
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,8 @@ from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import head, judgements, row_line
 from roboeval.evaluation.runs.completions import Completion, Key, name_of
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
-from roboeval.evaluation.runs.rows import JudgedRow, Seal, is_sealed, judged_row, read_lines_of
+from roboeval.evaluation.runs.judged import selected_tasks
+from roboeval.evaluation.runs.rows import JudgedRow, Line, Seal, is_sealed, judged_row, read_lines_of
 from roboeval.suites.load import Suite
 
 
@@ -31,110 +31,100 @@ def evaluate_run(
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,  # those of the run, if they were read before
 ) -> Iterator[JudgedRow]:
-    """Judge a run's completions, going on where an earlier evaluation stopped; yield all rows in order."""
+    """Judge those completions of tasks that an earlier evaluation has not judged; yield all their rows.
+
+    Rows of other tasks stay. A completion whose judging takes too long has no row, and is tried again.
+    """
     key = evaluation_key(suite, ablated=ablated)
     with run.writing():
         run.rows(key).parent.mkdir(exist_ok=True)
         if redo:
             for path in (run.rows(key), run.head(key)):
                 path.unlink(missing_ok=True)
-        about = {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
-        was = _go_on_or_refuse(run.head(key), about, run.rows(key))
+        was = _expect_same(run, suite, ablated=ablated)
+        about = _head(suite, ablated=ablated, tasks=_selected(tasks, was))
+        if was is None:
+            write_whole(run.head(key), to_text(about))
+        written = {one.key: one for one in (run.read(suite) if completions is None else completions)}
         with contextlib.closing(Appender(run.rows(key))) as rows:
-            written = run.read(suite) if completions is None else completions
-            selected = (one for one in written if tasks is None or one.task in tasks)
-            left_out = LeftOut(run.head(key))
-            seal = yield from _judged_before(rows, selected, was, left_out)
-            left = [*left_out.waiting.values(), *islice(selected, 1)]
-            if is_sealed(was) and (left or seal.is_broken(was)):
-                write_whole(run.head(key), to_text({**about, **left_out.data()}))
-            judged = judgements(
-                chain(left, selected), suite, ablated=ablated, engine=engine or Local(workers)
-            )
-            is_whole = yield from _judge(judged, rows, seal, left_out)
-            finished = {**about, **left_out.data(), **seal.data()}
-            if is_whole and finished != was:
+            seal, left = Seal(), dict(written)
+            for line in read_lines_of(rows.path, was or {}, seal=seal):
+                _expect_of_run(line, written, left, rows.path)
+                del left[line.row.key]
+                if _is_in(line.row.task, tasks):
+                    yield line.row
+            left = {key: one for key, one in left.items() if _is_in(one.task, selected_tasks(about))}
+            if was is not None and is_sealed(was) and (left or seal.is_broken(was)):
+                write_whole(run.head(key), to_text(about))
+            wanted = [one for one in left.values() if _is_in(one.task, tasks)]
+            for completion, judgement in judgements(
+                wanted, suite, ablated=ablated, engine=engine or Local(workers)
+            ):
+                if judgement is None:
+                    continue
+                row = row_line(completion, judgement)
+                rows.append(row)
+                seal.add(row)
+                del left[completion.key]
+                yield judged_row(row)
+            finished = {**about, **seal.data()}
+            if not left and finished != was:
                 rows.sync()
                 write_whole(run.head(key), to_text(finished))
 
 
-def _judge(
-    judged: Iterable[tuple[Completion, Any]], rows: Appender, seal: Seal, left_out: LeftOut
-) -> Generator[JudgedRow, None, bool]:
-    """Add the rows of completions; return whether each has one."""
-    is_whole = True
-    for completion, judgement in judged:
-        if judgement is None:
-            left_out.add(completion)
-            is_whole = False
-            continue
-        written = row_line(completion, judgement)
-        rows.append(written)
-        seal.add(written)
-        yield judged_row(written)
-    return is_whole
+def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
+    return tasks is None or task in tasks
 
 
-LEFT_OUT = "took_too_long"
+def _expect_of_run(
+    line: Line, written: Mapping[Key, Completion], left: Mapping[Key, Completion], file: Path
+) -> None:
+    """Raise UserError where a row judges what is not in the run, or judges it again."""
+    row, completion = line.row, written.get(line.row.key)
+    if completion is None:
+        sentence = f"judges {name_of(row.key)}, which is not in the run"
+    elif row.key not in left:
+        sentence = f"judges {name_of(row.key)} again"
+    elif completion.program_sha256 != row.program_sha256:
+        sentence = f"the program of {name_of(row.key)} has changed since it was judged"
+    else:
+        return
+    raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
-class LeftOut:
-    """The completions that once had no row since judging them took too long; their rows come at the end."""
-
-    def __init__(self, head: Path) -> None:
-        self._head = head
-        self._names: list[str] = load_head(head).get(LEFT_OUT, [])
-        self.waiting: dict[Key, Completion] = {}
-
-    def __contains__(self, completion: Completion) -> bool:
-        return name_of(completion.key) in self._names
-
-    def add(self, completion: Completion) -> None:
-        """Remember one, before the row of any later one is written."""
-        if completion not in self:
-            self._names.append(name_of(completion.key))
-            write_whole(self._head, to_text({**load_head(self._head), **self.data()}))
-
-    def data(self) -> dict[str, Any]:
-        """What KEY.json keeps of them."""
-        return {LEFT_OUT: self._names} if self._names else {}
+# --- by what a run is judged
 
 
-def _judged_before(
-    rows: Appender, completions: Iterator[Completion], was: Mapping[str, Any], left_out: LeftOut
-) -> Generator[JudgedRow, None, Seal]:
-    """Yield the rows of the file and return their seal; `completions` goes on behind the last one."""
-    seal, waiting = Seal(), left_out.waiting
-    for line in read_lines_of(rows.path, was, seal=seal):
-        row = line.row
-        completion = waiting.pop(row.key) if row.key in waiting else next(completions, None)
-        while completion is not None and completion.key != row.key and completion in left_out:
-            waiting[completion.key] = completion
-            completion = next(completions, None)
-        if completion is None or completion.key != row.key:
-            expected = "nothing more" if completion is None else name_of(completion.key)
-            sentence = f"judges {name_of(row.key)} where the completions have {expected}"
-            raise UserError(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
-        if completion.program_sha256 != row.program_sha256:
-            sentence = f"the program of {name_of(row.key)} has changed since it was judged"
-            raise UserError(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
-        yield row
-    return seal
+def _head(suite: Suite, *, ablated: bool, tasks: frozenset[str] | None) -> dict[str, Any]:
+    return {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
 
 
-def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> dict[str, Any]:
-    """The content of KEY.json; raises UserError if the rows were judged otherwise."""
+def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> frozenset[str] | None:
+    """The tasks that an evaluation has judged, and those that it judges now."""
+    before = frozenset() if was is None else selected_tasks(was)
+    return None if tasks is None or before is None else tasks | before
+
+
+def expect_same_judge(run: Run, suite: Suite) -> None:
+    """Raise UserError if an evaluation of a run cannot go on, since the suite or the tool has changed."""
+    _expect_same(run, suite, ablated=False)
+
+
+def _expect_same(run: Run, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
+    """The content of KEY.json, None if there is none; raises UserError if the rows were judged otherwise."""
+    key = evaluation_key(suite, ablated=ablated)
+    path, rows = run.head(key), run.rows(key)
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise UserError(
                 "is missing, so it is unknown how the rows were judged; --redo starts over", file=path
             )
-        write_whole(path, to_text(about))
-        return about
+        return None
     was = load_head(path)
-    for name, now in about.items():
-        if was.get(name) != now:
-            what = f"{CALLED.get(name, name)} ({_brief(name, was.get(name))}, now {_brief(name, now)})"
+    for name, now in _head(suite, ablated=ablated, tasks=None).items():
+        if was.get(name) != now and name != "tasks":
+            what = f"{CALLED.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
             raise UserError(f"was judged with another {what}; --redo starts over", file=path)
     return was
 
@@ -147,12 +137,8 @@ CALLED = {
     "skills": "set of skills",
     "codebotler": "version of this tool",
     "python": "version of Python",
-    "tasks": "selection of tasks",
 }
 
 
-def _brief(name: str, value: object) -> str:
-    text = json.dumps(value)
-    if name == "tasks":
-        text = ", ".join(map(str, value)) if isinstance(value, list) else "all"
-    return brief(text)
+def _brief(value: object) -> str:
+    return brief(json.dumps(value))

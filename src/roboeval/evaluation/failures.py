@@ -1,4 +1,4 @@
-"""Why completions fail: the paper's three classes and their kinds (section V.B)."""
+"""Why completions fail: no program, or one of the classes of the paper (section V.B), each with kinds."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from codebotler.core.trace import Outcome, Status
+from codebotler.models.no_program import NO_PROGRAM_KINDS
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
 
+NO_PROGRAM = "NoProgram"
 PYTHON, ROBOT, TASK = "PythonError", "RobotExecutionError", "TaskCompletionError"
 
 
@@ -27,6 +29,7 @@ class FailureClass:
 CLASSES: Mapping[str, FailureClass] = {
     one.name: one
     for one in (
+        FailureClass(NO_PROGRAM, "no program", "without a program", NO_PROGRAM_KINDS),
         FailureClass(
             PYTHON,
             "Python error",

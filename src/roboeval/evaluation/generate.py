@@ -18,6 +18,8 @@ from codebotler.models.base import (
     ModelError,
     Reply,
     SamplingSettings,
+    Usage,
+    reply_from,
     unheard,
 )
 from codebotler.models.rate_limit import RateLimited
@@ -29,8 +31,9 @@ from roboeval.evaluation.requests import (
     no_usage,
     run_metadata,
     timestamp,
+    with_batch,
 )
-from roboeval.evaluation.runs.completions import KEY, Key, how_many
+from roboeval.evaluation.runs.completions import Key, how_many, reply_row
 from roboeval.evaluation.runs.folder import Run
 
 FAILURES_IN_A_ROW = 3  # after so many, or one for each request under way, a model is given up
@@ -78,14 +81,13 @@ def generate_run(
     run: Run,
     plan: GenerationPlan,
     model: Model,
-    settings: SamplingSettings,
     pace: Pace,
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
     """Request the completions that a run lacks, each on the disk before it counts; close the model."""
     with run.writing():
-        metadata = run_metadata(run, plan, model.name, settings)
+        metadata = run_metadata(run, plan, model)
         with contextlib.closing(Appender(run.completions)) as file:
             done, usage = set(), no_usage()
             for completion in plan.completed(run):
@@ -95,7 +97,8 @@ def generate_run(
             todo = [key for key in keys if key not in done]
             log = RequestLog(run.in_flight, done, metadata["possibly_paid_twice"])
             metadata |= {"usage": usage, "possibly_paid_twice": log.lost}
-            metadata["ended"] = None if todo else metadata["ended"]
+            if todo:
+                metadata["batches"] = with_batch(metadata["batches"], plan, model.settings)
             write_whole(run.about, to_text(metadata))
             progress = Progress(len(keys), len(keys) - len(todo), log.interrupted, usage)
             with log:
@@ -105,8 +108,8 @@ def generate_run(
                     asyncio.run(generation.generate(todo))
                 finally:
                     progress.under_way = len(log.under_way)
-            if progress.missing is None:
-                metadata["ended"] = metadata["ended"] or timestamp()
+            if todo and progress.missing is None:
+                metadata["batches"][-1]["ended"] = timestamp()
             write_whole(run.about, to_text(metadata))
         if generation.error is not None and not run.completions.stat().st_size:
             run.completions.unlink()
@@ -158,6 +161,7 @@ class _Generation:
     on_progress: Callable[[Progress], None]
     error: ModelError | None = None
     _failures_in_a_row: int = 0
+    _refused: dict[Key, ModelError] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._paced = RateLimited(_LoggedModel(self.model, self.log), **asdict(self.pace))
@@ -168,6 +172,8 @@ class _Generation:
             async with asyncio.TaskGroup() as group:
                 for _ in range(min(self.pace.concurrency, len(keys))):
                     group.create_task(self._request_each(waiting))
+            if self.progress.stopped is None and self.progress.done:
+                self._keep_refused()
         except BaseExceptionGroup as errors:
             raise errors.exceptions[0] from None
         finally:
@@ -191,31 +197,35 @@ class _Generation:
             self.log.failed(key)
             self.error = error
             self.progress.failures[key] = error.sentence
+            if error.is_refusal:
+                self._refused[key] = error
             self._failures_in_a_row += 1
             if self._failures_in_a_row >= max(FAILURES_IN_A_ROW, self.pace.concurrency):
                 self.progress.stopped = error.sentence
 
     async def _keep(self, key: Key, reply: Reply) -> None:
-        usage = asdict(reply.usage)
-        row = {
-            **dict(zip(KEY, key, strict=True)),
-            "instruction": self.plan.instruction(key),
-            "model": self.model.name,
-            "program": reply.program,
-            "raw_reply": reply.text,
-            "usage": usage,
-            "latency_s": round(reply.latency_s, 3),
-            "finish_reason": reply.finish_reason,
-        }
-        line = to_line(row)
+        line = self._line(key, reply)
         if len(line) > MAX_ROW:
             raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=True)
         self.file.append(line)
         self.log.kept(key)
+        self._keep_refused()
         try:
             await asyncio.to_thread(self.file.sync)
         finally:  # after an interrupt, too: the file is synced when it is closed
-            add_usage(self.progress.usage, usage)
+            add_usage(self.progress.usage, asdict(reply.usage))
             self.progress.done += 1
         self._failures_in_a_row = 0
         self.on_progress(self.progress)
+
+    def _keep_refused(self) -> None:
+        """Keep requests that the server refused for good, now that it has taken another one."""
+        for key, error in self._refused.items():
+            reply = reply_from(error.sentence, Usage(), None, None, said="refusal", has_answer=False)
+            self.file.append(self._line(key, reply))
+            del self.progress.failures[key]
+            self.progress.done += 1
+        self._refused.clear()
+
+    def _line(self, key: Key, reply: Reply) -> bytes:
+        return to_line(reply_row(key, self.plan.instruction(key), self.model.name, reply))

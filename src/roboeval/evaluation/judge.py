@@ -29,8 +29,8 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.rules import PAPER
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.engines import PYTHON, Local, OpenEngine
-from roboeval.evaluation.failures import Verdict, failure
+from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
+from roboeval.evaluation.failures import NO_PROGRAM, PYTHON, Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown
 from roboeval.evaluation.runs.rows import Row, bounded
 from roboeval.evaluation.runs.traces import circumstances
@@ -39,6 +39,7 @@ from roboeval.suites.load import Requirement, Scenario, Suite
 LOG = logging.getLogger("roboeval.evaluation.judge")
 Value = TypeVar("Value")
 
+FAILED_BY_PYTHON = b'{"passed": false, "failure": {"class": "%b", ' % PYTHON.encode()  # as `judgement` writes
 BUDGET = 60  # seconds of processor time that judging one program may take, in all its worlds
 MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 128  # results, and events of all runs of one
 
@@ -161,7 +162,19 @@ def judgements(
                     name_of(completion.key),
                     BUDGET,
                 )
-            yield completion, None if told is None else told[completion.prompt]
+            yield completion, None if told is None else _of_reply(completion, told[completion.prompt])
+
+
+def _of_reply(completion: Completion, told: bytes) -> bytes:
+    """The judgement on a program, given as JSON, with what is wrong with its reply if that held no program.
+
+    Text that is no program ends in some Python error, which is not the cause.
+    """
+    if not told.startswith(FAILED_BY_PYTHON) or (kind := completion.no_program) is None:
+        return told
+    judgement = json.loads(told)
+    cause = {**judgement["failure"], "class": NO_PROGRAM, "kind": kind}
+    return to_line({**judgement, "failure": cause}).removesuffix(b"\n")
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
@@ -292,7 +305,7 @@ def head(suite: Suite) -> dict[str, Any]:
         ),
         **({} if suite.skills is SKILLS else {"skills": files_of(suite.skills)}),
         "codebotler": __version__,
-        "python": PYTHON,
+        "python": PYTHON_VERSION,
     }
 
 

@@ -15,10 +15,10 @@ from codebotler.core.errors import UserError, installed
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import NO_SECCOMP, DistinctKeys, ResultFile
 from codebotler.simulator.worker import EngineError
-from roboeval.evaluation.engines import PYTHON, Ran, RunPrograms, Value, Work, own_worker
+from roboeval.evaluation.engines import PYTHON_VERSION, Ran, RunPrograms, Value, Work, own_worker
 
 LOG = logging.getLogger("roboeval.ray")
-VERSIONS = f"codebotler {__version__} with Python {PYTHON}"
+VERSIONS = f"codebotler {__version__} with Python {PYTHON_VERSION}"
 
 AHEAD = 2  # shards for each core that are under way, so that none waits for this process
 RETRIES = 20  # of a shard whose machine is lost

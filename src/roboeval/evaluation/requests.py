@@ -15,13 +15,14 @@ from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.core.words import brief
-from codebotler.models.base import SamplingSettings
+from codebotler.models.base import Model, SamplingSettings
 from codebotler.prompts import template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies
+LATER = ("reasoning_effort", "extra_body")  # settings that runs of earlier versions do not name
 
 
 @dataclass(frozen=True)
@@ -67,37 +68,71 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 # --- run.json
 
 
-def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: SamplingSettings) -> dict[str, Any]:
+def run_metadata(run: Run, plan: GenerationPlan, model: Model) -> dict[str, Any]:
     """The content of run.json; raises UserError where completions are there that were generated otherwise."""
     fixed = {
-        "model": model,
-        "settings": {name: value for name, value in asdict(settings).items() if name not in WITHOUT_EFFECT},
+        "model": model.name,
+        "settings": _recorded(model.settings),
         "template": template_hash(plan.suite.skills),
         "suite": plan.suite.name,
     }
-    metadata = fixed | {
-        "num_completions": plan.num_completions,
-        "tasks": None if plan.tasks is None else sorted(plan.tasks),
-        **_families(plan.suite),
-        "base_url": settings.base_url,
-        "codebotler": __version__,
-        "python": platform.python_version(),
-        "started": timestamp(),
-        "ended": None,
-        "usage": no_usage(),
-        "possibly_paid_twice": 0,
-    }
+    earlier: dict[str, Any] = {}
     if run.about.exists():
         earlier = load_head(run.about)
         if not isinstance(earlier.get("settings"), dict):
             raise UserError("holds imported completions; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
-        kept = ("started", "ended", "possibly_paid_twice")
-        metadata |= {name: earlier.get(name, metadata[name]) for name in kept}
     elif run.completions.exists() and run.completions.stat().st_size:
         why = "is missing, so that the settings of the completions are unknown"
         raise UserError(f"{why}; name another folder", file=run.about)
-    return metadata
+    return {
+        **fixed,
+        **_families(plan.suite),
+        "batches": batches(earlier),
+        "usage": no_usage(),
+        "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
+    }
+
+
+def _recorded(settings: SamplingSettings) -> dict[str, Any]:
+    """The settings that change what a model replies; those that came later are left out where unset."""
+    return {
+        name: value
+        for name, value in asdict(settings).items()
+        if name not in WITHOUT_EFFECT and (value is not None or name not in LATER)
+    }
+
+
+def with_batch(
+    earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
+) -> list[dict[str, Any]]:
+    """Request batches of a run with that of a plan, which is the last one if that was interrupted."""
+    batch = {
+        "tasks": None if plan.tasks is None else sorted(plan.tasks),
+        "num_completions": plan.num_completions,
+        "settings": asdict(settings),
+        "codebotler": __version__,
+        "python": platform.python_version(),
+        "ended": None,
+    }
+    if earlier and earlier[-1].items() >= batch.items():
+        return earlier
+    return [*earlier, {**batch, "started": timestamp()}]
+
+
+BATCH = ("tasks", "num_completions", "settings", "codebotler", "python", "started", "ended")
+
+
+def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The request batches of a run.json, in order; one of an earlier version says what it has of its one."""
+    found = metadata.get("batches")
+    if isinstance(found, list):
+        return [dict(one) for one in found if isinstance(one, dict)]
+    return (
+        [{name: metadata[name] for name in BATCH if name in metadata}]
+        if "num_completions" in metadata
+        else []
+    )
 
 
 def _families(suite: Suite) -> dict[str, Any]:

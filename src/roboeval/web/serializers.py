@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from collections.abc import Hashable, Mapping
 from dataclasses import asdict
 from enum import StrEnum
@@ -14,6 +15,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
 from roboeval.evaluation.explanation import GONE, completion_data, suite_instruction
+from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, name_of
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
@@ -77,11 +79,16 @@ def run_data(run: Snapshot) -> dict[str, Any]:
 
 def _wanted(about: Mapping[str, Any], suite: Suite | None) -> int | None:
     """How many completions a run shall have, as its run.json says; None where nobody recorded that."""
-    each, tasks = about.get("num_completions"), about.get("tasks")
-    if not isinstance(each, int) or suite is None:
+    found = batches(about)
+    if not found or suite is None:
         return None
-    selected = [name for name in tasks if name in suite.tasks] if isinstance(tasks, list) else suite.tasks
-    return each * sum(len(suite.tasks[name].prompts) for name in selected)
+    each: Counter[str] = Counter()
+    for batch in found:
+        tasks, count = batch.get("tasks"), batch.get("num_completions")
+        if not isinstance(count, int):
+            return None
+        each |= dict.fromkeys(tasks if isinstance(tasks, list) else suite.tasks, count)
+    return sum(count * len(suite.tasks[name].prompts) for name, count in each.items() if name in suite.tasks)
 
 
 def notes(run: Snapshot) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from codebotler.generation.generate import Attempt, Generation, write_program
-from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
 from codebotler.prompts import Prompt, prompt_for
 
 PROMPT = prompt_for("Say hello.")
@@ -21,6 +21,7 @@ class Scripted:
     lines: list[str]
     asked: list[tuple[Prompt, int]] = field(default_factory=list)
     name: str = "scripted"
+    settings: SamplingSettings = field(default_factory=SamplingSettings)
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
         self.asked.append((prompt, number))

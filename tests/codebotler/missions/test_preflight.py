@@ -23,7 +23,7 @@ from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight, rooms_to_check, unknown_rooms
 from codebotler.missions.store import missions
-from codebotler.models.base import Heard, Reply, Usage, unheard
+from codebotler.models.base import Heard, Reply, SamplingSettings, Usage, unheard
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, NotReadyError, Result
 from codebotler.robots.reservation import Reservation
@@ -111,6 +111,7 @@ class Writing:
 
     program: str
     name: str = "writing"
+    settings: SamplingSettings = field(default_factory=SamplingSettings)
     asked: list[Prompt] = field(default_factory=list)
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:

@@ -126,7 +126,7 @@ def test_reply_ends_where_the_function_ends(by_heart: Callable[..., str]) -> Non
     assert reply.usage.output_tokens == 3  # the last one showed that the function was over
     assert reply.usage.input_tokens is not None
     assert reply.usage.input_tokens > 500
-    assert reply.latency_s > 0
+    assert (reply.latency_s or 0) > 0
 
 
 def test_reply_ends_where_the_model_ends_it(by_heart: Callable[..., str]) -> None:

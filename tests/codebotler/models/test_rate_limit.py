@@ -240,6 +240,7 @@ class HundredTokens:
     """A model whose replies take a hundred tokens each."""
 
     name = "hundred"
+    settings = SamplingSettings()
 
     async def reply(self, _prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
         heard(str(number))

@@ -21,7 +21,7 @@ from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
-from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.base import Heard, Model, ModelError, Reply, SamplingSettings, Usage, unheard
 from codebotler.models.recorded import recorded_model
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Result, Robot
@@ -42,6 +42,7 @@ class Author:
     """A model that says what a test wants, piece by piece, and then waits to be let go on."""
 
     name = "author"
+    settings = SamplingSettings()
 
     def __init__(self, *programs: str, waits: bool = False) -> None:
         self.programs, self.waits = list(programs), waits

@@ -11,6 +11,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -37,14 +38,11 @@ def generated(
     model: Scripted,
     *,
     count: int = 3,
-    settings: SamplingSettings | None = None,
     pace: Pace | None = None,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
     plan = GenerationPlan(suite, SMALL, count)
-    return generate_run(
-        run, plan, model, settings or SamplingSettings(), pace or Pace(), on_progress=on_progress
-    )
+    return generate_run(run, plan, model, pace or Pace(), on_progress=on_progress)
 
 
 def rows(run: Run) -> list[dict[str, Any]]:
@@ -66,10 +64,9 @@ def about(run: Run) -> dict[str, Any]:
 
 def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
     run = Run(tmp_path / "runs" / "one")
-    model = Scripted()
-    progress = generated(
-        run, paper, model, settings=SamplingSettings(temperature=0.7, seed=5, base_url="http://a/v1")
-    )
+    sent = SamplingSettings(temperature=0.7, seed=5, base_url="http://a/v1")
+    model = Scripted(settings=sent)
+    progress = generated(run, paper, model)
     assert (progress.done, progress.total, progress.missing, progress.interrupted) == (30, 30, None, 0)
     assert model.closed
     assert keys(run) == expected(3)
@@ -81,18 +78,22 @@ def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite
         "instruction": paper.tasks["LunchTime"].prompts[4],
         "model": "scripted:one",
         "program": 'def task_program():\n    say("2")\n',
-        "raw_reply": 'def task_program():\n    say("2")\n',
-        "usage": {"input_tokens": 100, "output_tokens": 10},
-        "latency_s": 0.0,
+        "no_program": None,
         "finish_reason": "stop",
+        "usage": {"input_tokens": 100, "output_tokens": 10, "reasoning_tokens": None},
+        "latency_s": 0.0,
+        "raw_reply": 'def task_program():\n    say("2")\n',
+        "reasoning": "",
     }
     metadata = about(run)
     assert metadata["model"] == "scripted:one"
-    assert metadata["settings"] == {"temperature": 0.7, "top_p": 0.95, "max_tokens": 512, "seed": 5}
-    assert metadata["base_url"] == "http://a/v1"
+    assert metadata["settings"] == {"temperature": 0.7, "top_p": 0.95, "max_tokens": None, "seed": 5}
+    [batch] = metadata["batches"]
+    assert (batch["tasks"], batch["num_completions"]) == (sorted(SMALL), 3)
+    assert batch["settings"] == asdict(sent)
     assert re.fullmatch("[0-9a-f]{64}", metadata["template"])
     assert metadata["usage"] == {"input_tokens": 3000, "output_tokens": 300}
-    assert metadata["started"] <= metadata["ended"]
+    assert batch["started"] <= batch["ended"]
     assert metadata["possibly_paid_twice"] == 0
     assert sorted(path.name for path in run.path.iterdir()) == [".lock", "completions.jsonl", "run.json"]
 
@@ -122,6 +123,23 @@ def test_more_can_be_asked_for_later_and_fewer_take_nothing_away(tmp_path: Path,
     assert keys(run) == expected(3)
     assert generated(run, paper, Scripted(), count=2).missing is None
     assert keys(run) == expected(3)
+
+
+def test_each_batch_of_requests_keeps_its_settings(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    first, second = (SamplingSettings(timeout=seconds) for seconds in (5.0, 6.0))
+    generate_run(run, GenerationPlan(paper, frozenset({"LunchTime"}), 2), Scripted(settings=first), Pace())
+    model = Scripted(settings=second)
+    generate_run(run, GenerationPlan(paper, SMALL, 2), model, Pace())
+    assert len(model.asked) == 10
+    before = run.about.read_bytes()
+    generate_run(run, GenerationPlan(paper, frozenset({"SayGoodDay"}), 1), Scripted(settings=first), Pace())
+    assert run.about.read_bytes() == before  # it asked for nothing
+    batches = about(run)["batches"]
+    assert [(one["tasks"], one["settings"]["timeout"]) for one in batches] == [
+        (["LunchTime"], 5.0),
+        (sorted(SMALL), 6.0),
+    ]
 
 
 def test_as_many_at_the_same_time_as_allowed(tmp_path: Path, paper: Suite) -> None:
@@ -170,7 +188,7 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
     [
         (SamplingSettings(temperature=0.7), "temperature (0.2, now 0.7)"),
         (SamplingSettings(top_p=0.5), "top-p (0.95, now 0.5)"),
-        (SamplingSettings(max_tokens=100), "max-tokens (512, now 100)"),
+        (SamplingSettings(max_tokens=100), "max-tokens (none, now 100)"),
         (SamplingSettings(seed=1), "seed (none, now 1)"),
     ],
 )
@@ -181,7 +199,7 @@ def test_other_settings_are_refused(
     generated(run, paper, Scripted())
     before = run.completions.read_bytes(), run.about.read_bytes()
     with pytest.raises(UserError, match=re.escape(what)) as error:
-        generated(run, paper, Scripted(), settings=settings)
+        generated(run, paper, Scripted(settings=settings))
     assert error.value.file == run.about
     assert (run.completions.read_bytes(), run.about.read_bytes()) == before
 
@@ -200,7 +218,7 @@ def test_another_timeout_or_address_is_no_matter(tmp_path: Path, paper: Suite) -
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted(), count=1)
     moved = SamplingSettings(timeout=5, base_url="http://other/v1")
-    generated(run, paper, Scripted(), count=2, settings=moved)
+    generated(run, paper, Scripted(settings=moved), count=2)
     assert keys(run) == expected(2)
 
 
@@ -253,12 +271,40 @@ def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: 
     assert progress.missing is not None
     assert progress.missing.startswith("2 completions ")
     assert "SCRIPTED_API_KEY" in progress.missing
-    assert about(run)["ended"] is None
+    assert about(run)["batches"][-1]["ended"] is None
     model = Scripted()
     assert generated(run, paper, model).missing is None
     assert (len(model.asked), keys(run)) == (2, expected(3))
-    assert about(run)["ended"] is not None
+    assert [batch["ended"] is not None for batch in about(run)["batches"]] == [True]
     assert about(run)["possibly_paid_twice"] == 0
+
+
+REFUSAL = ModelError("the server answered with status 400 (no)", may_pass=False, is_refusal=True)
+
+
+def test_refused_prompt_is_a_completion_without_a_program(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    model = Scripted(fails=lambda number: REFUSAL if number in {0, 5, 29} else None)
+    progress = generated(run, paper, model, pace=Pace(concurrency=1))
+    assert (progress.done, progress.missing, keys(run)) == (30, None, expected(3))
+    refused = [row for row in rows(run) if row["no_program"] == "refusal"]
+    assert [(row["program"], row["raw_reply"]) for row in refused] == [("", REFUSAL.sentence)] * 3
+
+
+def test_refusals_of_every_prompt_are_an_error(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    with pytest.raises(ModelError, match="400"):
+        generated(run, paper, Scripted(fails=lambda _: REFUSAL), pace=Pace(concurrency=1))
+    assert not run.completions.exists()
+
+
+def test_refusals_in_a_row_are_no_completions(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    model = Scripted(fails=lambda number: REFUSAL if number >= 10 else None)  # such as a key without money
+    progress = generated(run, paper, model, pace=Pace(concurrency=1))
+    assert progress.stopped is not None
+    assert progress.missing is not None
+    assert [row["no_program"] for row in rows(run)] == [None] * 10
 
 
 def test_a_model_that_fails_now_and_then_is_not_given_up(tmp_path: Path, paper: Suite) -> None:
@@ -321,7 +367,7 @@ def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, pape
     chance = random.Random(3)
     run = Run(tmp_path / "run")
     model = Scripted(fails=lambda _: CUT if chance.random() < 0.1 else None)
-    progress = generate_run(run, GenerationPlan(paper), model, SamplingSettings(), Pace(concurrency=100))
+    progress = generate_run(run, GenerationPlan(paper), model, Pace(concurrency=100))
     assert (progress.done, progress.missing) == (4000, None)
     prompts = [(task.name, number) for task in paper.tasks.values() for number in range(len(task.prompts))]
     assert keys(run) == sorted((*prompt, index) for prompt in prompts for index in range(50))
@@ -342,7 +388,7 @@ print("on", flush=True)
 {before}
 generate_run(
     Run(pathlib.Path({run!r})), GenerationPlan(load_suite(), {tasks!r}, {count}),
-    Scripted(seconds={seconds}, log=pathlib.Path({log!r})), SamplingSettings(), Pace(concurrency=5),
+    Scripted(seconds={seconds}, log=pathlib.Path({log!r})), Pace(concurrency=5),
 )
 """
 
@@ -449,7 +495,7 @@ def test_an_interruption_counts_what_waits_for_the_disk(
     monkeypatch.setattr(Appender, "sync", interrupted)
     plan = GenerationPlan(paper, SMALL, 100)  # so many that it cannot be over by then
     with pytest.raises(KeyboardInterrupt):
-        generate_run(run, plan, Scripted(seconds=0.01), SamplingSettings(), Pace(), on_progress=seen.append)
+        generate_run(run, plan, Scripted(seconds=0.01), Pace(), on_progress=seen.append)
     progress = seen[0]
     assert progress.done == len(rows(run)) > 10
     assert progress.under_way > 0

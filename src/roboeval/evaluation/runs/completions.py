@@ -12,6 +12,9 @@ from typing import Any, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.core.words import counted
+from codebotler.models.base import Reply
+from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, is_cut_off, why_no_program
+from codebotler.prompts.extract import read_reply
 from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
 
@@ -23,6 +26,7 @@ Key: TypeAlias = tuple[str, int, int]
 KEY = ("task", "prompt", "index")  # as columns of tables and names in rows
 REQUIRED = (*KEY, "program")
 FIELDS = (*REQUIRED, "instruction", "model")
+NO_PROGRAM = "no_program"  # its column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +40,7 @@ class Completion:
         program: the cleaned source; judged exactly as it stands.
         instruction: what the model was told; None where nobody recorded it.
         model: who wrote it.
-        more: what else its row says, such as `usage`.
+        more: what else its row says, such as `usage`, `raw_reply` and `finish_reason`.
 
     Raises:
         UserError: one of them is not of its kind or range.
@@ -60,6 +64,8 @@ class Completion:
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
                 raise UserError(f"the {name} is {text!r}, not a text")
+        if (kind := self.more.get(NO_PROGRAM)) not in (None, *NO_PROGRAM_KINDS):
+            raise UserError(f'"{NO_PROGRAM}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}')
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:
@@ -87,9 +93,43 @@ class Completion:
         return self.task, self.prompt, self.index
 
     @property
+    def finish_reason(self) -> str | None:
+        """Why the reply ended, as the server said it; None if nobody recorded it."""
+        reason = self.more.get("finish_reason")
+        return reason if isinstance(reason, str) else None
+
+    @property
+    def is_cut_off(self) -> bool:
+        """Whether the reply ended at the limit of tokens, whether or not the program is whole."""
+        return is_cut_off(self.finish_reason)
+
+    @property
+    def no_program(self) -> NoProgram | None:
+        """Why the reply held no program; None if it held one, or if the row leaves that open.
+
+        Rows of earlier versions and of other tools are read as if the reply had just arrived.
+
+        Raises:
+            EngineError: no isolated process can be started.
+        """
+        if NO_PROGRAM in self.more:
+            kind: NoProgram | None = self.more[NO_PROGRAM]
+            return kind
+        reply = self.more.get("raw_reply")
+        is_chat = isinstance(reply, str) and not (self.model or "").startswith("completions:")
+        has_code = read_reply(str(reply)).has_code if is_chat else bool(self.program.strip())
+        return why_no_program(self.program, self.finish_reason, has_code=has_code)
+
+    @property
     def program_sha256(self) -> str:
         """The hash of the program, half surrogate pairs included, in 64 hexadecimal digits."""
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
+
+
+def reply_row(key: Key, instruction: str, model: str, reply: Reply) -> dict[str, Any]:
+    """The row of completions.jsonl for a model's reply to the instruction of a key."""
+    of_whom = {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model}
+    return {**of_whom, **reply.data()}
 
 
 def read_completions(

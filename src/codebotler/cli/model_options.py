@@ -1,0 +1,133 @@
+"""Options that say how a model is asked, for all commands that ask one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from inspect import Signature, signature
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import note
+from codebotler.models.base import PAPER_MAX_TOKENS, Model, SamplingSettings
+from codebotler.models.recorded import is_recorded
+
+Command = TypeVar("Command", bound=Callable[..., object])
+
+TemperatureOption = Annotated[
+    float | None,
+    typer.Option(
+        help="The sampling temperature; higher is more random.",
+        show_default=str(SamplingSettings.temperature),
+    ),
+]
+NoTemperatureOption = Annotated[bool, typer.Option("--no-temperature", help="Send no temperature.")]
+TopPOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Sample only from the likeliest tokens whose probabilities add up to this (top-p).",
+        show_default=str(SamplingSettings.top_p),
+    ),
+]
+NoTopPOption = Annotated[bool, typer.Option("--no-top-p", help="Send no top-p.")]
+MaxTokensOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="The limit for a reply, in tokens, reasoning included.",
+        show_default=f"no limit; {PAPER_MAX_TOKENS} for base models",
+    ),
+]
+EffortOption = Annotated[
+    str | None, typer.Option(help="How much a reasoning model thinks, such as low, medium or high.")
+]
+ExtraBodyOption = Annotated[
+    str | None,
+    typer.Option(help="More fields for the JSON of each request, such as '{\"top_k\": 20}'.", metavar="JSON"),
+]
+PresetOption = Annotated[
+    str | None,
+    typer.Option(
+        "--settings",
+        help=f"paper: its temperature 0.2, top-p 0.95 and limit of {PAPER_MAX_TOKENS} tokens.",
+        metavar="NAME",
+    ),
+]
+SeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
+TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
+
+
+def model_settings(
+    *,
+    temperature: TemperatureOption = None,
+    no_temperature: NoTemperatureOption = False,
+    top_p: TopPOption = None,
+    no_top_p: NoTopPOption = False,
+    max_tokens: MaxTokensOption = None,
+    reasoning_effort: EffortOption = None,
+    extra_body: ExtraBodyOption = None,
+    settings: PresetOption = None,
+    seed: SeedOption = None,
+    timeout: TimeoutOption = SamplingSettings.timeout,
+) -> SamplingSettings:
+    """The settings that options name; raises UserError where two of them contradict each other."""
+    if settings not in {None, "paper"}:
+        raise UserError(f'there are no settings "{settings}"; use --settings paper, or leave it out')
+    if settings is not None and (
+        no_temperature or no_top_p or (temperature, top_p, max_tokens) != (None,) * 3
+    ):
+        raise UserError("--settings paper sets the temperature, top-p and the limit; leave out your own")
+    if settings is not None:
+        max_tokens = PAPER_MAX_TOKENS
+    return SamplingSettings(
+        temperature=_sampling("temperature", temperature, is_left_out=no_temperature),
+        top_p=_sampling("top_p", top_p, is_left_out=no_top_p),
+        max_tokens=max_tokens,
+        seed=seed,
+        timeout=timeout,
+        reasoning_effort=reasoning_effort,
+        extra_body=None if extra_body is None else _json_object(extra_body),
+    )
+
+
+def _sampling(name: str, value: float | None, *, is_left_out: bool) -> float | None:
+    option = name.replace("_", "-")
+    if is_left_out and value is not None:
+        raise UserError(f"--{option} and --no-{option} exclude each other; give one of them")
+    default: float = getattr(SamplingSettings, name)
+    return None if is_left_out else default if value is None else value
+
+
+def _json_object(text: str) -> dict[str, Any]:
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, dict):
+        raise UserError("--extra-body is not a JSON object; write one such as '{\"top_k\": 20}'")
+    return value
+
+
+def note_unsent(asked: SamplingSettings, model: Model) -> None:
+    """Say which settings a model does not take, so that they are not sent."""
+    names = ("temperature", "top_p")
+    unsent = [name for name in names if getattr(model.settings, name) is None is not getattr(asked, name)]
+    if unsent and not is_recorded(model.name):
+        note(f"{model.name} takes no {' or '.join(unsent).replace('_', '-')}; none is sent")
+
+
+def with_options_of(called: Callable[..., object]) -> Callable[[Command], Command]:
+    """Give a command all options of a function to which it passes them on as `**options`."""
+
+    def extended(command: Command) -> Command:
+        inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
+        named = [one for one in own.values() if one.kind is not one.VAR_KEYWORD and one.name not in inherited]
+        first = [one for one in named if one.kind is not one.KEYWORD_ONLY]
+        last = [one for one in named if one.kind is one.KEYWORD_ONLY]
+        shared = [one.replace(kind=one.KEYWORD_ONLY) for one in inherited.values()]
+        command.__signature__ = Signature([*first, *shared, *last])  # type: ignore[attr-defined]  # of a function
+        return command
+
+    return extended
