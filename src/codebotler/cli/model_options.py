@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from inspect import Signature, signature
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -13,6 +13,9 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
 from codebotler.models.base import PAPER_MAX_TOKENS, Model, SamplingSettings
 from codebotler.models.recorded import is_recorded
+
+if TYPE_CHECKING:
+    from codebotler.models.batch import BatchModel  # which imports large libraries
 
 Command = TypeVar("Command", bound=Callable[..., object])
 
@@ -110,7 +113,7 @@ def _json_object(text: str) -> dict[str, Any]:
     return value
 
 
-def note_unsent(asked: SamplingSettings, model: Model) -> None:
+def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
     """Say which settings a model does not take, so that they are not sent."""
     names = ("temperature", "top_p")
     unsent = [name for name in names if getattr(model.settings, name) is None is not getattr(asked, name)]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,7 +17,7 @@ from codebotler.cli.options import (
     BaseUrlOption,
     ModelOption,
 )
-from codebotler.core.errors import install_command
+from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
 from roboeval.cli.evaluate import evaluate
 from roboeval.cli.options import (
@@ -30,31 +31,56 @@ from roboeval.cli.options import (
     OutOption,
     ProcessOption,
     RateOption,
+    RequestsOption,
     SuiteOption,
     TasksOption,
     WorkersOption,
     command,
     load,
-    suite_of_families,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
-    from codebotler.models.base import Model
+    from codebotler.models.base import Model, SamplingSettings
+    from codebotler.models.batch import BatchModel
     from roboeval.evaluation.generate import Pace, Progress
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run
 
+MOST_REQUESTS = 50_000
 
-class Requested(NamedTuple):
-    """A run, with the completions that it should have, and the model that writes them."""
 
-    run: Run
+@dataclass(frozen=True)
+class Requested:
+    """What a command requests: of which model, and for which run."""
+
+    name: str  # of the model
+    settings: SamplingSettings
     plan: GenerationPlan
-    model: Model
     pace: Pace
     suite: str  # as --suite takes it
+    out: Path | None
+
+    def run_of(self, model: Model | BatchModel) -> Run:
+        """The run that is named, or else that of the model."""
+        from roboeval.evaluation.runs.folder import Run
+
+        folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
+        fresh = self.plan.suite.families is not None
+        return Run(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
+
+    def model(self) -> Model:
+        """Open the model that is asked."""
+        from codebotler.models.open import open_model
+        from codebotler.models.recorded import is_recorded
+        from roboeval.evaluation.runs.source import recorded_model_for
+
+        if is_recorded(self.name) and self.settings.base_url is None:
+            return recorded_model_for(self.name, self.plan.suite)
+        opened = open_model(self.name, self.settings)
+        note_unsent(self.settings, opened)
+        return opened
 
 
 @with_options_of(model_settings)
@@ -72,14 +98,11 @@ def requested(
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> Requested:
-    """The run that options name, with the completions that it should have, and the model that writes them."""
+    """What options request."""
     from codebotler.models.chosen import chosen_model
-    from codebotler.models.open import open_model
-    from codebotler.models.recorded import is_recorded
     from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.runs.folder import Run, tasks_to_judge
-    from roboeval.evaluation.runs.source import recorded_model_for
+    from roboeval.evaluation.runs.folder import tasks_to_judge
 
     if families is not None or num_tasks is not None:
         suite = suite_of_families(suite, families, num_tasks, sampling["seed"])
@@ -89,24 +112,31 @@ def requested(
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    knows_more = is_recorded(chosen.name) and chosen.base_url is None
-    opened = recorded_model_for(chosen.name, known) if knows_more else open_model(chosen.name, settings)
-    note_unsent(settings, opened)
-    folder = re.sub(r"[^\w.]+", "-", opened.name).strip("-.")
-    run = Run(out or Path("runs", folder if known.families is None else f"{folder}-{suite}"))
-    return Requested(run, plan, opened, pace, suite)
+    return Requested(chosen.name, settings, plan, pace, suite, out)
 
 
-def complete(requested: Requested) -> Path:
+def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
+    """The name of the suite that families make of a seed, which stands in the place of --suite."""
+    from roboeval.suites.families.suite import FamilyTasks
+    from roboeval.suites.families.tasks import family_names
+
+    if families is None:
+        fail("--num-tasks needs --families; add it")
+    if suite != "paper":
+        fail("--families makes a suite of its own; leave out --suite")
+    return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
+
+
+def complete(what: Requested, model: Model) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
     from codebotler.models.recorded import NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
-    run, plan, model, pace, _ = requested
+    run = what.run_of(model)
     meter = Meter()
     try:
         with meter:
-            progress = generate_run(run, plan, model, pace, on_progress=meter.show)
+            progress = generate_run(run, what.plan, model, what.pace, on_progress=meter.show)
     except KeyboardInterrupt:
         note(f"roboeval: {meter.after_a_stop()}")
         raise SystemExit(STOPPED) from None
@@ -119,14 +149,40 @@ def complete(requested: Requested) -> Path:
 
 
 @with_options_of(requested)
-def generate(**options: Any) -> None:  # noqa: ANN401 - of several kinds
+def generate(
+    *,
+    requests: RequestsOption = None,
+    **options: Any,  # noqa: ANN401 - of several kinds
+) -> None:
     """Have a model write programs for a suite.
 
     After an interruption, the same command continues.
     """
     what = requested(**options)
-    path = complete(what)
+    if requests is not None:
+        write_batch(what, requests)
+        return
+    path = complete(what, what.model())
     note(f"the completions are in {path}; `{command('evaluate', path, suite=what.suite)}` judges them")
+
+
+def write_batch(what: Requested, path: Path) -> None:
+    """Write the requests of a run to a file, and note how to go on."""
+    with installed():
+        from codebotler.models.batch import BatchModel
+    from roboeval.evaluation.batches import write_requests
+
+    with closing(BatchModel(what.name, what.settings)) as model:
+        note_unsent(what.settings, model)
+        run = what.run_of(model)
+        with metered("writing", len(what.plan.keys())) as tell:
+            count = write_requests(run, what.plan, model, path, progress=lambda done: tell(done, ""))
+    again = command("import", "ANSWERS.jsonl", "--out", run.path, suite=what.suite)
+    note(
+        f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` takes the answers"
+    )
+    if count > MOST_REQUESTS:
+        note(f"OpenAI takes at most {MOST_REQUESTS:,} requests in a file; split it")
 
 
 @with_options_of(requested)
@@ -151,9 +207,9 @@ def run(
     from roboeval.evaluation.evaluate import expect_same_judge
 
     what = requested(tasks=tasks, **options)
-    suite = what.suite
-    expect_same_judge(what.run, what.plan.suite)  # before anything is paid for
-    path = complete(what)
+    suite, model = what.suite, what.model()
+    expect_same_judge(what.run_of(model), what.plan.suite)  # before anything is paid for
+    path = complete(what, model)
     evaluate(
         str(path),
         suite=suite,

@@ -139,6 +139,14 @@ WorldsOption = Annotated[
 SeedOption = Annotated[
     int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
 ]
+RequestsOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Ask no model, but write the requests to this file, for a batch endpoint.",
+        parser=named("a file"),
+    ),
+]
 FamiliesOption = Annotated[
     str | None,
     typer.Option(
@@ -193,18 +201,6 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
     for sentence in evasions(house.rules, [*rooms], SKILLS):  # in simulation, rules see inside own skills
         note(sentence)
     return read.with_house_rules(house)
-
-
-def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
-    """The name of the suite that families make of a seed, which stands in the place of --suite."""
-    from roboeval.suites.families.suite import FamilyTasks
-    from roboeval.suites.families.tasks import family_names
-
-    if families is None:
-        fail("--num-tasks needs --families; add it")
-    if suite != "paper":
-        fail("--families makes a suite of its own; leave out --suite")
-    return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
 def command(

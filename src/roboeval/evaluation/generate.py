@@ -23,7 +23,7 @@ from codebotler.models.base import (
     unheard,
 )
 from codebotler.models.rate_limit import RateLimited
-from codebotler.prompts import Prompt, prompt_for
+from codebotler.prompts import Prompt
 from roboeval.evaluation.requests import (
     GenerationPlan,
     RequestLog,
@@ -118,6 +118,11 @@ def generate_run(
     return progress
 
 
+def reply_of_refusal(error: ModelError) -> Reply:
+    """The reply that stands for a request that the server refused for good."""
+    return reply_from(error.sentence, Usage(), None, None, said="refusal", has_answer=False)
+
+
 _KEY: ContextVar[Key] = ContextVar("_KEY")
 
 
@@ -187,10 +192,7 @@ class _Generation:
     async def _request(self, key: Key) -> None:
         _KEY.set(key)
         try:
-            suite = self.plan.suite
-            wish, rules = self.plan.instruction(key), suite.house_sentences
-            prompt = prompt_for(wish, rules=rules, skills=suite.skills)
-            await self._keep(key, await self._paced.reply(prompt, number=key[2]))
+            await self._keep(key, await self._paced.reply(self.plan.prompt(key), number=key[2]))
         except BudgetSpentError as error:
             self.progress.stopped = error.sentence
         except ModelError as error:
@@ -221,8 +223,7 @@ class _Generation:
     def _keep_refused(self) -> None:
         """Keep requests that the server refused for good, now that it has taken another one."""
         for key, error in self._refused.items():
-            reply = reply_from(error.sentence, Usage(), None, None, said="refusal", has_answer=False)
-            self.file.append(self._line(key, reply))
+            self.file.append(self._line(key, reply_of_refusal(error)))
             del self.progress.failures[key]
             self.progress.done += 1
         self._refused.clear()

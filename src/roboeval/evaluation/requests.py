@@ -9,17 +9,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.core.words import brief
 from codebotler.models.base import Model, SamplingSettings
-from codebotler.prompts import template_hash
+from codebotler.prompts import Prompt, prompt_for, template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
+
+if TYPE_CHECKING:
+    from codebotler.models.batch import BatchModel  # which imports large libraries
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies
 LATER = ("reasoning_effort", "extra_body")  # settings that runs of earlier versions do not name
@@ -43,9 +46,14 @@ class GenerationPlan:
         """The instruction that a completion is for."""
         return self.suite.tasks[key[0]].prompts[key[1]]
 
+    def prompt(self, key: Key) -> Prompt:
+        """The prompt that a completion is for."""
+        rules, skills = self.suite.house_sentences, self.suite.skills
+        return prompt_for(self.instruction(key), rules=rules, skills=skills)
+
     def completed(self, run: Run) -> Iterator[Completion]:
         """The completions that a run has; raises UserError if one's instruction is no longer the suite's."""
-        if not run.completions.stat().st_size:
+        if not run.completions.is_file() or not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
             if completion.instruction != self.instruction(completion.key):
@@ -68,7 +76,7 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 # --- run.json
 
 
-def run_metadata(run: Run, plan: GenerationPlan, model: Model) -> dict[str, Any]:
+def run_metadata(run: Run, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
     """The content of run.json; raises UserError where completions are there that were generated otherwise."""
     fixed = {
         "model": model.name,

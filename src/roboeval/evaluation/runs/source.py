@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.core.errors import UserError
+from codebotler.core.files import MAX_ROW, parsed_row, read_lines
 from codebotler.models.recorded import NAMES, RecordedModel, recorded_model
 from roboeval.evaluation.runs.completions import COMPLETIONS, EXAMPLE, Completion, read_completions
 from roboeval.evaluation.runs.folder import Run
@@ -45,6 +46,21 @@ def open_source(text: str, suite: Suite) -> Source:
     if path.suffix == ".py":
         raise UserError(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
     return Source([*read_completions(path, suite)])
+
+
+LONGEST_ANSWER = 10 * MAX_ROW  # bytes; it may say more than we keep
+
+
+def is_answers(path: Path) -> bool:
+    """Whether a file begins like one of requests to a batch endpoint, or of its answers."""
+    if not path.is_file():
+        return False
+    _, line = next(read_lines(path, limit=LONGEST_ANSWER), (0, b""))
+    try:
+        row = parsed_row(line)
+    except UserError:
+        return False
+    return row is not None and "custom_id" in row
 
 
 def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
