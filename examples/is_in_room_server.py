@@ -20,7 +20,7 @@ from PIL.Image import Image
 from codebotler import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.models.base import SamplingSettings
+from codebotler.models.sampling import SamplingSettings
 from codebotler.perception import (
     Detector,
     PerceptionError,

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 
 PROGRAM = 'def task_program():\n    say("{number}")\n'

@@ -13,9 +13,9 @@ from codebotler.core.terminal import busy, note, print_source, visible
 from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore, write_checked_program
 from codebotler.missions.preflight import with_closest_here
-from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import NOTICE, UnknownInstructionError, is_recorded
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap

@@ -11,8 +11,10 @@ import typer
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
-from codebotler.models.base import PAPER_MAX_TOKENS, Model, SamplingSettings
-from codebotler.models.recorded import is_recorded
+from codebotler.models.sampling import PAPER_MAX_TOKENS, SamplingSettings
+
+if TYPE_CHECKING:
+    from codebotler.models.base import Model
 
 if TYPE_CHECKING:
     from codebotler.models.batch import BatchModel  # which imports large libraries
@@ -115,6 +117,8 @@ def _json_object(text: str) -> dict[str, Any]:
 
 def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
     """Say which settings a model does not take, so that they are not sent."""
+    from codebotler.models.recorded import is_recorded
+
     names = ("temperature", "top_p")
     unsent = [name for name in names if getattr(model.settings, name) is None is not getattr(asked, name)]
     if unsent and not is_recorded(model.name):

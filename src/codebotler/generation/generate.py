@@ -13,9 +13,10 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
-from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unheard
+from codebotler.models.base import Heard, Model, Reply, unheard
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.rule_guard import Rule

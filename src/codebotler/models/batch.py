@@ -11,9 +11,10 @@ from typing import Any
 import httpx2
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Reply, SamplingSettings
+from codebotler.models.base import Reply
 from codebotler.models.chat import OWN_SERVER, ChatModel
 from codebotler.models.completions import CompletionsModel
+from codebotler.models.sampling import SamplingSettings
 from codebotler.models.server_errors import FIRST_ERROR, error_in_reply
 from codebotler.prompts import Prompt
 
@@ -46,7 +47,8 @@ class BatchModel:
     def __init__(self, name: str, settings: SamplingSettings) -> None:
         kind, _, rest = name.partition(":")
         client = httpx2.AsyncClient(transport=httpx2.MockTransport(self._answered))
-        asked = replace(settings, base_url=settings.base_url or OPENAI)
+        own = {"base_url": settings.base_url, "timeout": settings.timeout}
+        asked = replace(settings, base_url=settings.base_url or OPENAI, timeout=SamplingSettings.timeout)
         self._model: ChatModel | CompletionsModel
         if kind == "completions":
             self._model = CompletionsModel(rest, asked, client)
@@ -55,7 +57,7 @@ class BatchModel:
         else:
             raise UserError(f"{name} takes no batch file; use {OWN_SERVER}:NAME or completions:NAME")
         self.name = self._model.name
-        self.settings = replace(self._model.settings, base_url=settings.base_url)
+        self.settings = replace(self._model.settings, **own)
         self._runner = asyncio.Runner()
         self._bodies: dict[Prompt, Mapping[str, Any]] = {}
         self._sent: httpx2.Request | None = None
@@ -71,13 +73,12 @@ class BatchModel:
         if prompt not in self._bodies:
             self._reply(prompt, number, _response(200, ENDED))
             assert self._sent is not None, "the model has sent its request to us"
-            body = json.loads(self._sent.content)
-            self._bodies[prompt] = {name: value for name, value in body.items() if name not in OF_STREAMS}
+            sent = json.loads(self._sent.content)
+            self._bodies[prompt] = {name: value for name, value in sent.items() if name not in OF_STREAMS}
         seed = self.settings.seed_of(number)  # the only difference between requests of the same prompt
-        path = "/completions" if isinstance(self._model, CompletionsModel) else "/chat/completions"
-        return BatchRequest(
-            f"/v1{path}", {**self._bodies[prompt], **({} if seed is None else {"seed": seed})}
-        )
+        body = {**self._bodies[prompt], **({} if seed is None else {"seed": seed})}
+        is_chat = isinstance(self._model, ChatModel)
+        return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
 
     def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
         """The reply in an answer.
@@ -130,5 +131,6 @@ def _streamed(choice: Mapping[str, Any]) -> dict[str, Any]:
         return dict(choice)
     delta = {name: value for name, value in message.items() if value is not None}
     if isinstance(calls := delta.get("tool_calls"), list):
-        delta["tool_calls"] = [{"index": number, **call} for number, call in enumerate(calls)]
+        known = (call for call in calls if isinstance(call, Mapping))
+        delta["tool_calls"] = [{"index": number, **call} for number, call in enumerate(known)]
     return {**{name: value for name, value in choice.items() if name != "message"}, "delta": delta}

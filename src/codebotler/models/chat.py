@@ -20,19 +20,11 @@ from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provi
 from pydantic_ai.settings import ModelSettings
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import (
-    DEMANDED_MAX_TOKENS,
-    Heard,
-    ModelError,
-    Reply,
-    SamplingSettings,
-    Usage,
-    reply_from,
-    unheard,
-)
+from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, unheard
 from codebotler.models.http_client import bound, cannot_open, limit_of, with_proxy, without_proxy
 from codebotler.models.keys import blank_is_unset, guard_logs, key_in, without_keys
 from codebotler.models.openai_stream import Chunks, make_lenient
+from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import (
     broken_off,
     error_in_reply,

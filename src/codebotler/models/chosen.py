@@ -11,9 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
-from codebotler.models.base import Model, SamplingSettings
+from codebotler.models.base import Model
 from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
 from codebotler.models.recorded import is_recorded
+from codebotler.models.sampling import SamplingSettings
 
 VARIABLE = "CODEBOTLER_MODEL"
 RECORDED = "recorded:careful"

@@ -11,10 +11,11 @@ import openai
 from pydantic_ai.exceptions import ModelHTTPError
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, reply_from, unheard
+from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, unheard
 from codebotler.models.http_client import bound, cannot_open, limit_of, with_proxy, without_proxy
 from codebotler.models.keys import guard_logs, key_in, without_keys
 from codebotler.models.openai_stream import Chunks, make_lenient
+from codebotler.models.sampling import SamplingSettings
 from codebotler.models.server_errors import (
     broken_off,
     error_in_reply,

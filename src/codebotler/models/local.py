@@ -15,17 +15,9 @@ import torch
 import transformers
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import (
-    DEMANDED_MAX_TOKENS,
-    Heard,
-    ModelError,
-    Reply,
-    SamplingSettings,
-    Usage,
-    reply_from,
-    unheard,
-)
+from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, unheard
 from codebotler.models.keys import guard_logs
+from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import failure, told
 from codebotler.prompts import Message, Prompt
 from codebotler.prompts.rendering import task_end

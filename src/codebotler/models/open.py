@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from codebotler.core.errors import UserError, installed
-from codebotler.models.base import Model, SamplingSettings
+from codebotler.models.base import Model
 from codebotler.models.recorded import recorded_model
+from codebotler.models.sampling import SamplingSettings
 
 KINDS = (
     "recorded, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "

@@ -16,16 +16,8 @@ from tenacity import (
 )
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import (
-    BudgetSpentError,
-    Heard,
-    Model,
-    ModelError,
-    Reply,
-    SamplingSettings,
-    Usage,
-    unheard,
-)
+from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 
 LOG = logging.getLogger("codebotler.models")

@@ -16,7 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.yaml_files import YamlFile
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 
 FOLDER = Path(__file__).with_name("recorded")

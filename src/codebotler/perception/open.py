@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from codebotler.core.errors import UserError, installed
-from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of
+from codebotler.models.sampling import SamplingSettings
 from codebotler.perception.base import Detector
 
 LOOKING = SamplingSettings(temperature=0.0, top_p=None, timeout=30.0)

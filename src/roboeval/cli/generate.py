@@ -42,8 +42,9 @@ from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
-    from codebotler.models.base import Model, SamplingSettings
+    from codebotler.models.base import Model
     from codebotler.models.batch import BatchModel
+    from codebotler.models.sampling import SamplingSettings
     from roboeval.evaluation.generate import Pace, Progress
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run

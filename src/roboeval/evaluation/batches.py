@@ -23,8 +23,9 @@ from codebotler.core.files import (
     write_whole,
     written_whole,
 )
-from codebotler.models.base import ModelError, Reply, SamplingSettings
+from codebotler.models.base import ModelError, Reply
 from codebotler.models.batch import BatchModel
+from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import reply_of_refusal
 from roboeval.evaluation.requests import (
     GenerationPlan,

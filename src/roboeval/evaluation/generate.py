@@ -17,12 +17,12 @@ from codebotler.models.base import (
     Model,
     ModelError,
     Reply,
-    SamplingSettings,
     Usage,
     reply_from,
     unheard,
 )
 from codebotler.models.rate_limit import RateLimited
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from roboeval.evaluation.requests import (
     GenerationPlan,

@@ -12,7 +12,7 @@ from inspect_ai.dataset import MemoryDataset, Sample
 from inspect_ai.scorer import CORRECT, INCORRECT, Score, Scorer, Target, accuracy, grouped, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
-from codebotler.models.base import SamplingSettings
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import prompt_for
 from codebotler.prompts.extract import program_of
 from codebotler.simulator.pool import shared_pool

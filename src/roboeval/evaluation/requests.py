@@ -15,7 +15,8 @@ from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.core.words import brief
-from codebotler.models.base import Model, SamplingSettings
+from codebotler.models.base import Model
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for, template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head

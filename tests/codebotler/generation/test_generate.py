@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import pytest
 
 from codebotler.generation.generate import Attempt, Generation, write_program
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 
 PROMPT = prompt_for("Say hello.")

@@ -23,7 +23,8 @@ from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight, rooms_to_check, unknown_rooms
 from codebotler.missions.store import missions
-from codebotler.models.base import Heard, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.base import Heard, Reply, Usage, unheard
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, NotReadyError, Result
 from codebotler.robots.reservation import Reservation

@@ -10,8 +10,9 @@ from typing import Any, TypeVar
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import ModelError, Reply, SamplingSettings
+from codebotler.models.base import ModelError, Reply
 from codebotler.models.open import open_model
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import prompt_for
 from codebotler.prompts.rendering import OPENING
 

@@ -5,8 +5,8 @@ import sys
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import SamplingSettings
 from codebotler.models.open import open_model
+from codebotler.models.sampling import SamplingSettings
 
 COMMAND = 'pip install "pydantic-ai-slim[groq]"'
 URL = "http://127.0.0.1:9/v1"

@@ -14,17 +14,10 @@ from typing import Any, TypeVar
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import (
-    BudgetSpentError,
-    Heard,
-    ModelError,
-    Reply,
-    SamplingSettings,
-    Usage,
-    unheard,
-)
+from codebotler.models.base import BudgetSpentError, Heard, ModelError, Reply, Usage, unheard
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 from server import Fault, Request, Server
 
@@ -325,7 +318,7 @@ def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
 
 INTERRUPTED = """
 import asyncio, sys
-from codebotler.models.base import SamplingSettings
+from codebotler.models.sampling import SamplingSettings
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import prompt_for

@@ -11,9 +11,9 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
 from codebotler.models import base
-from codebotler.models.base import SamplingSettings
 from codebotler.models.open import expect_server, open_model
 from codebotler.models.recorded import NAMES, UnknownInstructionError, _words, recorded_model
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import prompt_for
 from codebotler.simulator.engine import run
 

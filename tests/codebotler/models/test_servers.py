@@ -11,8 +11,9 @@ import openai
 import pytest
 
 from codebotler.models import http_client
-from codebotler.models.base import Model, ModelError, Reply, SamplingSettings, Usage
+from codebotler.models.base import Model, ModelError, Reply, Usage
 from codebotler.models.open import open_model
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Message, Prompt, prompt_for
 from server import CHUNK, HUGE, TASK, Fault, Server
 

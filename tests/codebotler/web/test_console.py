@@ -21,8 +21,9 @@ from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
-from codebotler.models.base import Heard, Model, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.models.recorded import recorded_model
+from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Result, Robot
 from codebotler.robots.simulated import OFFICE, Simulated

@@ -169,6 +169,15 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
             {"content": "def task_program():\n    pass", "reasoning_content": "thought"},
             {"reasoning": "thought", "no_program": None, "program": "def task_program():\n    pass\n"},
         ),
+        (
+            {
+                "content": "```python\ndef task_program():\n    pass\n```",
+                "reasoning": "thought",
+                **dict.fromkeys(("refusal", "annotations", "audio", "function_call")),
+                "tool_calls": [],
+            },
+            {"reasoning": "thought", "no_program": None, "program": "def task_program():\n    pass\n"},
+        ),
         ({"content": None, "refusal": "I cannot."}, {"no_program": "refusal", "raw_reply": "I cannot."}),
         (
             {

@@ -88,9 +88,13 @@ def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
 
 def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
     assert roboeval("generate", "--num-completions", "1", cwd=tmp_path).status == 0
-    refusal = refused("generate", "--num-completions", "1", "--temperature", "0.7", cwd=tmp_path)
+    about = tmp_path / "runs/recorded-careful/run.json"
+    before = about.read_bytes()
+    hasty = ("--model", "recorded:hasty", "--out", "runs/recorded-careful")
+    refusal = refused("generate", "--num-completions", "2", *hasty, cwd=tmp_path)
     assert refusal.at == ("runs/recorded-careful/run.json", None)
-    assert "temperature (0.2, now 0.7)" in refusal.sentence
+    assert "(recorded:careful, now recorded:hasty)" in refusal.sentence
+    assert about.read_bytes() == before
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,8 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line
-from codebotler.models.base import ModelError, SamplingSettings
+from codebotler.models.base import ModelError
+from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import Pace, Progress, generate_run
 from roboeval.evaluation.requests import GenerationPlan, RequestLog
 from roboeval.evaluation.runs.completions import read_completions
@@ -378,7 +379,7 @@ def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, pape
 SCRIPT = """
 import pathlib, sys
 sys.path.insert(0, {tests!r})
-from codebotler.models.base import SamplingSettings
+from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import Pace, generate_run
 from roboeval.evaluation.requests import GenerationPlan
 from roboeval.evaluation.runs.folder import Run

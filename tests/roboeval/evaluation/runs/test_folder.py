@@ -186,10 +186,10 @@ def test_a_program_that_is_changed_while_it_waits_is_tied_to_what_was_judged(
     next(rows)
     run.completions.write_bytes(kept.replace(b"# 299", b"# abc"))
     assert len(list(rows)) == 299
-    assert len(judged(run, paper)) == 300
-    run.completions.write_bytes(kept)
     with pytest.raises(UserError, match="SayGoodDay/0/299 "):
         judged(run, paper)
+    run.completions.write_bytes(kept)
+    assert len(judged(run, paper)) == 300
 
 
 def test_a_finished_evaluation_runs_nothing_again(tmp_path: Path, paper: Suite) -> None:
@@ -234,7 +234,6 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
         ("digest", "0" * 64, "suite ("),
         ("python", "2.7", 'Python ("2.7", now "3.'),
         ("codebotler", "0.0.1", 'tool ("0.0.1", now '),
-        ("tasks", ["LunchTime", "GetDrink"], "tasks (LunchTime, GetDrink, now all)"),
         ("ablation", True, "ablation (true, now false)"),
     ],
 )
@@ -264,9 +263,43 @@ def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> 
     run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
     judged(run, paper)
     rows = run.completions.read_bytes().splitlines(keepends=True)
-    run.completions.write_bytes(rows[1] + rows[0])
-    with pytest.raises(UserError, match=r"SayGoodDay/0/0 .* SayGoodDay/0/1"):
+    run.completions.write_bytes(rows[1] + rows[0])  # in whatever order
+    assert len(judged(run, paper)) == 2
+    run.completions.write_bytes(rows[0])
+    with pytest.raises(UserError, match="SayGoodDay/0/1"):
         judged(run, paper)
+
+
+def test_rows_that_judge_a_completion_again_are_refused(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    judged(run, paper)
+    path = run.rows("paper")
+    path.write_bytes(2 * path.read_bytes())
+    with pytest.raises(UserError, match="again") as error:
+        judged(run, paper)
+    assert (error.value.file, error.value.line) == (path, 2)
+
+
+def test_further_tasks_are_judged_beside_those_that_were(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
+    other = to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": GREETS})
+    first, second = run.completions.read_bytes().splitlines(keepends=True)
+    run.completions.write_bytes(first + other + second)
+
+    def judged_tasks(*tasks: str) -> list[str]:
+        rows = evaluate_run(run, paper, ablated=False, tasks=frozenset(tasks) or None, redo=False)
+        return [row.task for row in rows]
+
+    assert judged_tasks("SayGoodDay") == ["SayGoodDay"] * 2
+    before = run.rows("paper").read_bytes()
+    assert judged_tasks("LunchTime", "SayGoodDay") == ["SayGoodDay", "SayGoodDay", "LunchTime"]
+    assert run.rows("paper").read_bytes().startswith(before)
+    whole = run.rows("paper").read_bytes(), run.head("paper").read_bytes()
+    assert json.loads(whole[1])["tasks"] == ["LunchTime", "SayGoodDay"]
+    assert judged_tasks("LunchTime") == ["LunchTime"]
+    assert (run.rows("paper").read_bytes(), run.head("paper").read_bytes()) == whole
+    assert len(judged_tasks()) == 3
+    assert json.loads(run.head("paper").read_text())["tasks"] is None
 
 
 def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
