@@ -47,7 +47,6 @@ class BatchModel:
     def __init__(self, name: str, settings: SamplingSettings) -> None:
         kind, _, rest = name.partition(":")
         client = httpx2.AsyncClient(transport=httpx2.MockTransport(self._answered))
-        own = {"base_url": settings.base_url, "timeout": settings.timeout}
         asked = replace(settings, base_url=settings.base_url or OPENAI, timeout=SamplingSettings.timeout)
         self._model: ChatModel | CompletionsModel
         if kind == "completions":
@@ -57,7 +56,7 @@ class BatchModel:
         else:
             raise UserError(f"{name} takes no batch file; use {OWN_SERVER}:NAME or completions:NAME")
         self.name = self._model.name
-        self.settings = replace(self._model.settings, **own)
+        self.settings = replace(self._model.settings, base_url=settings.base_url, timeout=settings.timeout)
         self._runner = asyncio.Runner()
         self._bodies: dict[Prompt, Mapping[str, Any]] = {}
         self._sent: httpx2.Request | None = None
