@@ -129,7 +129,4 @@ def _streamed(choice: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(message, Mapping):
         return dict(choice)
     delta = {name: value for name, value in message.items() if value is not None}
-    if isinstance(calls := delta.get("tool_calls"), list):
-        known = (call for call in calls if isinstance(call, Mapping))
-        delta["tool_calls"] = [{"index": number, **call} for number, call in enumerate(known)]
     return {**{name: value for name, value in choice.items() if name != "message"}, "delta": delta}

@@ -183,10 +183,11 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
             {
                 "content": None,
                 "tool_calls": [
-                    {"id": "1", "type": "function", "function": {"name": "say", "arguments": '{"a": 1}'}}
+                    {"id": number, "type": "function", "function": {"name": name, "arguments": '{"a": 1}'}}
+                    for number, name in enumerate(("say", "go_to"))
                 ],
             },
-            {"no_program": "tool-call", "raw_reply": '[tool call] say({"a":1})'},
+            {"no_program": "tool-call", "raw_reply": '[tool call] say({"a":1})\n[tool call] go_to({"a":1})'},
         ),
         ({"content": ""}, {"no_program": "empty", "program": ""}),
     ],
@@ -215,9 +216,9 @@ def test_a_file_twice_changes_nothing_and_several_add_up(tmp_path: Path) -> None
     assert (ended.status, ended.err.count("\n")) == (0, 1)
     rows = lines(run / "completions.jsonl")
     assert len({(row["prompt"], row["index"]) for row in rows}) == len(rows) == COUNT
-    after = (run / "completions.jsonl").read_bytes()
+    after = {name: (run / name).stat().st_mtime_ns for name in before}
     assert take(tmp_path, "a.jsonl", "b.jsonl").status == 0
-    assert (run / "completions.jsonl").read_bytes() == after
+    assert {name: (run / name).stat().st_mtime_ns for name in before} == after
 
 
 def test_the_order_of_answers_makes_no_difference(tmp_path: Path) -> None:
@@ -288,6 +289,14 @@ def test_a_line_that_is_no_answer_of_the_run_adds_nothing(
     assert (tmp_path / "run" / "completions.jsonl").read_bytes() == b""
 
 
+def test_answers_to_other_settings_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "hotter").mkdir()
+    request, *_ = begin(tmp_path / "hotter", "--temperature", "1")
+    begin(tmp_path)
+    written(tmp_path / "answers.jsonl", [answer(request, content="a")])
+    assert "other settings" in refused("import", "answers.jsonl", "--out", "run", cwd=tmp_path).sentence
+
+
 def test_a_file_that_breaks_off_adds_nothing(tmp_path: Path) -> None:
     first, second, *_ = begin(tmp_path)
     file = written(tmp_path / "answers.jsonl", [answer(first, content="a"), answer(second, content="b")])
@@ -312,6 +321,7 @@ def test_fresh_tasks_by_a_batch(tmp_path: Path) -> None:
     assert ended.status == 0
     (run,) = (tmp_path / "runs").iterdir()
     requests = lines(tmp_path / "requests.jsonl")
+    assert not any("seed" in request["body"] for request in requests)
     written(tmp_path / "answers.jsonl", [answer(request, content="pass") for request in requests])
     suite = ("--suite", "families-test-7-2")
     assert roboeval("import", "answers.jsonl", "--out", run, *suite, cwd=tmp_path).status == 0

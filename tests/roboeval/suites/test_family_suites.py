@@ -124,7 +124,9 @@ def test_from_fresh_tasks_to_tables_and_again_on_another_machine(tmp_path: Path)
 
 def test_completions_of_another_seed_are_not_judged(tmp_path: Path) -> None:
     assert roboeval("generate", *FRESH, "--num-completions", "1", "--out", "run", cwd=tmp_path).status == 0
-    refusal = refused("evaluate", "run", "--suite", "families-test-8-2", cwd=tmp_path)
+    refusal = refused(
+        "evaluate", "run", "--suite", "families-test-24-2", cwd=tmp_path
+    )  # of the same families
     assert refusal.at == ("run/completions.jsonl", 1)
     assert not (tmp_path / "run" / "evaluations").exists()
 
