@@ -130,19 +130,16 @@ class ChatModel:
         )
 
     def _error(self, error: Exception) -> ModelError:
-        is_hopeless = isinstance(
-            error, exceptions.ModelRequestRejectedError | exceptions.ModelQuotaExceededError
-        )
+        is_out_of_money = isinstance(error, exceptions.ModelQuotaExceededError)
         match error:
             case exceptions.ModelTimeoutError() | exceptions.ModelRequestTimeout():
                 return timed_out(self.name, self.settings.timeout)
             case exceptions.ModelHTTPError(status_code=status, body=body, retry_after=wait):
-                is_spent = isinstance(error, exceptions.ModelQuotaExceededError)
-                return refused(self.name, status, body, retry_after=wait, hopeless=is_spent)
+                return refused(self.name, status, body, retry_after=wait, hopeless=is_out_of_money)
             case exceptions.ModelAPIError(__cause__=openai.APIError(body=body)) if body is not None:
                 return error_in_reply(self.name, body)
             case exceptions.ModelAPIError() | exceptions.ContentFilterError() | exceptions.UserError():
-                may_pass = isinstance(error, exceptions.ModelAPIError) and not is_hopeless
+                may_pass = isinstance(error, exceptions.ModelAPIError) and not is_out_of_money
                 nobody = unreachable(self.name, error, self.settings.base_url)
                 return nobody or failure(self.name, error, may_pass=may_pass)
             case exceptions.UnexpectedModelBehavior():

@@ -36,10 +36,12 @@ from roboeval.cli.options import (
     TasksOption,
     WorkersOption,
     command,
+    engine_named,
     load,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
+from roboeval.cli.rounds import further_rounds
 
 if TYPE_CHECKING:
     from codebotler.models.base import Model
@@ -71,7 +73,7 @@ class Requested:
         fresh = self.plan.suite.families is not None
         return Run(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
-    def model(self) -> Model:
+    def open(self) -> Model:
         """Open the model that is asked."""
         from codebotler.models.open import open_model
         from codebotler.models.recorded import is_recorded
@@ -79,9 +81,7 @@ class Requested:
 
         if is_recorded(self.name) and self.settings.base_url is None:
             return recorded_model_for(self.name, self.plan.suite)
-        opened = open_model(self.name, self.settings)
-        note_unsent(self.settings, opened)
-        return opened
+        return open_model(self.name, self.settings)
 
 
 @with_options_of(model_settings)
@@ -128,16 +128,15 @@ def suite_of_families(suite: str, families: str | None, num_tasks: int | None, s
     return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
-def complete(what: Requested, model: Model) -> Path:
+def complete(run: Run, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
     from codebotler.models.recorded import NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
-    run = what.run_of(model)
     meter = Meter()
     try:
         with meter:
-            progress = generate_run(run, what.plan, model, what.pace, on_progress=meter.show)
+            progress = generate_run(run, plan, model, pace, on_progress=meter.show)
     except KeyboardInterrupt:
         note(f"roboeval: {meter.after_a_stop()}")
         raise SystemExit(STOPPED) from None
@@ -163,7 +162,9 @@ def generate(
     if requests is not None:
         write_batch(what, requests)
         return
-    path = complete(what, what.model())
+    model = what.open()
+    note_unsent(what.settings, model)
+    path = complete(what.run_of(model), what.plan, model, what.pace)
     note(f"the completions are in {path}; `{command('evaluate', path, suite=what.suite)}` judges them")
 
 
@@ -196,6 +197,13 @@ def run(
     with_report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write the report, to the folder report of the run.")
     ] = True,
+    repair: Annotated[
+        int,
+        typer.Option(min=0, help="Rounds in which the model repairs programs that the check rejects."),
+    ] = 0,
+    retries: Annotated[
+        int, typer.Option(min=0, help="Rounds in which rejected programs are requested again.")
+    ] = 0,
     json: JsonOption = False,
     **options: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
@@ -203,14 +211,20 @@ def run(
 
     It prints the tables. After an interruption, the same command continues.
     """
+    if repair and retries:
+        fail("--repair and --retries exclude each other; give one of them")
+    if json and (repair or retries):
+        fail("--json prints the first programs only; leave it out, and evaluate each round's folder with it")
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
 
     what = requested(tasks=tasks, **options)
-    suite, model = what.suite, what.model()
-    expect_same_judge(what.run_of(model), what.plan.suite)  # before anything is paid for
-    path = complete(what, model)
+    suite, plan, model = what.suite, what.plan, what.open()
+    note_unsent(what.settings, model)
+    first = what.run_of(model)
+    expect_same_judge(first, plan.suite)  # before anything is paid for
+    path = complete(first, plan, model, what.pace)
     evaluate(
         str(path),
         suite=suite,
@@ -220,11 +234,22 @@ def run(
         one_process_per_run=one_process_per_run,
         json=json,
     )
+    paths = [path]
+    if repair or retries:
+        with engine_named("local", workers, require_isolation=require_isolation) as engine_for:
+            paths += further_rounds(
+                first,
+                plan,
+                repair or retries,
+                repairs=bool(repair),
+                engine=lambda: engine_for(0),
+                complete=lambda run, plan: complete(run, plan, what.open(), what.pace),
+            )
     if not with_report:
         return
     folder = path / "report"
     try:
-        report([path], folder, suite=suite, workers=workers)
+        report(paths, folder, suite=suite, workers=workers)
     except KeyboardInterrupt:
         again = command("report", path, "--out", folder, suite=suite)
         note(f"roboeval: stopped; verdicts are in {path}; `{again}` writes the report")

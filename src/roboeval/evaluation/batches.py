@@ -76,7 +76,7 @@ def write_requests(
         about["batches"] = with_batch(about["batches"], plan, model.settings)
         with written_whole(path) as file:
             for number, key in enumerate(todo, 1):
-                asked = model.request(plan.prompt(key), number=key[2])
+                asked = model.request(plan.prompt(key), number=plan.sample(key))
                 name = request_id(about, key, plan.instruction(key))
                 row = {"custom_id": name, "method": "POST", "url": asked.url, "body": asked.body}
                 file.write(to_line(row))
@@ -201,7 +201,12 @@ class _Replies:
             return
         try:
             prompt = self.plan.prompt(key)
-            self._keep(key, self.model.reply(prompt, number=key[2], status=answer.status, body=answer.body))
+            self._keep(
+                key,
+                self.model.reply(
+                    prompt, number=self.plan.sample(key), status=answer.status, body=answer.body
+                ),
+            )
         except ModelError as error:
             self.failed[key] = error.sentence
             if error.is_refusal:

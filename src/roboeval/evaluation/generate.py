@@ -92,7 +92,10 @@ def generate_run(
             done, usage = set(), no_usage()
             for completion in plan.completed(run):
                 done.add(completion.key)
-                add_usage(usage, completion.more.get("usage"))
+                if plan.mark().items() <= completion.more.items():  # of this round
+                    add_usage(usage, completion.more.get("usage"))
+            given = [one for one in plan.given() if one.key not in done]
+            done |= {one.key for one in given}
             keys = plan.keys()
             todo = [key for key in keys if key not in done]
             log = RequestLog(run.in_flight, done, metadata["possibly_paid_twice"])
@@ -100,6 +103,8 @@ def generate_run(
             if todo:
                 metadata["batches"] = with_batch(metadata["batches"], plan, model.settings)
             write_whole(run.about, to_text(metadata))
+            for completion in given:
+                file.append(to_line(completion.row))
             progress = Progress(len(keys), len(keys) - len(todo), log.interrupted, usage)
             with log:
                 on_progress(progress)
@@ -192,7 +197,8 @@ class _Generation:
     async def _request(self, key: Key) -> None:
         _KEY.set(key)
         try:
-            await self._keep(key, await self._paced.reply(self.plan.prompt(key), number=key[2]))
+            reply = await self._paced.reply(self.plan.prompt(key), number=self.plan.sample(key))
+            await self._keep(key, reply)
         except BudgetSpentError as error:
             self.progress.stopped = error.sentence
         except ModelError as error:
@@ -229,4 +235,5 @@ class _Generation:
         self._refused.clear()
 
     def _line(self, key: Key, reply: Reply) -> bytes:
-        return to_line(reply_row(key, self.plan.instruction(key), self.model.name, reply))
+        row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
+        return to_line({**row, **self.plan.mark()})

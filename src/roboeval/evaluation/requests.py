@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import platform
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -48,9 +48,21 @@ class GenerationPlan:
         return self.suite.tasks[key[0]].prompts[key[1]]
 
     def prompt(self, key: Key) -> Prompt:
-        """The prompt that a completion is for."""
+        """The request for a completion."""
         rules, skills = self.suite.house_sentences, self.suite.skills
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
+
+    def sample(self, key: Key) -> int:
+        """The number of the sample, from which its seed comes."""
+        return key[2]
+
+    def given(self) -> Iterable[Completion]:
+        """Completions that are taken over from elsewhere."""
+        return ()
+
+    def mark(self) -> Mapping[str, int]:
+        """What rows of completions.jsonl say besides the reply."""
+        return {}
 
     def completed(self, run: Run) -> Iterator[Completion]:
         """The completions that a run has; raises UserError if one's instruction is no longer the suite's."""
@@ -119,6 +131,7 @@ def with_batch(
     batch = {
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
         "num_completions": plan.num_completions,
+        **plan.mark(),
         "settings": asdict(settings),
         "codebotler": __version__,
         "python": platform.python_version(),

@@ -112,6 +112,7 @@ class Server:
         delay: how many seconds it is slow.
         pause: how many seconds it takes for any reply.
         counts: whether it says how many tokens it used.
+        sends: what it sends instead of its own answer: status, headers and body; None for its own.
     """
 
     answer: Callable[[Request], str] = program
@@ -120,6 +121,7 @@ class Server:
     delay: float = 30.0
     pause: float = 0.0
     counts: bool = True
+    sends: Callable[[Request], tuple[int, dict[str, str], bytes] | None] = lambda _request: None
     faults: deque[Fault | None] = field(default_factory=deque)
     """How it misbehaves at the next requests."""
     requests: list[Request] = field(default_factory=list)
@@ -199,6 +201,14 @@ class _Answer:
 
     async def given(self) -> bool:
         """Answer; whether the connection goes on."""
+        if (sent := self.server.sends(self.request)) is not None:
+            status, headers, body = sent
+            kind = headers.pop("Content-Type", "text/event-stream")
+            extra = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
+            return self._body(status, body, kind, extra)
+        return await self._given()
+
+    async def _given(self) -> bool:
         if self.fault is Fault.HUNG_UP:
             return False
         if self.fault in REFUSALS:

@@ -4,6 +4,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.models.chosen import ChosenModel, chosen_model
+from codebotler.models.sampling import SamplingSettings
 
 URL = "http://localhost:11434/v1"
 
@@ -33,6 +34,14 @@ def test_a_name_comes_before_the_environment_and_that_before_the_file(
     assert chosen_model().name == "openai-chat:qwen3"
 
 
+def test_limit_of_the_file_is_for_its_model_unless_a_command_names_one(config: Path) -> None:
+    config.write_text(f"model: openai-chat:qwen3\nbase_url: {URL}\nmax_tokens: 900\n")
+    limited, other = chosen_model(), chosen_model("openai-chat:other")
+    assert limited.with_its_server(SamplingSettings()) == SamplingSettings(max_tokens=900, base_url=URL)
+    assert limited.with_its_server(SamplingSettings(max_tokens=5)).max_tokens == 5
+    assert other.with_its_server(SamplingSettings()) == SamplingSettings()
+
+
 def test_without_codebotlers_home_the_file_is_where_settings_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -50,6 +59,7 @@ def test_without_codebotlers_home_the_file_is_where_settings_are(
         ("modl: a\nmodel: b\n", "line 1.*modl"),
         ("model: [a]\n", "line 1"),
         ("model: ''\n", "line 1"),
+        ("model: a\nmax_tokens: 0\n", "line 2"),
     ],
 )
 def test_a_wrong_file_is_told_with_its_line(text: str, told: str, config: Path) -> None:

@@ -14,7 +14,7 @@ from codebotler.models.recorded import NOTICE
 from command_line import ENVIRONMENT, refused, roboeval
 from forked import Forked
 from seals import unseal
-from server import Fault, Server
+from server import Fault, Request, Server
 
 KEY = "sk-verysecret0123456789abcdefghijkl"
 WITH_KEY = {**ENVIRONMENT, "OPENAI_API_KEY": KEY}
@@ -70,6 +70,63 @@ def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
     assert roboeval("resample", "run", cwd=tmp_path).status == 0
     assert checks.read_bytes().startswith(kept[: kept.rfind(b"\n") + 1])
     assert roboeval("show", "run", cwd=tmp_path).status == 0
+
+
+def test_further_tasks_are_generated_and_judged_beside_those_there(tmp_path: Path) -> None:
+    words = ["run", "--num-completions", "2", "--no-report", "--out", "run"]
+    assert roboeval(*words, "--tasks", "LunchTime", cwd=tmp_path).status == 0
+    rows, verdicts = tmp_path / "run" / "completions.jsonl", tmp_path / "run" / "evaluations" / "paper.jsonl"
+    before = rows.read_bytes(), verdicts.read_bytes()
+    ended = roboeval(*words, "--tasks", TASKS, cwd=tmp_path)
+    assert ended.status == 0
+    assert "10 of 20 completions" in ended.err
+    assert rows.read_bytes().startswith(before[0])
+    assert verdicts.read_bytes().startswith(before[1])
+    assert verdicts.read_bytes().count(b"\n") == rows.read_bytes().count(b"\n") == 20
+    kept = rows.read_bytes(), verdicts.read_bytes(), (tmp_path / "run" / "run.json").read_bytes()
+    one = roboeval(*words, "--tasks", "SayGoodDay", "--num-completions", "1", cwd=tmp_path)
+    assert one.status == 0
+    assert "LunchTime" not in one.out
+    assert kept == (rows.read_bytes(), verdicts.read_bytes(), (tmp_path / "run" / "run.json").read_bytes())
+
+
+def test_a_run_that_cannot_be_judged_is_refused_before_anything_is_paid(tmp_path: Path) -> None:
+    words = ["run", "--no-report", "--out", "run", "--tasks", "LunchTime", "--num-completions"]
+    assert roboeval(*words, "1", cwd=tmp_path).status == 0
+    head = tmp_path / "run" / "evaluations" / "paper.json"
+    head.write_text(json.dumps(json.loads(head.read_text()) | {"digest": "0" * 64}))
+    kept = {path: path.read_bytes() for path in (tmp_path / "run").rglob("*") if path.is_file()}
+    assert "--redo" in refused(*words, "2", cwd=tmp_path).sentence
+    assert kept == {path: path.read_bytes() for path in (tmp_path / "run").rglob("*") if path.is_file()}
+
+
+# --- further rounds
+
+
+LOST = "```python\ndef task_program():\n    go_to('the moon')\n```\n"
+GREETS = "```python\ndef task_program():\n    say('good day')\n```\n"
+
+
+def repaired(request: Request) -> str:
+    """The wrong room at first; in a repair, or for a sample of a further round, a greeting."""
+    is_repair = any("the moon" in message["content"] for message in request.body["messages"])
+    return GREETS if is_repair or request.body.get("seed", 0) > 1000 else LOST
+
+
+@pytest.mark.parametrize("option", ["repair", "retries"])
+def test_rejected_programs_are_requested_again_in_rounds(option: str, tmp_path: Path) -> None:
+    with Server(answer=repaired) as server:
+        words = ["run", "--model", "openai:m", "--base-url", server.url, "--tasks", "SayGoodDay"]
+        words += ["--seed", "0", "--num-completions", "1", "--out", "run", "--no-report", f"--{option}", "2"]
+        ended = roboeval(*words, cwd=tmp_path)
+        assert ended.status == 0, ended
+        assert len(server.requests) == 10
+        folder = tmp_path / "run" / ("repair-1" if option == "repair" else "retry-1")
+        assert {json.loads(line)["round"] for line in (folder / "completions.jsonl").open()} == {1}
+        lines = ended.out[ended.out.index("The effect of") :].splitlines()
+        assert [line.split()[-2] for line in lines if " of 5 " in line] == ["5", "10"]  # requests
+        assert roboeval(*words, cwd=tmp_path).out == ended.out
+        assert len(server.requests) == 10  # nothing is paid for twice
 
 
 def test_generate_says_where_and_what_next(tmp_path: Path) -> None:

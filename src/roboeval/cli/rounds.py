@@ -1,0 +1,121 @@
+"""Further rounds of `roboeval run`: rejected programs are requested again or repaired, and all are judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from codebotler.core.terminal import print_rich
+from roboeval.cli.output import watched
+
+if TYPE_CHECKING:
+    from roboeval.analysis.summary import Summary
+    from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.requests import GenerationPlan
+    from roboeval.evaluation.runs.completions import Completion, Key
+    from roboeval.evaluation.runs.folder import Run
+
+
+@dataclass(frozen=True)
+class Round:
+    """How a round of a run did.
+
+    Args:
+        number: from 0, for the first programs.
+        summary: the verdicts on all programs after it.
+        requests: how many programs were requested in it.
+        accepted: how many programs the check accepts after it.
+        tokens: the tokens of its requests, as far as the model counts them.
+    """
+
+    number: int
+    summary: Summary
+    requests: int
+    accepted: int
+    tokens: int
+
+
+def further_rounds(
+    run: Run,
+    plan: GenerationPlan,
+    most: int,
+    *,
+    repairs: bool,
+    engine: Callable[[], OpenEngine],
+    complete: Callable[[Run, GenerationPlan], Path],
+) -> list[Path]:
+    """Request rejected programs again, round by round, judge all, and print what that brings.
+
+    Returns:
+        the folders of the rounds, of which there are fewer once the check accepts all programs.
+    """
+    from roboeval.cli.views.rounds import rounds_view
+    from roboeval.evaluation.rounds import RoundPlan
+
+    found: list[Round] = []
+    runs = [run]
+    while True:
+        completions = {one.key: one for one in runs[-1].read(plan.suite) if _is_of(one.key, plan)}
+        problems = dict(_rejected(runs[-1], plan, completions, engine()))
+        found.append(_round(runs[-1], plan, completions, problems, len(found), engine()))
+        if not problems or len(found) > most:
+            break
+        following = RoundPlan(
+            plan.suite,
+            plan.tasks,
+            plan.num_completions,
+            number=len(found),
+            repairs=repairs,
+            earlier=completions,
+            problems=problems,
+        )
+        complete(following.folder(run), following)
+        runs.append(following.folder(run))
+    print_rich(rounds_view(found, repairs=repairs))
+    return [one.path for one in runs[1:]]
+
+
+def _is_of(key: Key, plan: GenerationPlan) -> bool:
+    return (plan.tasks is None or key[0] in plan.tasks) and key[2] < plan.num_completions
+
+
+def _rejected(
+    run: Run, plan: GenerationPlan, completions: dict[Key, Completion], engine: OpenEngine
+) -> Iterator[tuple[Key, list[str]]]:
+    from roboeval.evaluation.checks import check_programs
+
+    programs = {(one.task, one.program_sha256) for one in completions.values()}
+    checking = check_programs(run, plan.suite, completions.values(), engine, samples=5, seed=0)
+    problems = dict(watched(checking, "checking", len(programs)))
+    for key, one in completions.items():
+        if listed := problems[one.task, one.program_sha256]:
+            yield key, listed
+
+
+def _round(
+    run: Run,
+    plan: GenerationPlan,
+    completions: dict[Key, Completion],
+    problems: dict[Key, list[str]],
+    number: int,
+    engine: OpenEngine,
+) -> Round:
+    from roboeval.analysis.summary import summary
+    from roboeval.analysis.tally import Tally
+    from roboeval.evaluation.evaluate import evaluate_run
+    from roboeval.evaluation.requests import add_usage, no_usage
+    from roboeval.evaluation.rounds import round_of
+    from roboeval.evaluation.runs.scope import Scope
+
+    rows = evaluate_run(run, plan.suite, ablated=False, tasks=plan.tasks, redo=False, engine=engine)
+    tally, usage = Tally(), no_usage()
+    for row in watched(rows, "judging", len(completions)):
+        if row.key in completions:
+            tally.add(row)
+    requested = [one for one in completions.values() if round_of(one) == number]
+    for one in requested:
+        add_usage(usage, one.more.get("usage"))
+    counted = summary(tally, plan.suite, Scope.of(completions.values(), plan.tasks))
+    return Round(number, counted, len(requested), len(completions) - len(problems), usage.total())
