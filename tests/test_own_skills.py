@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import make_reader
 from typer.testing import CliRunner
 
 from codebotler.checking.check import check
@@ -144,8 +145,10 @@ def test_an_instruction_becomes_a_program_and_a_mission(
     shown = asked("missions", "last", "--skills", str(own.folder / "skills.py"))
     words = {skill.verb.third for skill in own.skills.rows[len(SKILLS) :] if skill.verb}
     assert any(word in shown for word in words), shown
-    asked("missions", "last", *own.options[:2], "--mcap", str(tmp_path / "mission.mcap"))
-    assert (tmp_path / "mission.mcap").stat().st_size > 0
+    asked("missions", "last", "--mcap", str(tmp_path / "mission.mcap"))
+    with (tmp_path / "mission.mcap").open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert topics & {f"/skill/{skill.name}" for skill in own.skills.rows[len(SKILLS) :]}
 
 
 def test_the_command_shows_each_skill_and_tries_it(own: Own) -> None:

@@ -52,7 +52,7 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
         page.get_by_role("button", name="Run it on the robot").click()
         expect(page.locator(".headline")).to_have_text("Stopped")
         expect(page.locator(".reason")).to_have_text("line 5: stopped by rule study")
-        expect(page.locator(".moment-rule")).to_contain_text('kept from going to "study" by the rule "study"')
+        expect(page.locator(".moment-rule")).to_contain_text('the rule "study" prevented going to "study"')
         expect(page.locator(".moment-say")).to_have_count(0)
 
         write(page, VISIT)

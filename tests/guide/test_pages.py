@@ -411,6 +411,13 @@ def test_pictures_are_made_and_shown_and_quickly_loaded() -> None:
         assert any(re.search(f"{in_markdown}|{in_html}", page) for page in pages), name
 
 
+def test_this_project_is_installed_from_its_folder() -> None:
+    """By its name alone, pip would look for it among published packages."""
+    readmes = {f"environments/{path.parent.name}": path for path in ROOT.glob("environments/*/README.md")}
+    for page, path in {**PAGES, **readmes}.items():
+        assert not re.findall(r"pip install [^`\n]*\bcodebotler\b(?!-\d)", path.read_text()), page
+
+
 def test_links_lead_somewhere() -> None:
     for page, path in PAGES.items():
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", path.read_text()):

@@ -1,4 +1,4 @@
-"""A review of house rules: an example that keeps each and one that breaks it, and what is odd about them."""
+"""A review of house rules: an example that keeps each and one that breaks it, and likely mistakes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,7 @@ NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part th
 ALWAYS_BROKEN = "all that a robot can do breaks it"
 IMPOSSIBLE = "nothing can keep it"
 UNDECIDED = (
-    "it is too large for examples, though it is enforced all the same; "
-    'make a rule of each part that is joined by "and"'
+    'it is too complex for examples, but still enforced; make a rule of each part that is joined by "and"'
 )
 DETECTED = (
     "it can be broken by what a look finds or a person answers, which can only be noticed: "
@@ -149,7 +148,7 @@ def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
 
 
 def _of_pair(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule, str]]:
-    """What is odd about two rules together, and about which of them."""
+    """Likely mistakes in two rules together, and which of them has each."""
     kinds = [{element.kind for element in elements(rule.formula)} for rule in (one, other)]
     if not kinds[0] & kinds[1]:
         return

@@ -129,7 +129,7 @@ def rules(
     skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Show house rules with examples, and what is odd about them.
+    """Show house rules with examples, and likely mistakes.
 
     For each rule, it finds a shortest example that keeps it and one that breaks it.
     """

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from codebotler.cli.views import list_view, mission_view
-from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import note, print_json, print_rich
 from codebotler.missions.log import Summary, events_of
 from codebotler.missions.pictures import FOLDER, picture_of
@@ -40,12 +39,12 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
             note(f"its pictures are in {folder / FOLDER}")
 
 
-def write_mission(home: Path, name: str, path: Path, *, clock: Clock, skills: SkillTable) -> None:
+def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
     """Write a mission as an MCAP file."""
     from codebotler.missions.mcap import export
 
     recover(home)
     folder = find(home, name)
     summary, events = Summary.read(folder), events_of(folder)
-    export(path, summary, events, clock, folder, skills=skills)
+    export(path, summary, events, clock, folder)
     note(f"wrote {len(events):,} events of mission {summary.id} to {path}")

@@ -68,7 +68,7 @@ def run(
         skills=table,
     )
     body = open_robot(robot, settings)
-    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked)))
+    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
 
 
 def missions(
@@ -94,13 +94,13 @@ def missions(
         raise UserError("--mcap and --json exclude each other; give one of them")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
-    table = skills_from(*(skills or ()))
+    skills_from(*(skills or ()))  # their verbs are known then
     if mission is None:
         show_missions(home(), json=json)
     elif mcap is None:
         show_mission(home(), mission, json=json)
     else:
-        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall", skills=table)
+        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall")
 
 
 def robots(

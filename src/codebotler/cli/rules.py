@@ -1,4 +1,4 @@
-"""`codebotler rules`: shows each house rule with examples, and warns of what is odd."""
+"""`codebotler rules`: shows each house rule with examples, and warns of likely mistakes."""
 
 from __future__ import annotations
 

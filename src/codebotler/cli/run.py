@@ -17,6 +17,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.core.words import listed
+from codebotler.core.world import World
 from codebotler.missions.log import State
 from codebotler.missions.mission import GRACE, MissionError
 from codebotler.missions.session import MissionSession
@@ -69,8 +70,21 @@ class Request:
             return False
 
 
-def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], Model]) -> int:
+def run(
+    robot: Robot,
+    request: Request,
+    home: Path,
+    open_model: Callable[[str], Model],
+    world: World | None = None,
+) -> int:
     """Take a user's request to its end, and show all of it.
+
+    Args:
+        robot: the robot.
+        request: what the user asks for.
+        home: the folder of missions.
+        open_model: opens a model by its name.
+        world: the map, if there is one.
 
     Returns:
         the exit status: 0 if the mission is done, 1 if it is not, 128 plus the number of the signal that
@@ -81,7 +95,9 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
     recover(home)
     order = Order(program=program) if program else Order(request.what, request.model)
     checked = checker(robot.skills)
-    session = MissionSession(robot, home, order, open_model=open_model, check=checked, rules=request.rules)
+    session = MissionSession(
+        robot, home, order, open_model=open_model, check=checked, rules=request.rules, world=world
+    )
     session.start()
     try:
         view = _prepared(session)
@@ -178,7 +194,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
         threading.Thread(target=session.stop, args=(by,), daemon=True).start()
         got.append(number)
         if len(got) > 1:
-            note(f"\nthe robot was told to stop; it has {GRACE:g} s to confirm")
+            note(f"\nasked the robot to stop; it has {GRACE:g} s to confirm")
 
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]

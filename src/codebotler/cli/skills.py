@@ -28,7 +28,7 @@ from codebotler.simulator.sampled_robot import Lot, RoomMap, SampledRobot
 TRIES = 40  # worlds in which each skill is tried
 ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
 NEW = '''\
-"""What this robot can do besides the eight skills; `codebotler skills {name}` shows it as a model sees it."""
+"""This robot's further skills; `codebotler skills {name}` shows it as a model sees it."""
 
 from codebotler import Simulation, skill
 

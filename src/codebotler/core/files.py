@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import errno
 import fcntl
 import io
@@ -43,11 +44,18 @@ def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
     """The text of a file's bytes, with the line ends of any system and without a byte order mark."""
     if len(data) > limit:
         raise UserError(f"is larger than {limit:,} bytes", file=name)
+    _expect_not_utf_16(data, name)
     try:
         return io.StringIO(data.decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise UserError("is not UTF-8 text; save it as UTF-8", file=name, line=line) from None
+
+
+def _expect_not_utf_16(data: bytes, name: Path | str) -> None:
+    """Refuse the encoding that editors of Windows call Unicode, by the mark with which it begins."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise UserError("is UTF-16 text; save it as UTF-8", file=name)
 
 
 def _opened(path: Path, name: Path | str) -> BinaryIO:
@@ -73,6 +81,8 @@ def read_lines(
             line = file.readline(limit + 1)
             if not line:
                 return
+            if number == 1:
+                _expect_not_utf_16(line, name or path)
             if len(line) > limit:
                 raise UserError(f"this row is longer than {limit:,} bytes", file=name or path, line=number)
             yield number, line

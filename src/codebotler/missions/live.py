@@ -90,7 +90,7 @@ class LiveRobot:
             self._told.set()
 
     def why_unstopped(self) -> str:
-        """Why the robot could not be stopped, once it was told; empty if it was, as far as it knows."""
+        """Return why the robot could not be stopped after a request; empty if it was, as far as it knows."""
         if self._stopped.is_set():
             self._told.wait(TELLING)
         return str(getattr(self.robot, "failed_stop", ""))  # which only robots of users have
@@ -118,7 +118,7 @@ class LiveRobot:
         return result
 
     def _performed(self, row: Skill, arguments: Sequence[Argument]) -> Result:
-        """What comes of one skill, as `perform` tells it."""
+        """Execute one skill, and return its result."""
         is_drive = row.is_drive
         if is_drive:  # what is judged is what the robot is told
             arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
@@ -157,7 +157,7 @@ class LiveRobot:
     # --- rules
 
     def _judge(self, guard: RuleGuard, event: Event, *, is_drive: bool) -> None:
-        """Refuse what a rule forbids, in whichever room it would happen; the robot is not told."""
+        """Refuse an event that a rule forbids in a room where it may happen, before it reaches the robot."""
         rooms = self._meant(event.text) if is_drive else []
         texts = [event.text, *(names_of(room, event.text) for room in rooms if room != event.text)]
         try:
@@ -290,7 +290,7 @@ def answered(skill: Skill, result: base.Result) -> base.Result:
 
 
 def _told(broken: RuleViolationError) -> dict[str, object]:
-    """What the log says of a rule that was broken, or would have been."""
+    """The log entry of a rule that was broken, or would have been."""
     rule, event = broken.rule, broken.event
     what = {} if event is None else {"what": trace_data((event,))[0], "prevented": not broken.is_late}
     return {"rule": rule.name, "says": rule.says, "formula": str(rule.formula), **what}

@@ -32,6 +32,7 @@ HAS: Mapping[str, frozenset[str]] = {
     "stop": frozenset({"by"}),
     "rule": frozenset({"rule", "says", "formula"}),
     "log": frozenset({"text"}),
+    "map": frozenset({"rooms", "robot"}),
 }
 """What belongs to each kind of event."""
 

@@ -2,47 +2,61 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import IO, Any, Literal, TypeAlias
+from typing import IO, Any, Literal, NamedTuple, TypeAlias
 from uuid import uuid4
 
 from mcap.writer import Writer
 
 from codebotler import __version__
 from codebotler.core.files import expect_replaceable, written_whole
-from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.skills.values import ValueType
-from codebotler.missions.log import Line, Summary
+from codebotler.core.world import Point, World
+from codebotler.missions import foxglove
+from codebotler.missions.foxglove import (
+    DEBUG,
+    ERROR,
+    INFO,
+    NUMBER,
+    SECOND,
+    TEXT,
+    WARNING,
+    WHOLE,
+    Message,
+    Schema,
+)
+from codebotler.missions.log import Line, State, Summary
+from codebotler.missions.map_event import map_from
 from codebotler.missions.pictures import picture_of
+from codebotler.missions.progress import Progress, position
+from codebotler.missions.wording import event_text
+from codebotler.simulator.sampled_robot import RoomMap
 
 Clock: TypeAlias = Literal["wall", "robot"]
-Schema: TypeAlias = Mapping[str, Any]
 
-TEXT: Schema = {"type": "string"}
-NUMBER: Schema = {"type": "number"}
-SECOND = 1_000_000_000
 LATEST = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
-STATES, NOTES = "/mission/state", "/mission/log"
-DETAILS = ("text", "message", "reason", "by", "file")
-"""The keys of events that hold text."""
-IMAGE = "foxglove.CompressedImage"
-"""The schema by whose name Foxglove recognises pictures."""
-WHOLE: Schema = {"type": "integer"}
-TIME: Schema = {"type": "object", "title": "time", "properties": {"sec": WHOLE, "nsec": WHOLE}}
-IMAGE_SCHEMA: Mapping[str, Schema] = {
-    "timestamp": TIME,
-    "frame_id": TEXT,
-    "data": {**TEXT, "contentEncoding": "base64"},
-    "format": TEXT,
+STATES, NOTES, POSE, FRAMES, ROOMS = "/mission/state", "/mission/log", "/robot/pose", "/tf", "/rooms"
+DETAILS = ("text", "message", "file")
+"""The keys of a skill's events that hold text."""
+LEVELS = {"feedback": DEBUG, "error": ERROR, **dict.fromkeys(("rule", "stop", "cancelled", "late"), WARNING)}
+"""The levels of log lines, by kind of event; for others it is INFO."""
+STATE_SCHEMA: Schema = {
+    "type": "object",
+    "properties": {"state": TEXT, "reason": TEXT, "clock": NUMBER},
 }
-FORMATS = {"jpg": "jpeg", "png": "png"}
-GOES_ON: Mapping[str, Schema] = {"number": WHOLE, "event": TEXT, "text": TEXT, "clock": NUMBER}
+TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
+
+
+class Item(NamedTuple):
+    """A message for a topic; a schema of Foxglove's goes by its name, others by their topic."""
+
+    topic: str
+    message: Message
+    schema: Schema | str
 
 
 def write_mcap(
@@ -52,9 +66,8 @@ def write_mcap(
     *,
     folder: Path | None = None,
     clock: Clock = "wall",
-    skills: SkillTable = SKILLS,
 ) -> None:
-    """Write a mission: a channel for each skill and its pictures, one for states, one for the rest.
+    """Write a mission: a topic for each skill, and topics for states, the log, the robot's pose and rooms.
 
     The program is attached. Messages are timed by the clock on the wall, or by the robot's, put to start with
     the mission. Pictures lie in its `folder`; None leaves them out.
@@ -63,25 +76,24 @@ def write_mcap(
     writer = Writer(file)
     writer.start(profile="", library=f"codebotler {__version__}")
     channels: dict[str, int] = {}
+    skills, way = _Skills(events), _Way(summary.program)
 
     def time(line: Line) -> int:
         seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
         return round(min(seconds * SECOND, LATEST))
 
-    def add(topic: str, properties: Mapping[str, Schema], message: object, at: int, name: str = "") -> None:
+    def add(topic: str, message: Message, schema: Schema | str, at: int) -> None:
         if topic not in channels:
-            named = name or "codebotler." + topic.strip("/").replace("/", ".")
-            schema = json.dumps({"type": "object", "properties": properties}).encode()
-            number = writer.register_schema(named, "jsonschema", schema)
+            name = "codebotler." + topic.strip("/").replace("/", ".")
+            name, data = (schema, foxglove.SCHEMAS[schema]) if isinstance(schema, str) else (name, schema)
+            number = writer.register_schema(name, "jsonschema", json.dumps(data).encode())
             channels[topic] = writer.register_channel(topic, "json", number)
         writer.add_message(channels[topic], at, json.dumps(message).encode(), at)
 
     for line in events:
         at = time(line)
-        topic, properties, message = _message(line, skills)
-        add(topic, properties, message, at)
-        if folder is not None and (picture := picture_of(folder, line)) is not None:
-            add(f"{topic}/picture", IMAGE_SCHEMA, _image(*picture, at), at, IMAGE)
+        for item in (*_items(line, skills, at), *_pictures(line, folder, at), *way.items(line, at)):
+            add(*item, at)
     last = time(events[-1]) if events else began
     program = summary.program.encode(errors="surrogatepass")
     writer.add_attachment(began, last, "program.py", "text/x-python", program)
@@ -89,48 +101,123 @@ def write_mcap(
     writer.finish()  # type: ignore[no-untyped-call]  # theirs
 
 
-def schema_of(skill: Skill) -> dict[str, Schema]:
-    """The properties of messages about a skill: arguments, result and feedback."""
-    arguments = {p.name: _schema(p.type) for p in skill.parameters}
-    result = {} if skill.returns.base is None else {"result": _schema(skill.returns)}
-    return {**GOES_ON, **arguments, **result}
+def _items(line: Line, skills: _Skills, at: int) -> Iterator[Item]:
+    """The messages about an event: of its skill, of the state, and a line of the log."""
+    event = line["event"]
+    if "skill" in line:
+        yield skills.item(line)
+    if event == "state":
+        message = {"state": line["state"], "reason": line.get("reason", ""), "clock": line["clock"]}
+        yield Item(STATES, message, STATE_SCHEMA)
+    text = event_text(line)
+    if not text or (event == "sleep" and not line["seconds"]):
+        return
+    level = ERROR if line.get("state") == State.FAILED else LEVELS.get(event, INFO)
+    name = str(line.get("skill", event))
+    yield Item(NOTES, foxglove.log_line(level, text, name, line.get("line"), at), "foxglove.Log")
 
 
-def _schema(value: ValueType) -> Schema:
-    one: Schema = {"str": TEXT, "int": WHOLE, "float": NUMBER, "bool": {"type": "boolean"}}[
-        value.base or "str"
-    ]
-    one = {**one, "enum": list(value.choices)} if value.choices else one
-    return {"type": "array", "items": one} if value.is_list else one
+def _pictures(line: Line, folder: Path | None, at: int) -> Iterator[Item]:
+    if folder is not None and (picture := picture_of(folder, line)) is not None:
+        image = foxglove.compressed_image(*picture, at)
+        yield Item(f"/skill/{line['skill']}/picture", image, "foxglove.CompressedImage")
 
 
-def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema], dict[str, object]]:
-    """The topic, the schema and the message of an event."""
-    event, name = line["event"], str(line.get("skill"))
-    message: dict[str, object] = {"event": event, "clock": line["clock"]}
-    text = next((str(line[key]) for key in DETAILS if key in line), None)
-    if text is not None:
-        message["text"] = f"{line['kind']}: {text}" if "kind" in line else text
-    if name not in skills:
-        if event == "state":
-            return STATES, {**GOES_ON, "state": TEXT}, {**message, "state": line["state"]}
-        if "seconds" in line:
-            message["seconds"] = line["seconds"]
-        return NOTES, {**GOES_ON, "seconds": NUMBER}, message
-    message |= {"number": line["number"], **line.get("arguments", {})}
-    if line.get("result") is not None:
-        message["result"] = line["result"]
-    return f"/skill/{name}", schema_of(skills[name]), message
+class _Skills:
+    """The messages of skills, with schemas of the arguments and results that these events have."""
+
+    def __init__(self, events: Sequence[Line]) -> None:
+        arguments: dict[str, dict[str, list[object]]] = {}
+        results: dict[str, list[object]] = {}
+        for line in events:
+            for name, value in line.get("arguments", {}).items():
+                arguments.setdefault(line["skill"], {}).setdefault(name, []).append(value)
+            if line.get("result") is not None:
+                results.setdefault(line["skill"], []).append(line["result"])
+        self._arguments = {
+            skill: {name: schema_of(values) for name, values in given.items()}
+            for skill, given in arguments.items()
+        }
+        self._results = {skill: schema_of(values) for skill, values in results.items()}
+
+    def item(self, line: Line) -> Item:
+        """The message of a skill's event."""
+        skill = line["skill"]
+        arguments, result = self._arguments.get(skill, {}), self._results.get(skill)
+        message = {"number": line["number"], "event": line["event"], "clock": line["clock"]}
+        if "arguments" in line:
+            given = line["arguments"].items()
+            message["arguments"] = {name: _fitting(value, arguments[name]) for name, value in given}
+        if result is not None and line.get("result") is not None:
+            message["result"] = _fitting(line["result"], result)
+        text = next((str(line[key]) for key in DETAILS if key in line), None)
+        if text is not None:
+            message["text"] = f"{line['kind']}: {text}" if "kind" in line else text
+        properties = {
+            "number": WHOLE,
+            "event": TEXT,
+            "clock": NUMBER,
+            "text": TEXT,
+            "arguments": {"type": "object", "properties": arguments},
+            **({} if result is None else {"result": result}),
+        }
+        return Item(f"/skill/{skill}", message, {"type": "object", "properties": properties})
 
 
-def _image(kind: str, data: bytes, at: int) -> dict[str, object]:
-    """A picture as a message for Foxglove."""
-    return {
-        "timestamp": {"sec": at // SECOND, "nsec": at % SECOND},
-        "frame_id": "",
-        "data": base64.b64encode(data).decode(),
-        "format": FORMATS[kind],
-    }
+class _Way:
+    """The rooms, and the robot's way through them."""
+
+    def __init__(self, program: str) -> None:
+        self._program, self._progress = program, Progress()
+        self._world: World | None = None
+        self._at: Point | None = None
+
+    def items(self, line: Line, at: int) -> Iterator[Item]:
+        """The messages of an event that tells of rooms, or after which the robot is elsewhere."""
+        if line["event"] == "map":
+            self._world = map_from(line)
+            yield Item(ROOMS, foxglove.scene_update(self._world.rooms, at), "foxglove.SceneUpdate")
+        else:
+            self._progress = self._progress.after(line, self._program)
+        now, before = self._position(), self._at
+        if now is None or now == before:
+            return
+        self._at = now
+        heading = 0.0 if before is None else math.atan2(now[1] - before[1], now[0] - before[0])
+        yield Item(POSE, foxglove.pose_in_frame(now, heading, at), "foxglove.PoseInFrame")
+        yield Item(FRAMES, foxglove.frame_transform(now, heading, at), "foxglove.FrameTransform")
+
+    def _position(self) -> Point | None:
+        if self._world is None:
+            return self._progress.at
+        return position(self._progress, self._world, RoomMap.of(self._world))
+
+
+def schema_of(values: Sequence[object]) -> dict[str, Any]:
+    """The schema of arguments or results; text where their types differ, since Foxglove takes no unions."""
+    lists = [value for value in values if isinstance(value, list)]
+    if len(lists) == len(values):
+        return {"type": "array", "items": {"type": _type([one for each in lists for one in each])}}
+    return {"type": _type(values)}
+
+
+def _type(values: Sequence[object]) -> str:
+    types = {_type_of(value) for value in values}
+    if types == {"integer", "number"}:
+        return "number"
+    return types.pop() if len(types) == 1 else "string"
+
+
+def _type_of(value: object) -> str:
+    is_endless = isinstance(value, float) and not math.isfinite(value)  # JSON has no such numbers
+    return "string" if is_endless else TYPES.get(type(value), "string")
+
+
+def _fitting(value: object, schema: Mapping[str, Any]) -> object:
+    """The value, as text where the schema says so."""
+    if schema["type"] == "array" and isinstance(value, list):
+        return [_fitting(one, schema["items"]) for one in value]
+    return value if schema["type"] != "string" or isinstance(value, str) else str(value)
 
 
 def _about(summary: Summary) -> dict[str, str]:
@@ -147,15 +234,13 @@ def export(
     events: Sequence[Line],
     clock: Clock,
     folder: Path | None = None,
-    *,
-    skills: SkillTable = SKILLS,
 ) -> None:
     """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
     path.parent.stat()  # no folder is created where a name is mistyped
     whole = io.BytesIO()
-    write_mcap(whole, summary, events, folder=folder, clock=clock, skills=skills)
+    write_mcap(whole, summary, events, folder=folder, clock=clock)
     if path.exists() and not path.is_file():
         path.write_bytes(whole.getvalue())
         return

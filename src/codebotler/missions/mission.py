@@ -15,8 +15,10 @@ from typing import Self, TypeAlias
 from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
 from codebotler.core.trace import Outcome, RunError, Status, Trace
+from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event, log_of
+from codebotler.missions.map_event import map_data
 from codebotler.missions.pictures import Pictures
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
@@ -163,6 +165,10 @@ class Mission:
     def note(self, text: str) -> None:
         """Log a sentence."""
         self._write("log", text=text)
+
+    def show_map(self, world: World) -> None:
+        """Log where the rooms are."""
+        self._write("map", **map_data(world))
 
     def stop(self, by: str = "somebody") -> None:
         """Stop the robot and the program, from any thread; nothing else starts.

@@ -19,7 +19,7 @@ MOST_ROOMS = 1_000
 
 
 def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms and for the room it is in; what is odd is a remark, a sentence.
+    """Ask a connected robot for its rooms and for its own room; each likely mistake is a remark.
 
     Returns:
         the rooms, None if it does not list them; and the room it is in, empty if it does not say.
@@ -98,7 +98,7 @@ def missing_skills(program: str, robot: Robot) -> list[str]:
     """A sentence for each skill that a program calls and a connected robot lacks."""
     called = called_skills(tree_of(program), robot.skills)
     return [
-        f"line {line}: the robot cannot {skill}: {visible(robot.missing[skill])}"
+        f"line {line}: this robot has no `{skill}` skill: {visible(robot.missing[skill])}"
         for skill, line in sorted(called.items(), key=lambda item: item[1])
         if skill in robot.missing
     ]

@@ -14,9 +14,10 @@ from codebotler.core.program import parsed
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.table import Recording
 from codebotler.core.terminal import shortened
-from codebotler.core.world import Point
+from codebotler.core.world import Point, World, laid_out
 from codebotler.missions.log import SKILL_ENDS, Line, State
 from codebotler.missions.wording import activity, event_text, stop_text
+from codebotler.simulator.sampled_robot import RoomMap
 
 AT = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
 MOST, MOST_STEPS = 200, 60  # moments, and drives, looks and finds, that are kept
@@ -158,6 +159,20 @@ class Progress:
     def _found(self, find: Find) -> Progress:
         known = [one for one in self.finds if (one.room, one.name) != (find.room, find.name)]
         return replace(self, finds=(*known, find)[-MOST_STEPS:])
+
+
+def position(progress: Progress, world: World, room_map: RoomMap | None) -> Point | None:
+    """Where the robot is on a map, in metres; None if that is not known.
+
+    Until the robot reports a position, it is where robots stop in its room.
+    """
+    if progress.at is not None:
+        return progress.at
+    if progress.is_between and not progress.is_driving:
+        return None
+    words = progress.left if progress.is_driving else progress.room
+    room = (room_map.room(words) if room_map and words else None) or world.robot
+    return next((one.stand_at for one in laid_out(world).rooms if one.name == room), None)
 
 
 def _recording(name: str) -> Recording | None:

@@ -18,6 +18,7 @@ from codebotler.checking.problems import Check
 from codebotler.checking.rule_review import unknown_rooms_in
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
+from codebotler.core.world import World
 from codebotler.generation.generate import write_program
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
@@ -46,7 +47,7 @@ class MissionSession:
     """Drives one mission on a thread of its own, with a robot that is connected while the session lasts.
 
     `check` gets a program, the robot's rooms and the rules in force; `changed` is called at each change of
-    the view and must return at once; `before` is the session to wait for.
+    the view and must return at once; `before` is the session to wait for; `world` is the map, if any.
     """
 
     def __init__(
@@ -61,9 +62,11 @@ class MissionSession:
         changed: Callable[[], None] = lambda: None,
         number: int = 1,
         before: MissionSession | None = None,
+        world: World | None = None,
     ) -> None:
         self._robot, self._home, self._order = robot, home, order
         self._open_model, self._check, self._changed, self._before = open_model, check, changed, before
+        self._world = world
         self._lock = threading.Condition()  # held for moments; never while a mission is asked for something
         self._editing = threading.Lock()  # held while a program is replaced or approved
         self._view = SessionView(
@@ -216,6 +219,8 @@ class MissionSession:
         ):
             self._mission = mission
             self._show(id=mission.id, state=mission.state)
+            if self._world is not None:
+                mission.show_map(self._world)
             if self._is_stopped():
                 mission.stop(self._stopped_by or "")
                 return

@@ -1,4 +1,4 @@
-"""A mission session at one moment, as the command line, the page and the API see it."""
+"""A mission session at one moment, for the command line, the page and the API."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ class SessionView:
     missing_skills: tuple[str, ...] = ()  # that the program calls and the robot lacks, in sentences
     unknown_rooms: tuple[str, ...] = ()  # that the program names and the robot does not know, in sentences
     room_map: RoomMap | None = None  # of the robot, as far as it says
-    remarks: tuple[str, ...] = ()  # what is odd about the robot, in sentences
-    rules: tuple[Rule, ...] = ()  # of the house
+    remarks: tuple[str, ...] = ()  # likely mistakes about the robot, in sentences
+    rules: tuple[Rule, ...] = ()  # house rules
     off: tuple[str, ...] = ()  # names of those that a person has switched off for this program
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True

@@ -105,11 +105,11 @@ def _result(line: Line) -> str:
 
 def _rule(line: Line) -> str:
     """A rule that was enforced, broken, or not kept at the end."""
-    rule = f'the rule "{visible(str(line["rule"]))}": {shortened(str(line["says"]))}'
+    rule, says = f'the rule "{visible(str(line["rule"]))}"', shortened(str(line["says"]))
     if "what" not in line:
-        return f"not kept: {rule}"
+        return f"not kept: {rule}: {says}"
     what = visible(event_words(trace_from([line["what"]])[0]))
-    return f"kept from {what} by {rule}" if line.get("prevented") else f"{what} broke {rule}"
+    return f"{rule} prevented {what}: {says}" if line.get("prevented") else f"{what} broke {rule}: {says}"
 
 
 EVENTS: Mapping[str, Callable[[Line], str]] = {
@@ -125,5 +125,6 @@ EVENTS: Mapping[str, Callable[[Line], str]] = {
     "cancelled": lambda _: "cancelled",
     "late": lambda _: "finished after the stop; nothing more will run",
     "log": lambda line: shortened(line["text"]),
+    "map": lambda _: "",
 }
 """The text of each kind of event."""

@@ -86,7 +86,7 @@ class OwnRobot:
         try:
             method = getattr(self._body, skill, None)
         except Exception as error:
-            raise UserError(f"{self.name}.{skill} is no method: {_said(error)}") from error
+            raise UserError(f"{self.name}.{skill} is not a method: {_said(error)}") from error
         if method is None and skill == "get_all_rooms":
             method = self._body.rooms
         return method if callable(method) else None

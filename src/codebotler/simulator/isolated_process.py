@@ -363,9 +363,7 @@ def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, Run
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")
         case signal.SIGSYS:
-            return Status.KILLED, RunError(
-                "ForbiddenCall", "the program asked the kernel for what is forbidden"
-            )
+            return Status.KILLED, RunError("ForbiddenCall", "the program made a forbidden system call")
         case signal.SIGKILL:
             return Status.KILLED, RunError("MemoryError", "the process was killed from outside")
     how = f"signal {-status}" if status < 0 else f"exit status {status}"

@@ -101,7 +101,7 @@ class Ledger:
                 name = kind if is_own else "Exception"
                 return self.outcome(Status.PYTHON_ERROR, name[:100], message, line)
             case _:
-                return self.outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")
+                return self.outcome(Status.KILLED, "Crash", "the program wrote to the sandbox channel")
 
     def outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
         """The outcome of a run that ended in an error."""

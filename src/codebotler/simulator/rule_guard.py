@@ -1,4 +1,4 @@
-"""`RuleGuard`: keeps a robot from breaking the rules of the house, whatever its program asks for."""
+"""`RuleGuard`: keeps a robot from breaking house rules, whatever its program asks for."""
 
 from __future__ import annotations
 

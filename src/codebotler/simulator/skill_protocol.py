@@ -45,7 +45,7 @@ class SkillProtocol:
         except ProtocolError as error:
             self.child.end()
             return self.ledger.outcome(
-                Status.KILLED, "Crash", f"the program spoke on the robot's line: {error}"
+                Status.KILLED, "Crash", f"the program wrote to the sandbox channel: {error}"
             )
         except BaseException:
             with suppress(LostProcessError):  # which would hide what the robot says

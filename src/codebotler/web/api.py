@@ -136,7 +136,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         summary, events = _past(console, mission)
         file = io.BytesIO()
         folder = console.home / "missions" / summary.id
-        write_mcap(file, summary, events, folder=folder, clock=clock, skills=console.robot.skills)
+        write_mcap(file, summary, events, folder=folder, clock=clock)
         return _file(file.getvalue(), f"{summary.id}.mcap", "application/octet-stream")
 
 
@@ -193,7 +193,7 @@ def _add_events(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program by the rules of the house, in the rooms of the current mission if there is one."""
+        """Check a program by the house rules, in the rooms of the current mission if there is one."""
         with _refusing():
             return console.check(new.program, console.view.room_map, console.rules).data()
 

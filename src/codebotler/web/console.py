@@ -116,6 +116,7 @@ class Console:
                 changed=self.notifier.change,
                 number=before.view.number + 1 if before else 1,
                 before=before,
+                world=self.world,
             )
         if before is not None and not before.view.is_over:
             threading.Thread(target=before.stop, args=("another instruction",), daemon=True).start()

@@ -233,7 +233,7 @@ def supposed(facts: Sequence[Fact]) -> str:
 def _clauses(known: Sequence[Fact]) -> Iterator[str]:
     for one in known:
         if isinstance(one, GivenAnswer):
-            yield f"is told {_quoted(one.answer)} when it asks {_quoted(one.question)} in {_room(one.room)}"
+            yield f"hears {_quoted(one.answer)} when it asks {_quoted(one.question)} in {_room(one.room)}"
         elif isinstance(one, Lot):
             yield f"works where {one.sentence}"
         else:

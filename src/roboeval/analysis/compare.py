@@ -196,18 +196,15 @@ def _ends(estimate: Estimate) -> dict[str, float]:
 
 
 def to_tell(comparison: Comparison) -> list[str]:
-    """How much it would take to tell the two apart, in sentences."""
+    """The sample sizes with which the two would be told apart, in sentences."""
     much = comparison.needed
     if much.completions is None:
-        return ["Without a difference, the sample size needed to detect it cannot be computed."]
+        return ["There is no difference, so no sample size can be computed."]
     each = how_many(much.completions)
-    here = (
-        f"Detecting a difference of this size on these prompts, four times in five, takes {each} of each "
-        f"model for each prompt ({much.completions * comparison.prompts:,} of each in all)."
-    )
-    told = [here]
+    total = much.completions * comparison.prompts
+    needed = [
+        f"For 80% power on these prompts, use {each} per prompt and model ({total:,} in all for each model)."
+    ]
     if much.prompts is not None:
-        told.append(
-            f"For prompts like these, it takes {much.prompts:,} of them, with as many completions each."
-        )
-    return told
+        needed.append(f"For 80% power on prompts like these, use {much.prompts:,} prompts.")
+    return needed

@@ -74,7 +74,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) ->
 
 @dataclass(frozen=True)
 class Needed:
-    """How much it would take to tell two models apart, four times in five; None where they do not differ."""
+    """The sample sizes for 80% power to distinguish two models; None where they do not differ."""
 
     completions: int | None  # of each model for each of these prompts, if only these matter
     prompts: int | None  # like these, with as many completions each, if others matter as well

@@ -326,14 +326,14 @@ def open_current(
 
 
 def complaint_of(results: RunEvaluation) -> str | None:
-    """A sentence about rows that judge other programs than stand in the run now; None without such rows."""
+    """A sentence about rows whose programs are no longer in the run; None without such rows."""
     from roboeval.evaluation.runs.completions import name_of
 
     if not (stale := results.stale):
         return None
     others = len(stale) - 1
     judge = f"and {counted(others, 'other row')} judge" if others else "judges"
-    return f"{name_of(stale[0])} {judge} another program than stands in {results.run.completions} now"
+    return f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
 
 
 def unfinished_of(results: RunEvaluation) -> str | None:

@@ -28,7 +28,7 @@ EARLIER = "judged by an earlier version, which kept no places; evaluate again wi
 CUT = "the trace was too long to keep, so this cannot be explained"
 TOO_LONG = "the traces of this program are too long to explain this as well"
 
-LOWERED = "The suite lowers a program's texts before it runs; here they have the program's capitals."
+LOWERED = "This suite lower-cases strings before running; shown as written."
 MOST_TEXTS = 200  # of a program, whose capitals are shown
 MOST_LINES = 1_000  # of a program that is shown
 MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:

@@ -62,7 +62,7 @@ class Processes:
                 held.enter_context(line)
                 processes = ProcessPoolExecutor(self._workers, context, live_with, (line,))
             held.callback(processes.shutdown, cancel_futures=True)
-            held.enter_context(ours)  # closed before: no process goes on with what nobody waits for
+            held.enter_context(ours)  # closed before the pool shuts down, so that workers exit with us
             yield processes
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from codebotler.core.errors import UserError
-from codebotler.core.words import listed
 from roboeval.analysis.cost import budgets, spent
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resampled
@@ -74,16 +73,16 @@ def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
 
 
 def in_words(run: JudgedRun, prices: Mapping[str, Price]) -> str:
-    """What a program that passes costs, in words; empty where nothing is known."""
+    """The cost of a program that passes, in words; empty where nothing is known."""
     took = spent(run.table, price_of(run, prices))
     each = []
     if took.money_per_pass is not None:
-        each.append(f"{took.money_per_pass:.4g} in money")
+        each.append(f"${took.money_per_pass:.3g}")
     if took.tokens_per_pass is not None:
         each.append(f"{took.tokens_per_pass:,.0f} tokens")
     if took.seconds_per_pass is not None:
         each.append(f"{took.seconds_per_pass:,.1f} s")
-    return f"A program that passes takes {listed(each)}." if each else ""
+    return f"Cost per pass: {', '.join(each)}" if each else ""
 
 
 def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:

@@ -45,7 +45,7 @@ def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     suite = runs[0].suite
     lead = [f"{count}, judged by the suite \u201c{suite.name}\u201d: {suite.about}."]
     if by_hand:
-        lead.append(f"Programs of {', '.join(by_hand)} were written by hand, and stand for no model.")
+        lead.append(f"Programs of {', '.join(by_hand)} were written by hand, and represent no model.")
     return f"Robot programs by {title}", lead
 
 

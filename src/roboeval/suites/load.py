@@ -90,7 +90,7 @@ class Suite:
 
     @property
     def house_sentences(self) -> list[str]:
-        """The rules of the house, as models are told them."""
+        """The house rules, in the words of the prompt."""
         return [] if self.house is None else [rule.says for rule in self.house.rules]
 
     def with_house_rules(self, house: HouseRules | None) -> Suite:

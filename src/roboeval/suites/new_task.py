@@ -19,7 +19,7 @@ def new_task(folder: Path, name: str) -> Path:
             f'"{name}" is not a task name; write it in capitalised words without spaces, such as WaterPlants'
         )
     if (folder.resolve().parent / "suite.yaml").exists():
-        raise UserError("lies within a suite; name the folder around it", file=folder)
+        raise UserError("is inside a suite; name the folder around it", file=folder)
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
         raise UserError("already exists; choose another name, or edit it", file=path)

@@ -1,4 +1,4 @@
-"""Heat maps: what stands in each cell, its shade, and where it leads."""
+"""Heat maps: the text of each cell, its shade, and its link."""
 
 from __future__ import annotations
 

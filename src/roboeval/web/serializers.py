@@ -25,7 +25,7 @@ MOST_FAULTS, MOST_NAME, MOST_REASON = 5, 120, 300
 
 
 class State(StrEnum):
-    """How far a run has come."""
+    """The progress of a run."""
 
     READING = "being read"
     GENERATING = "being generated"
@@ -39,7 +39,7 @@ class State(StrEnum):
 
 
 def state_of(run: Snapshot, wanted: int | None) -> State:
-    """How far a run has come that shall have so many completions; None where nobody recorded that."""
+    """Progress towards the expected number of completions; None if that was not recorded."""
     written = len(run.results.completions)
     lacks = wanted is not None and written < wanted
     unjudged = run.judged < run.results.scope.total

@@ -86,7 +86,7 @@ class ProgramView(Element, component="static/code.js"):
 
 
 def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = None) -> None:
-    """Show how far a run has come on a label, and on a bar of its progress."""
+    """Show the progress of a run on a label, and on a bar."""
     state = str(data["state"])
     label.say(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")

@@ -81,11 +81,11 @@ def test_a_rule_ends_a_program_that_runs_all_the_same(files: Path) -> None:
     force = ("--yes", "--despite-problems", "--speed", "0", "--rules", "rules.yaml")
     ended = codebotler(files, "run", "sly.py", "--world", "world.yaml", *force)
     assert ended.status == 1
-    assert 'kept from going to "vault" by the rule "vault": Never go into the vault.' in ended.out
+    assert 'the rule "vault" prevented going to "vault"' in ended.out
     assert "stopped by rule vault" in ended.out
     assert "stopped: stopped" not in ended.out + codebotler(files, "missions", "last").out
     shown = codebotler(files, "missions", "last")
-    assert 'kept from going to "vault"' in shown.out
+    assert 'the rule "vault" prevented going to "vault"' in shown.out
 
 
 def test_a_model_is_told_the_rules(files: Path) -> None:

@@ -445,7 +445,8 @@ def test_mission_is_written_as_mcap(folder: Path) -> None:
         assert err.startswith("wrote ")
         with (folder / "one.mcap").open("rb") as file:
             topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
-        assert topics == {"/mission/state", "/skill/go_to", "/skill/is_in_room", "/skill/pick", "/skill/say"}
+        skills = {"/skill/go_to", "/skill/is_in_room", "/skill/pick", "/skill/say"}
+        assert topics == {"/mission/state", "/mission/log", "/robot/pose", "/tf", "/rooms", *skills}
 
 
 def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:

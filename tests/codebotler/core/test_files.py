@@ -13,6 +13,7 @@ from codebotler.core.files import (
     MAX_BYTES,
     Appender,
     make_folder,
+    read_lines,
     read_text,
     sync_folder,
     text_of,
@@ -141,3 +142,13 @@ def test_a_folder_that_cannot_be_synced_is_told_only_where_the_disk_is_broken(
     sync_folder(tmp_path)  # many a file system brings no folder to the disk
     with pytest.raises(OSError, match=str(tmp_path)):
         sync_folder(tmp_path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_utf_16_is_refused_by_its_name(encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "rows.jsonl"
+    path.write_text('\ufeff{"a": 1}\n', encoding=encoding)
+    for read in (read_text, lambda path: list(read_lines(path))):
+        with pytest.raises(UserError, match="UTF-16") as error:
+            read(path)
+        assert error.value.file == path

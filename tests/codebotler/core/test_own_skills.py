@@ -237,7 +237,7 @@ BAD = {
     "@skill\ndef wiggle(sim, who: str) -> 'int | None': 'Wiggle.'": "the result of wiggle, int | None,",
     "@skill(text='whom')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "wiggle has no parameter whom",
     "def wiggle(sim, who: str) -> None: 'Wiggle.'": "it declares no skill; put @skill above a function",
-    "def wiggle(": "it is no Python",
+    "def wiggle(": "it is not Python",
     "1 / 0": "it cannot be run: ZeroDivisionError",
 }
 

@@ -4,26 +4,29 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mcap.reader import make_reader
 
-from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import Parameter, Skill
-from codebotler.core.skills.values import NOTHING, ValueType
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.log import Line, Summary, events_of
-from codebotler.missions.mcap import Clock, export, schema_of, write_mcap
+from codebotler.missions.mcap import Clock, export, write_mcap
 from codebotler.missions.mission import Mission
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 
-WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
+HALL = Room("hall", footprint=((0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (0.0, 2.0)), stand_at=(1.0, 1.0))
+KITCHEN = Room(
+    "kitchen", ("mug",), (Person("ann", ("yes",)),), ((4.0, 0.0), (8.0, 0.0), (8.0, 4.0)), (6.0, 1.0)
+)
+WORLD = World((HALL, KITCHEN), "hall")
 PROGRAM = """def task_program():
     go_to("kitchen")
     if is_in_room("mug"):
@@ -41,7 +44,9 @@ PLAIN: dict[str, type | tuple[type, ...]] = {
     "integer": int,
     "boolean": bool,
     "array": list,
+    "object": dict,
 }
+LEVELS = {"INFO": 2, "WARNING": 3, "ERROR": 4}
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +54,7 @@ def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[Summary, list[Lin
     home = tmp_path_factory.mktemp("home")
     with Reservation(Simulated(WORLD, speed=None), home) as reserved:
         with Mission(home, "simulated", "bring tea") as mission:
+            mission.show_map(WORLD)
             mission.draft(PROGRAM, "recorded:careful")
             mission.check([])
             mission.note("a word")
@@ -73,39 +79,133 @@ def written(mission: tuple[Summary, list[Line]], clock: Clock = "wall") -> bytes
     return file.getvalue()
 
 
-def test_every_event_is_a_message_of_its_skill(mission: tuple[Summary, list[Line]]) -> None:
-    messages = read(written(mission))
-    assert len(messages) == len(mission[1])
-    for (topic, _, message, _), line in zip(messages, mission[1], strict=True):
-        assert message["event"] == line["event"]
-        assert topic == (f"/skill/{line['skill']}" if "skill" in line else topic)
-    asked = [m for topic, _, m, _ in messages if topic == "/skill/ask"]
-    assert [m["event"] for m in asked] == ["skill", "result"]
-    assert (asked[0]["options"], asked[1]["result"]) == (["No", "Yes"], "Yes")
-    told = {m["text"] for _, _, m, _ in messages if "text" in m}
-    assert {"a word", 'GoToInvalidLocation: there is no room "cellar"'} <= told
+def messages_on(topic: str, data: bytes) -> list[dict[str, Any]]:
+    return [message for found, _, message, _ in read(data) if found == topic]
+
+
+def fits(value: object, schema: dict[str, Any]) -> bool:
+    """Whether a value is as its schema says, with nothing that it leaves out."""
+    if isinstance(value, dict):
+        return schema["type"] == "object" and all(
+            name in schema["properties"] and fits(one, schema["properties"][name])
+            for name, one in value.items()
+        )
+    if isinstance(value, list):
+        return schema["type"] == "array" and all(fits(one, schema["items"]) for one in value)
+    return isinstance(value, PLAIN[schema["type"]])
+
+
+def test_every_event_of_a_skill_is_a_message_of_its_topic(mission: tuple[Summary, list[Line]]) -> None:
+    messages = [(topic, m) for topic, _, m, _ in read(written(mission)) if topic.startswith("/skill/")]
+    events = [line for line in mission[1] if "skill" in line]
+    assert [(topic, m["event"], m["number"]) for topic, m in messages] == [
+        (f"/skill/{line['skill']}", line["event"], line["number"]) for line in events
+    ]
+    asked = messages_on("/skill/ask", written(mission))
+    assert asked[0]["arguments"] == {"person": "ann", "question": "Tea?", "options": ["No", "Yes"]}
+    assert [m.get("result") for m in asked] == [None, "Yes"]
 
 
 def test_every_message_is_as_its_schema_says(mission: tuple[Summary, list[Line]]) -> None:
     topics = {}
     for topic, schema, message, _ in read(written(mission)):
-        assert schema["type"] == "object"
-        for name, value in message.items():
-            kind = schema["properties"][name]["type"]
-            assert isinstance(value, PLAIN[kind])
+        assert fits(message, schema), (topic, message)
         topics[topic] = schema["properties"]
-    assert topics["/skill/ask"]["options"] == {"type": "array", "items": {"type": "string"}}
+    asked = topics["/skill/ask"]["arguments"]["properties"]
+    assert asked["options"] == {"type": "array", "items": {"type": "string"}}
     assert topics["/skill/is_in_room"]["result"] == {"type": "boolean"}
     assert "result" not in topics["/skill/go_to"]
+
+
+def test_log_lines_have_a_level_and_the_line_of_the_program(mission: tuple[Summary, list[Line]]) -> None:
+    found = [
+        (m["level"], m["file"], m["line"], m["message"])
+        for m in messages_on("/mission/log", written(mission))
+    ]
+    assert (LEVELS["INFO"], "", 0, "a word") in found
+    assert (LEVELS["INFO"], "program.py", 2, 'drives to "kitchen"') in found
+    assert (LEVELS["ERROR"], "", 0, 'GoToInvalidLocation: there is no room "cellar"') in found
+
+
+def test_pose_and_frame_follow_the_robot_on_its_map(mission: tuple[Summary, list[Line]]) -> None:
+    data = written(mission)
+    poses = messages_on("/robot/pose", data)
+    places = [(p["pose"]["position"]["x"], p["pose"]["position"]["y"]) for p in poses]
+    assert (places[0], places[-1]) == (HALL.stand_at, KITCHEN.stand_at)
+    assert {p["frame_id"] for p in poses} == {"map"}
+    frames = messages_on("/tf", data)
+    assert [f["translation"] for f in frames] == [p["pose"]["position"] for p in poses]
+    assert [f["rotation"] for f in frames] == [p["pose"]["orientation"] for p in poses]
+    assert {(f["parent_frame_id"], f["child_frame_id"]) for f in frames} == {("map", "robot")}
+
+
+def test_robot_without_a_map_has_the_poses_that_it_reports(mission: tuple[Summary, list[Line]]) -> None:
+    lines: list[Line] = [
+        {
+            "time": 1.0,
+            "clock": 0.0,
+            "event": "feedback",
+            "number": 1,
+            "skill": "go_to",
+            "text": f"at ({x}, {y})",
+        }
+        for x, y in ((1, 1), (1, 1), (1, 4))
+    ]
+    data = written((mission[0], lines))
+    poses = [m["pose"] for m in messages_on("/robot/pose", data)]
+    assert [p["position"] for p in poses] == [{"x": 1.0, "y": 1.0, "z": 0.0}, {"x": 1.0, "y": 4.0, "z": 0.0}]
+    quarter_turn = {"x": 0.0, "y": 0.0, "z": pytest.approx(0.5**0.5), "w": pytest.approx(0.5**0.5)}
+    assert poses[1]["orientation"] == quarter_turn
+    assert messages_on("/rooms", data) == []
+
+
+def test_rooms_are_outlines_with_names(mission: tuple[Summary, list[Line]]) -> None:
+    (update,) = messages_on("/rooms", written(mission))
+    entities = {entity["id"]: entity for entity in update["entities"]}
+    assert {(entity["frame_id"], entity["texts"][0]["text"]) for entity in entities.values()} == {
+        ("map", "hall"),
+        ("map", "kitchen"),
+    }
+    (outline,) = entities["kitchen"]["lines"]
+    assert tuple((point["x"], point["y"]) for point in outline["points"]) == KITCHEN.footprint
+
+
+def test_foxglove_knows_every_field_of_its_messages(mission: tuple[Summary, list[Line]]) -> None:
+    json_format = pytest.importorskip("google.protobuf.json_format", reason="of a package for tests")
+    seen = set()
+    for schema, _, message in make_reader(io.BytesIO(written(mission))).iter_messages():
+        assert schema is not None
+        if schema.name.startswith("foxglove."):
+            name = schema.name.removeprefix("foxglove.")
+            theirs = pytest.importorskip(f"foxglove_schemas_protobuf.{name}_pb2", reason="for tests")
+            json_format.ParseDict(with_protobuf_times(json.loads(message.data)), getattr(theirs, name)())
+            seen.add(name)
+    assert seen == {"PoseInFrame", "FrameTransform", "SceneUpdate", "Log"}
+
+
+def with_protobuf_times(value: object) -> object:
+    """The same message, with times as protobuf writes them in JSON."""
+    if isinstance(value, list):
+        return [*map(with_protobuf_times, value)]
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"sec", "nsec"}:
+        seconds, nanoseconds = value["sec"], value["nsec"]
+        moment = f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{nanoseconds:09}Z"
+        return moment if seconds else f"{seconds}.{nanoseconds:09}s"  # only durations begin at 0
+    return {name: with_protobuf_times(one) for name, one in value.items()}
 
 
 def test_messages_are_timed_by_either_clock(mission: tuple[Summary, list[Line]]) -> None:
     summary, events = mission
     began = round(summary.created * 1e9)
-    wall = [time for *_, time in read(written(mission, "wall"))]
-    robot = [time - began for *_, time in read(written(mission, "robot"))]
-    assert wall == [round(line["time"] * 1e9) for line in events]
-    assert robot == pytest.approx([line["clock"] * 1e9 for line in events], abs=1_000)
+    wall = [time for topic, *_, time in read(written(mission, "wall")) if topic.startswith("/skill/")]
+    robot = [
+        time - began for topic, *_, time in read(written(mission, "robot")) if topic.startswith("/skill/")
+    ]
+    skills = [line for line in events if "skill" in line]
+    assert wall == [round(line["time"] * 1e9) for line in skills]
+    assert robot == pytest.approx([line["clock"] * 1e9 for line in skills], abs=1_000)
     assert robot[-1] > 10e9 > wall[-1] - wall[0]
 
 
@@ -122,21 +222,54 @@ def test_program_and_instruction_are_in_the_file(mission: tuple[Summary, list[Li
     assert about.metadata["state"] == "done"
 
 
-def test_skill_that_is_not_in_the_table_is_a_note(mission: tuple[Summary, list[Line]]) -> None:
-    table = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NOTHING, "Wave."))
-    line: Line = {"time": 1.0, "clock": 0.0, "event": "skill", "number": 1, "skill": "wave",
-                  "arguments": {"hand": "left"}}  # fmt: skip
-    for skills, topic in ((SKILLS, "/mission/log"), (table, "/skill/wave")):
-        file = io.BytesIO()
-        write_mcap(file, mission[0], [line], skills=skills)
-        assert [found for found, *_ in read(file.getvalue())] == [topic]
+def events_of_skill(skill: str, *calls: tuple[dict[str, object], object]) -> list[Line]:
+    """The events of calls of a skill, each with its arguments and its result."""
+    lines: list[Line] = []
+    for number, (arguments, result) in enumerate(calls, 1):
+        which: Line = {"time": float(number), "clock": 0.0, "number": number, "skill": skill}
+        lines.append({**which, "event": "skill", "arguments": arguments})
+        lines.append({**which, "event": "result", "result": result})
+    return lines
+
+
+def test_own_skills_keep_names_arguments_and_results(mission: tuple[Summary, list[Line]]) -> None:
+    given = {"event": "party", "coats": 2, "colours": ["red", "blue"], "is_wet": True, "text": "hi"}
+    data = written((mission[0], events_of_skill("paint", (given, [0.5, 1]))))
+    called, ended = messages_on("/skill/paint", data)
+    assert (called["event"], called["arguments"]) == ("skill", given)
+    assert (ended["event"], ended["result"]) == ("result", [0.5, 1])
+    schema = next(schema["properties"] for topic, schema, *_ in read(data) if topic == "/skill/paint")
+    assert schema["result"] == {"type": "array", "items": {"type": "number"}}
+    assert {name: one["type"] for name, one in schema["arguments"]["properties"].items()} == {
+        "event": "string",
+        "coats": "integer",
+        "colours": "array",
+        "is_wet": "boolean",
+        "text": "string",
+    }
+
+
+def test_values_without_a_common_type_are_texts(mission: tuple[Summary, list[Line]]) -> None:
+    calls: list[tuple[dict[str, object], object]]
+    calls = [({"to": "door", "at": 1}, math.inf), ({"to": 3, "at": 0.5}, 2.5), ({"to": [], "at": 2}, None)]
+    data = written((mission[0], events_of_skill("turn", *calls)))
+    for _, schema, message, _ in read(data):
+        assert fits(message, schema)
+    messages = messages_on("/skill/turn", data)
+    assert [m["arguments"] for m in messages if "arguments" in m] == [
+        {"to": "door", "at": 1},
+        {"to": "3", "at": 0.5},
+        {"to": "[]", "at": 2},
+    ]
+    assert [m["result"] for m in messages if "result" in m] == ["inf", "2.5"]
+    assert b"Infinity" not in data
 
 
 def test_any_text_and_any_time_can_be_written(mission: tuple[Summary, list[Line]]) -> None:
     odd = replace(mission[0], instruction="go \udcff there", reason="\ud800", program="say('\ud800')")
     line: Line = {"time": 1.0, "clock": 1e300, "event": "log", "text": "\ud800"}
     ((topic, _, message, time),) = read(written((odd, [line]), "robot"))
-    assert (topic, message["text"]) == ("/mission/log", "\ud800")
+    assert (topic, message["message"]) == ("/mission/log", "\\ud800")
     assert time < 2**63
     (about,) = make_reader(io.BytesIO(written((odd, [line])))).iter_metadata()
     assert about.metadata["instruction"] == "go \\udcff there"
@@ -147,19 +280,19 @@ def test_link_and_pipe_stay_what_they_are(mission: tuple[Summary, list[Line]], t
     link.symlink_to("mission.mcap")
     export(link, *mission, "wall")
     assert link.is_symlink()
-    assert len(read((tmp_path / "mission.mcap").read_bytes())) == len(mission[1])
+    assert (tmp_path / "mission.mcap").read_bytes() == written(mission)
     os.mkfifo(pipe)
     with ThreadPoolExecutor(1) as reader:
         got = reader.submit(pipe.read_bytes)
         export(pipe, *mission, "wall")
-        assert len(read(got.result(30))) == len(mission[1])
+        assert got.result(30) == written(mission)
     assert pipe.is_fifo()
 
 
 def test_file_is_written_whole_or_not_at_all(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
     path = tmp_path / "mission.mcap"
     export(path, *mission, "wall")
-    assert len(read(path.read_bytes())) == len(mission[1])
+    assert path.read_bytes() == written(mission)
     before = path.read_bytes()
     with pytest.raises(KeyError):
         export(path, mission[0], [{"event": "state"}], "wall")
@@ -174,15 +307,3 @@ def test_no_other_file_is_touched(mission: tuple[Summary, list[Line]], tmp_path:
     assert other.read_text() == "of the user"
     assert sorted(tmp_path.iterdir()) == [path, other]
     assert path.stat().st_mode == other.stat().st_mode
-
-
-def test_values_of_own_skills_have_schemas_of_their_types() -> None:
-    given = (
-        Parameter("colour", ValueType("str", choices=("red", "blue"))),
-        Parameter("coats", ValueType("int")),
-    )
-    row = Skill("paint", given, ValueType("float", is_list=True), "Paint.")
-    schema = schema_of(row)
-    assert schema["colour"] == {"type": "string", "enum": ["red", "blue"]}
-    assert schema["coats"] == {"type": "integer"}
-    assert schema["result"] == {"type": "array", "items": {"type": "number"}}

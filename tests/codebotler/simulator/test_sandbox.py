@@ -329,7 +329,7 @@ WORKS: dict[str, tuple[str, object]] = {
 
 T = Status.TIMEOUT
 P = Status.PYTHON_ERROR
-ON_THE_LINE = "the program spoke on the robot's line"
+ON_THE_LINE = "the program wrote to the sandbox channel"
 SPENT = "200,000 turns of loops"
 TOO_DEEP = "the program is too large, or nested too deeply"
 SUPPRESSED = "from contextlib import suppress\nwith suppress(BaseException):\n    while 1: pass\n"

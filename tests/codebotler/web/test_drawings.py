@@ -370,7 +370,7 @@ def there(name: str, room: str, *, found: bool = True) -> Fact:
         ([there("somebody", "a", found=False)], "If the robot finds nobody in a"),
         (
             [GivenAnswer("hall", "Tea?", "Yes"), there("cup", "ann's")],
-            "If the robot is told “Yes” when it asks “Tea?” in hall and it finds “cup” in ann's",
+            "If the robot hears “Yes” when it asks “Tea?” in hall and it finds “cup” in ann's",
         ),
         ([there("mug", "a, but not in b")], "If the robot finds “mug” in “a, but not in b”"),
     ],
@@ -389,8 +389,8 @@ def test_strips_say_what_their_worlds_are_like() -> None:
     asks = "when it asks “Whose mug is it?” in kitchen"
     assert worlds == {
         "If the robot does not find “mug” in kitchen",
-        f"If the robot finds “mug” in kitchen, it finds somebody in kitchen and it is told “his” {asks}",
-        f"If the robot finds “mug” in kitchen, it finds somebody in kitchen and it is told “mine” {asks}",
+        f"If the robot finds “mug” in kitchen, it finds somebody in kitchen and it hears “his” {asks}",
+        f"If the robot finds “mug” in kitchen, it finds somebody in kitchen and it hears “mine” {asks}",
     }
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.files import read_rows
 from codebotler.models.recorded import NOTICE
 from command_line import ENVIRONMENT, refused, roboeval
 from forked import Forked
@@ -122,7 +123,7 @@ def test_rejected_programs_are_requested_again_in_rounds(option: str, tmp_path: 
         assert ended.status == 0, ended
         assert len(server.requests) == 10
         folder = tmp_path / "run" / ("repair-1" if option == "repair" else "retry-1")
-        assert {json.loads(line)["round"] for line in (folder / "completions.jsonl").open()} == {1}
+        assert {row["round"] for _, row in read_rows(folder / "completions.jsonl")} == {1}
         lines = ended.out[ended.out.index("The effect of") :].splitlines()
         assert [line.split()[-2] for line in lines if " of 5 " in line] == ["5", "10"]  # requests
         assert roboeval(*words, cwd=tmp_path).out == ended.out

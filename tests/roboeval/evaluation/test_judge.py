@@ -246,6 +246,47 @@ def test_evaluating_takes_an_ablation(paper: Suite) -> None:
 HI = (Event("goto", "kitchen"), Event("say", "hi"))
 
 
+# --- replies without a program
+
+
+@pytest.mark.parametrize(
+    ("program", "more", "why"),
+    [
+        ("I cannot do that.", {"no_program": "refusal"}, ("NoProgram", "refusal")),
+        ("", {}, ("NoProgram", "empty")),
+        ("def task_program():\n    say(", {"finish_reason": "length"}, ("NoProgram", "cut-off")),
+        ("Sorry.", {"raw_reply": "Sorry.", "finish_reason": "stop"}, ("NoProgram", "no-code")),
+        ("Sorry.", {"finish_reason": "tool_calls"}, ("NoProgram", "tool-call")),
+        ("Sorry.", {}, ("PythonError", "SyntaxError")),  # nobody said what the reply was
+        ("x = task", {"no_program": None}, ("PythonError", "NameError")),
+        (GOOD, {"finish_reason": "length"}, None),
+        (GOOD, {"no_program": "cut-off"}, None),  # a verdict is about the program
+        (
+            'def task_program():\n    go_to("moon")\n',
+            {"no_program": "empty"},
+            ("RobotExecutionError", "GoToInvalid"),
+        ),
+    ],
+)
+def test_reply_without_a_program_fails_by_its_cause(
+    suite: Suite, program: str, more: dict[str, Any], why: tuple[str, str] | None
+) -> None:
+    [row] = evaluate([Completion(task="T", prompt=0, index=0, program=program, more=more)], suite)
+    failed = row["failure"]
+    if why is None:
+        assert row["passed"]
+    else:
+        assert failed is not None
+        assert failed["class"] == why[0]
+        assert failed["kind"].startswith(why[1])
+        assert failed["world"] == 0
+
+
+def test_kind_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(UserError, match="cut-off"):
+        Completion(task="T", prompt=0, index=0, program="", more={"no_program": "cutoff"})
+
+
 @pytest.fixture
 def tested(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
     """The traces on which a formula was tested, of which none is remembered."""

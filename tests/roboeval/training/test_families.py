@@ -105,7 +105,7 @@ def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
         ("spare: rooms", "spare: 4 to 2", ", line 3: write the smaller number first, and none above 10"),
         ("spare: rooms", "spare: 2 to 12", ", line 3: write the smaller number first, and none above 10"),
         ("spare: rooms", "spare: ['']", ", line 3: "),
-        ("spare: rooms", "spare: [$room]", ", line 3: a word holds one of"),
+        ("spare: rooms", "spare: [$room]", ", line 3: a word contains"),
         ("[Go to the $room.,", "['{Go|Drive to the $room.',", ", line 7: write several words, of which"),
         ('go_to("$room")', 'go_to("$room"', ", line 11: this program is no Python: "),
         ('go_to("$spare")', 'go_to("$spare"', ", line 16: this program is no Python: "),

@@ -90,7 +90,7 @@ def _refused(path: Path, error: BaseException) -> UserError:
     if isinstance(error, UserError) and error.file is not None:
         return error
     if isinstance(error, SyntaxError):
-        return UserError(f"it is no Python: {error.msg}", file=path, line=error.lineno)
+        return UserError(f"it is not Python: {error.msg}", file=path, line=error.lineno)
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
     is_ours = isinstance(error, UserError)
     sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"

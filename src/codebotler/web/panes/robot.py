@@ -11,7 +11,7 @@ from codebotler.core.skills.declaration import verb_for
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import State, Summary
-from codebotler.missions.progress import ANSWER, Moment
+from codebotler.missions.progress import ANSWER, Moment, position
 from codebotler.missions.view import Phase, SessionView
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
@@ -125,10 +125,7 @@ def map_state(view: SessionView, world: World) -> MapState:
     room, finds = room_of(progress.room), defaultdict[str, list[str]](list)
     for find in progress.finds:
         finds[room_of(find.room)].append(find.name)
-    at = progress.at
+    at = position(progress, world, view.room_map)
     if progress.is_between and not progress.is_driving:
         room = room_at(rooms, at) if at else ""
-    elif at is None:
-        stands_in = room_of(progress.left) if progress.is_driving else room
-        at = next((one.stand_at for one in rooms if one.name == stands_in), None)
     return MapState(at, room, progress.is_driving, progress.trail, dict(finds), progress.held)

@@ -1,4 +1,4 @@
-"""The rules of the house that count for a program, and how a person switches one off."""
+"""The house rules that count for a program, and how a person switches one off."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class RulesPane:
                 self._draw(view)
 
     def _draw(self, view: SessionView) -> None:
-        PlainText("h3", "Rules of the house")
+        PlainText("h3", "House rules")
         with ui.element("ul"):
             for rule in self._console.rules[:MOST_RULES]:
                 is_off = rule.name in view.off

@@ -34,5 +34,5 @@ class Scope:
         return sum(n for task, n in self.completions.items() if self.selects(task))
 
     def selects(self, task: str) -> bool:
-        """Whether a task is to be judged."""
+        """Whether to judge a task."""
         return self.tasks is None or task in self.tasks

@@ -241,9 +241,7 @@ def _chosen(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
             raise file.wrong(f"{count} words are to be chosen, but only {len(left)} are left", "choose", name)
         some = random.sample(left, count)
         if any(MARKS.intersection(word) for word in some):
-            raise file.wrong(
-                "a word holds one of $, {, } and |, which stand for what is chosen", "choose", name
-            )
+            raise file.wrong("a word contains $, {, } or |, which mark choices", "choose", name)
         used.update(some)
         return some
 
