@@ -63,8 +63,8 @@ def test_check_knows_the_rooms_in_any_form(ours: str, theirs: str) -> None:
 
 def test_rule_and_instruction_are_composed(tmp_path: Path) -> None:
     formula = f"tr.Exists(goto('{NFD}'))"
-    rule = f'{{name: out, says: Stay out of the {NFD}., always: "not {formula}"}}'
-    (tmp_path / "rules.yaml").write_text(f"rules:\n  - {rule}\n")
+    written = f'{{name: out, says: Stay out of the {NFD}., always: "not {formula}"}}'
+    (tmp_path / "rules.yaml").write_text(f"rules:\n  - {written}\n")
     (rule,) = read_rules(tmp_path / "rules.yaml")
     assert NFC in str(rule.formula)
     assert NFC in rule.says
