@@ -17,10 +17,9 @@ from typing import Any
 
 from PIL.Image import Image
 
-from codebotler import UserError
+from codebotler import SamplingSettings, UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.models.sampling import SamplingSettings
 from codebotler.perception import (
     Detector,
     PerceptionError,

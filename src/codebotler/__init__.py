@@ -11,6 +11,7 @@ __all__ = [
     "ModelError",
     "Problem",
     "RobotError",
+    "SamplingSettings",
     "Simulation",
     "UserError",
     "__version__",
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from codebotler.core.skills.simulation import Simulation
     from codebotler.generation.generate import Generation, generate
     from codebotler.models.base import ModelError
+    from codebotler.models.sampling import SamplingSettings
     from codebotler.prompts import prompt_for
     from codebotler.prompts.extract import program_of
     from codebotler.simulator.worker import EngineError
@@ -49,6 +51,7 @@ else:  # each name is imported when it is first used
             "core.skills.simulation": ["Simulation"],
             "generation.generate": ["Generation", "generate"],
             "models.base": ["ModelError"],
+            "models.sampling": ["SamplingSettings"],
             "prompts": ["prompt_for"],
             "prompts.extract": ["program_of"],
             "simulator.worker": ["EngineError"],

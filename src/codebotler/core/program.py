@@ -22,6 +22,7 @@ from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill, SkillTable
+from codebotler.core.unicode import composed
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
@@ -72,7 +73,7 @@ class Program:
 def parse(source: str) -> ast.Module:
     """The syntax tree of a source, which nobody may change, with the errors of `ast.parse`."""
     with _PARSING:
-        return ast.parse(source, FILE)
+        return ast.parse(composed(source), FILE)
 
 
 @lru_cache(maxsize=8)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from codebotler.core.skills.values import Scalar
+from codebotler.core.unicode import compose_fields
 from codebotler.core.words import counted
 
 TYPE_CHECKING = False
@@ -33,6 +34,9 @@ class Person:
     after_looks: int = 0  # how often the robot looks in vain before they come
     leaves: bool = False  # whether they go after their last answer
 
+    def __post_init__(self) -> None:
+        compose_fields(self)
+
 
 @dataclass(frozen=True)
 class Room:
@@ -52,6 +56,9 @@ class Room:
     footprint: tuple[Point, ...] | None = None
     stand_at: Point | None = None
 
+    def __post_init__(self) -> None:
+        compose_fields(self)
+
 
 @dataclass(frozen=True)
 class World:
@@ -70,6 +77,9 @@ class World:
     about: str = ""
     may_wait_forever: bool = False
     truths: tuple[tuple[str, Scalar | tuple[Scalar, ...]], ...] = ()
+
+    def __post_init__(self) -> None:
+        compose_fields(self)
 
     def __repr__(self) -> str:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"

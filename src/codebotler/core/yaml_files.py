@@ -17,6 +17,7 @@ from pydantic_core import ErrorDetails
 
 from codebotler.core.errors import UserError, both_ends
 from codebotler.core.files import read_text
+from codebotler.core.unicode import composed
 
 Place: TypeAlias = tuple[str | int, ...]
 """A path of keys and positions in a file."""
@@ -58,7 +59,8 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
         is_long = isinstance(node, yaml.ScalarNode) and node.tag != TEXT and len(node.value) > MAX_NUMBER
         with suppress(ValueError, LookupError, AttributeError, OverflowError):  # no such date, for example
             if not is_long:
-                return super().construct_object(node, deep)
+                made = super().construct_object(node, deep)
+                return composed(made) if isinstance(made, str) else made  # a list is filled later
         problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
         raise _fault(f"{problem}; put quotes around the text", node)
 
@@ -159,7 +161,7 @@ class YamlFile:
                     raise _fault("this key is not text; write one word or put quotes around it", key)
                 if key.tag != TEXT and not SMALL_NUMBER.fullmatch(key.value):  # hashes of others can collide
                     raise _fault(f"the key {_quoted(key.value)} is not a text; put quotes around it", key)
-                inner = (*place, key.value)
+                inner = (*place, composed(key.value))
                 if inner in self._lines:
                     raise _fault(f'the key "{key.value}" is repeated; keep one of them', key)
                 self._remember(value, inner)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
@@ -150,14 +150,7 @@ def generate(
     rooms: Sequence[str] | None = None,
     retries: int | None = None,
     repair: bool = False,
-    temperature: float | None = 0.2,
-    top_p: float | None = 0.95,
-    max_tokens: int | None = None,
-    seed: int | None = None,
-    timeout: float = SamplingSettings.timeout,
-    base_url: str | None = None,
-    reasoning_effort: str | None = None,
-    extra_body: Mapping[str, Any] | None = None,
+    settings: SamplingSettings | None = None,
     skills: SkillTable = SKILLS,
 ) -> Generation:
     """Have a model write a program, check it in sampled worlds, and wait for the result.
@@ -172,16 +165,7 @@ def generate(
         retries: how many times to ask again for a program with problems, at least 0; by default once with
             `repair`, else never.
         repair: whether to ask again with the program and its problems in the request.
-        temperature: from 0 (always the likeliest token) up to about 2; None leaves it to the model.
-        top_p: the share of likely tokens that are drawn from, above 0 and up to 1; None leaves it to the
-            model.
-        max_tokens: the limit for a reply, in tokens, at least 1; None for no limit, and for 512 of a base
-            model.
-        seed: for the random numbers, where a model takes a seed.
-        timeout: seconds for one request altogether.
-        base_url: where the model is served, such as `http://localhost:8000/v1`.
-        reasoning_effort: how much a reasoning model thinks, in its provider's words, such as `low`.
-        extra_body: further fields of the JSON that is sent.
+        settings: how the model is asked, such as its temperature and its server; the defaults if None.
         skills: what the robot can do; `skills_from` reads further ones from a file.
 
     Raises:
@@ -192,10 +176,6 @@ def generate(
     tries = int(repair) if retries is None else retries
     if tries < 0:
         raise UserError(f"the number of retries is {tries}, but must be at least 0")
-    settings = SamplingSettings(
-        temperature, top_p, max_tokens, seed, timeout, base_url, reasoning_effort, extra_body
-    )
     prompt = prompt_for(instruction, rooms=rooms or (), skills=skills)
-    return write_checked_program(
-        open_model(model, settings), prompt, rooms=rooms, retries=tries, repair=repair, skills=skills
-    )
+    asked = open_model(model, settings or SamplingSettings())
+    return write_checked_program(asked, prompt, rooms=rooms, retries=tries, repair=repair, skills=skills)

@@ -17,6 +17,7 @@ from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import TASK, Flaw, parsed
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.unicode import composed
 from codebotler.core.words import listed
 
 FOLDER = Path(__file__).parent
@@ -94,7 +95,7 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP) -> int:
 
 def stated(instruction: str) -> str:
     """An instruction without space around it; UserError if it says nothing."""
-    if not (said := instruction.strip()):
+    if not (said := composed(instruction.strip())):
         raise UserError("the instruction is empty; say what the robot should do")
     return said
 

@@ -6,11 +6,13 @@ import importlib
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import cast
 
 from codebotler.core.errors import UserError, install_command, missing_package
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
 from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
+from codebotler.robots.spelling import SpellingRobot
 
 KINDS = {
     "sim": "simulated",
@@ -33,12 +35,16 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
         UserError: there is no such kind or class, or an option is missing or wrong.
     """
     if is_own(name):
-        return OwnRobot(name, options or Options())
+        return _spelling(OwnRobot(name, options or Options()))
     if name not in KINDS:
         own = "or a class of yours, as in lab_robot.py:Spot"
         raise UserError(f'there is no robot "{name}"; choose one of {", ".join(KINDS)}, {own}')
     robot: Robot = _kind(name).robot(options or Options())
-    return robot
+    return robot if name == "sim" else _spelling(robot)
+
+
+def _spelling(robot: Robot) -> Robot:
+    return cast("Robot", SpellingRobot(robot))
 
 
 def open_with_face(name: str, options: Options, face: Face) -> Robot:

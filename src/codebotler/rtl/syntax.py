@@ -14,6 +14,7 @@ from codebotler.core.program import parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import TRUTH, ValueType, as_text
+from codebotler.core.unicode import composed
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
@@ -68,7 +69,7 @@ def parse(
     Raises:
         RtlSyntaxError: the text is no formula.
     """
-    return _Parser(text, skills, means).formula()
+    return _Parser(composed(text), skills, means).formula()
 
 
 class _Parser:

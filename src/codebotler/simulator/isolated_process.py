@@ -51,7 +51,10 @@ CORE, BATCHES = "codebotler.core", f"{__package__}.batches"
 # What a child needs that has robots of its own, besides the sandbox.
 SIMULATION = (
     f"{BATCHES}.process",
-    *(f"{CORE}.{name}" for name in ("cachedproperty", "errors", "regex_flags", "trace", "words", "world")),
+    *(
+        f"{CORE}.{name}"
+        for name in ("cachedproperty", "errors", "regex_flags", "trace", "unicode", "words", "world")
+    ),
     *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py")) if path.stem != "files"),
     *(f"{__package__}.{name}" for name in ("fact_sampler", "ledger", "robot", "rules", "sampled_robot")),
 )

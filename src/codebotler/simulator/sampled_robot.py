@@ -14,6 +14,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
 from codebotler.core.trace import options_of
+from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World
 from codebotler.simulator.fact_sampler import Draw, FactSampler
@@ -45,6 +46,9 @@ class RoomMap:
     start: str
     guessed: bool = False  # nobody said which rooms there are: driving to any other place finds it, too
     plain: bool = False  # names are plain texts, as robots and guesses have them, and no regexes
+
+    def __post_init__(self) -> None:
+        compose_fields(self)
 
     @classmethod
     def of(cls, world: World) -> RoomMap:

@@ -54,6 +54,13 @@ def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
 
 
+def split_names(incomplete: str) -> list[str]:
+    """The splits of families."""
+    from roboeval.suites.families.suite import SPLITS
+
+    return [name for name in SPLITS if name.startswith(incomplete)]
+
+
 def engine_names(incomplete: str) -> list[str]:
     """The engines."""
     return [name for name in ("local", "ray") if name.startswith(incomplete)]
@@ -131,6 +138,26 @@ WorldsOption = Annotated[
 ]
 SeedOption = Annotated[
     int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
+]
+RequestsOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Ask no model, but write the requests to this file, for a batch endpoint.",
+        parser=named("a file"),
+    ),
+]
+FamiliesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SPLIT",
+        help="Fresh tasks of families, from train, validation or test; --seed chooses them.",
+        autocompletion=split_names,
+    ),
+]
+NumTasksOption = Annotated[
+    int | None,
+    typer.Option(min=1, max=100, help="With --families: how many tasks; by default one of each family."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[

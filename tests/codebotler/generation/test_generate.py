@@ -98,10 +98,12 @@ def test_attempts_are_told_as_they_end_also_where_a_later_one_fails() -> None:
         "number": 0,
         "prompt": rows[0]["prompt"],
         "program": "bad 0",
-        "problems": ["line 1 says bad 0"],
-        "raw_reply": "bad 0",
-        "usage": {"input_tokens": 3, "output_tokens": 4},
-        "latency_s": 0.25,
+        "no_program": None,
         "finish_reason": "stop",
+        "usage": {"input_tokens": 3, "output_tokens": 4, "reasoning_tokens": None},
+        "latency_s": 0.25,
+        "raw_reply": "bad 0",
+        "reasoning": "",
+        "problems": ["line 1 says bad 0"],
     }
     assert rows[0]["prompt"][0]["role"] == "system"

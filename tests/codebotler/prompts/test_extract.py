@@ -22,8 +22,8 @@ HELPER = "def rooms():\n    return get_all_rooms()\n"
 USES_HELPER = "def task_program():\n    for room in rooms():\n        go_to(room)\n"
 
 
-def source(reply: str) -> str:
-    return program_of(reply).source
+def source(reply: str, *, continues: bool = False) -> str:
+    return program_of(reply, continues=continues).source
 
 
 def in_task(*statements: str) -> str:
@@ -75,8 +75,6 @@ def test_recorded_programs_stay_as_they_are_alone_and_in_chat() -> None:
         fenced(OTHER) + "Or better:\n" + fenced(TASK),
         fenced(TASK) + "Or better:\n" + fenced(CUT_OFF + "\n").removesuffix("```\n"),
         fenced(TASK) + "Call it:\n" + fenced("task_program()\n"),
-        BODY + "```\n\n# Task: say other\n" + fenced(OTHER),
-        TASK + "```\n\n# Task: say other\n" + fenced(OTHER),
         "<think>\nPerhaps\n" + fenced(OTHER) + "or not.\n</think>\n\n" + fenced(TASK),
         "<think>" + OTHER + "</think>" + TASK,
         " <thinking>\n" + OTHER + "</thinking>\n" + BODY,
@@ -92,16 +90,31 @@ def test_recorded_programs_stay_as_they_are_alone_and_in_chat() -> None:
         BODY.lstrip(),
         fenced(BODY),
         BODY + "```\nThis works.\n",
-        BODY + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
         TASK + "\n\n# Task: drive home\n# at once\ndef task_program():\n    go_to('ho",
-        TASK + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
-        BODY + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
         "Certainly\n\n" + TASK + "\nThis is all of it.\n",
-        TASK + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
     ],
 )
 def test_one_program_in_many_dresses(reply: str) -> None:
     assert source(reply) == TASK
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [
+        TASK,
+        fenced(TASK),
+        BODY + "```\n\n# Task: say other\n" + fenced(OTHER),
+        TASK + "```\n\n# Task: say other\n" + fenced(OTHER),
+        BODY + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
+        TASK + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
+        BODY + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
+        TASK + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
+        fenced(TASK) + "\n# Task: say other\n" + fenced(OTHER),
+        TASK + "\n\n# Task: drive home\n# at once\ndef task_program():\n    go_to('ho",
+    ],
+)
+def test_what_a_base_model_writes_first_counts(reply: str) -> None:
+    assert source(reply, continues=True) == TASK
 
 
 def test_code_without_a_definition_is_taken_as_it_is() -> None:
@@ -165,7 +178,9 @@ def test_other_blocks_come_along_only_where_needed() -> None:
     assert source(fenced(HELPER) + "and\n" + fenced(unused) + fenced(stub) + fenced(USES_HELPER)) == needed
     assert source(fenced(USES_HELPER) + fenced(HELPER)) == f"{USES_HELPER}\n\n{HELPER}"
     assert source(fenced(HELPER) + fenced("rooms = list\n") + fenced(USES_HELPER)) == needed
-    assert source(fenced(HELPER + TASK) + fenced(USES_HELPER)) == USES_HELPER
+    assert source(fenced(HELPER + TASK) + fenced(USES_HELPER)) == f"{HELPER}{TASK}\n\n{USES_HELPER}"
+    newer = "def rooms():\n    return []\n"
+    assert source(blocks(HELPER + TASK, newer, USES_HELPER)) == f"{newer}\n\n{USES_HELPER}"
     assert source(fenced(USES_HELPER) + fenced(HELPER + TASK)) == HELPER + TASK
 
 

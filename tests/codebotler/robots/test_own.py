@@ -21,8 +21,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.missions.mission import Mission
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Robot, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.own import OwnRobot
 from codebotler.robots.reservation import Reservation
+from codebotler.robots.spelling import SpellingRobot
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 Write: TypeAlias = Callable[[str], Robot]
@@ -188,7 +188,7 @@ def test_a_mission_of_a_robot_that_could_not_be_stopped_has_failed(
         if message == "hello": self.event.wait(60)
 """
     )
-    assert isinstance(robot, OwnRobot)
+    assert isinstance(robot, SpellingRobot)
     with Reservation(robot, tmp_path) as reserved, Mission(tmp_path, robot.name) as mission:
         mission.draft(f"def task_program():\n    {program}\n")
         mission.check([])

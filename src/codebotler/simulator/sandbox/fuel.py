@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import types
 from collections import defaultdict
+from unicodedata import normalize
 
 from codebotler.simulator.sandbox import BY_NAME, CAUGHT, ENTER, ENTRY, FUEL, PROGRAM
 from codebotler.simulator.sandbox.tame import is_tame
@@ -38,7 +39,7 @@ def prepared(
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
     try:
-        tree = ast.parse(source, PROGRAM)
+        tree = ast.parse(normalize("NFC", source), PROGRAM)
         nodes = nodes_of(tree)
         if lowercase:
             lower_literals(nodes)

@@ -1,0 +1,90 @@
+"""Tells code, prose and what is left of chat templates apart, line by line."""
+
+from __future__ import annotations
+
+import ast
+import keyword
+import re
+from collections.abc import Sequence
+from functools import lru_cache
+
+from codebotler.core.program import Flaw, parsed
+
+MARK = r"(?:</?[A-Za-z][\w:.-]*>|<[|\uff5c][^<>\n]*[|\uff5c]>|\[/\w+\]|\[[A-Z_]{3,}\])"
+RESIDUE_LINE = re.compile(rf"(?:{MARK}\s*)*(?:[Pp]ython3?|py|[Aa]ssistant|model)?")
+RESIDUE = re.compile(
+    rf"^(?:{MARK}(?:assistant|python|final)?[ ]?)+|(?<=[^\s`])(?:\s*(?:{MARK}|`{{3,}})){{1,9}}\s*$"
+)
+KEYWORDS = "|".join((*(word for word in keyword.kwlist if word.islower()), "match", "case", "print", "exec"))
+WORD = rf"(?!(?:{KEYWORDS})\b)[^\W\d_][\w'\u2019-]*"
+WORDS = re.compile(rf"\b{WORD}\s+{WORD}")  # side by side, as nowhere in code
+STRING = re.compile(r"""("|').*?(?:\1|$)|\#.*""")
+STATEMENT = re.compile(
+    r"""\s*(?:
+      \# | @\w | (?:async\s+)?def\s+\w+\s*\( | class\s+\w+\s*[(:] | import\s+\w | from\s+[\w.]+\s+import\b
+    | [^\W\d][\w.]*(?:\s*,\s*[^\W\d][\w.]*)*(?:\[[^\]]*\])?\s*
+      (?::\s*[\w.]+(?:\[.*\])?\s*)?(?:[-+*/%|&^@]|//|\*\*|<<|>>)?=(?!=)                     # an assignment
+    )""",
+    re.VERBOSE,
+)
+CALL = re.compile(r"\s*[^\W\d][\w.]*\(")
+PROSE = re.compile(
+    rf"""[ ]?(?:
+      (?:[-*+>•\u2013]|\d+[.)])\s | \*\* | ` | [-=*_]{{3,}}\s*$ | </?[\w|] | [^\x00-\x7f]  # Markdown, tags
+    | {WORD}(?:[,:;.!?]?\s+[\w`*“]|[:.!?…]+\s*$)                                           # words
+    )""",
+    re.VERBOSE,
+)
+INTERJECTION = re.compile(r" ?[A-Z][a-z]+\s*$")
+
+
+def is_prose(line: str) -> bool:
+    """Whether a line can only be prose; in doubt it is code, so that no code is ever lost."""
+    line = without_residue(line)
+    if INTERJECTION.match(line) or (line.strip() and is_residue(line)):
+        return True
+    is_sentence = PROSE.match(line) or (re.match(r" ?\S", line) and _has_words(line))
+    return bool(is_sentence) and not is_code(line) and tree_of([line.strip()]) is None
+
+
+def goes_on(line: str) -> bool:
+    """Whether a paragraph of prose goes on with a line, which may look like anything."""
+    return bool(line.strip()) and not is_code(without_residue(line))
+
+
+def is_code(line: str) -> bool:
+    """Whether a line begins like code, and is no sentence about a call."""
+    return bool(STATEMENT.match(line) or (CALL.match(line) and not _has_words(line)))
+
+
+def _has_words(line: str) -> bool:
+    return bool(WORDS.search(STRING.sub("''", line)))
+
+
+def is_residue(line: str) -> bool:
+    """Whether a line is blank, or left of a chat template."""
+    return bool(RESIDUE_LINE.fullmatch(line.strip()))
+
+
+def trimmed(lines: Sequence[str]) -> Sequence[str]:
+    """Lines without those at both ends that are blank or left of a chat template."""
+    kept = [i for i, line in enumerate(lines) if not is_residue(line)]
+    return lines[kept[0] : kept[-1] + 1] if kept else []
+
+
+def without_residue(line: str) -> str:
+    """A line without marks of a chat template at its ends, and without a fence at its last one."""
+    while (shorter := RESIDUE.sub("", line)) != line:
+        line = shorter
+    return line
+
+
+def tree_of(lines: Sequence[str]) -> ast.Module | None:
+    """The syntax tree of lines; None if they do not parse."""
+    return _tree_of("\n".join(lines))
+
+
+@lru_cache(maxsize=64)  # more than the texts of a reply that are tried, so that each is parsed once
+def _tree_of(text: str) -> ast.Module | None:
+    tree = parsed(text)
+    return None if isinstance(tree, Flaw) else tree

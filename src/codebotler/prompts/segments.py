@@ -1,0 +1,206 @@
+"""Cuts a model's reply into its thoughts and its answer, and this into fenced code and the text around it."""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain, islice
+from typing import Literal, TypeAlias
+
+from codebotler.core.program import TASK
+from codebotler.prompts.lines import is_code, is_residue
+
+MARGIN = 3  # columns by which the last fence may be indented
+MAX_ENDS = 5  # of a fence, which are tried until its code parses
+MAX_MARKERS = 9  # at the beginning of a line
+MARKER = re.compile(
+    r"""(?ix) <\|channel\|?> \s* (?P<channel>[a-z]+) (?:<\|message\|>)?
+    | [<\[\u25c1] (?P<left>[|\uff5c])? (?P<slash>/)?
+      (?P<name>[a-z][\w:.\u2581-]*) (?P<right>[|\uff5c])? [>\]\u25b7]"""
+)
+THOUGHT = re.compile(r"think|thought|reason|reflect|analy|scratch|monolog|deliberat|brainstorm|ponder|^cot$")
+FIRST, LAST = {"start", "begin", "prefix"}, {"end", "suffix"}
+LINE = re.compile(r"[^\n]*\n|[^\n]+")
+FENCE = re.compile(
+    r"(?P<indent>[ \t]*(?:(?:[-*+]|\d+[.)])[ \t]+)?)(?P<marks>`{3,}|~{3,})(?P<info>[^`\n]*)\n?$"
+)
+DEFINITION = re.compile(rf"^\s*(?:async\s+)?def\s+{TASK}\b", re.MULTILINE)
+NEXT_TURN = re.compile(
+    r"(?i)<(?:\|(?:im_)?start|\|start_header_id|start_of_turn)\|?>user\b|<[|\uff5c]user[|\uff5c]>|\[INST\]"
+)
+
+Parses: TypeAlias = Callable[[Sequence[str]], bool]
+"""Whether lines are a program's, or the body of one."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of a reply.
+
+    Args:
+        kind: `fence`, `thought` between two markers, `end` for the last marker of a pair alone, and `text`.
+        text: all of it; of a thought, without its markers.
+        code: the lines that may be code.
+    """
+
+    kind: Literal["text", "fence", "thought", "end"]
+    text: str
+    code: Sequence[str] = ()
+
+
+def answer_of(reply: str, parses: Parses) -> tuple[list[Segment], str]:
+    """The fences and texts of a reply's answer, and its thoughts.
+
+    All in front of the last marker of a pair is a thought, as the prompt may hold the first one; but where
+    nothing follows it, and thoughts ended before, it has no meaning.
+    """
+    segments = [*_segments(_first_turn(reply), parses)]
+    answer: list[Segment] = []
+    thoughts: list[str] = []
+    for number, segment in enumerate(segments, 1):
+        if segment.kind == "thought":
+            thoughts.append(segment.text)
+        elif segment.kind != "end":
+            answer.append(segment)
+        elif not thoughts or any(later.code and later.text.strip() for later in segments[number:]):
+            thoughts.append("".join(one.text for one in answer))
+            answer = []
+    return answer, "\n\n".join(filter(None, map(str.strip, thoughts)))
+
+
+def _first_turn(reply: str) -> str:
+    """A reply up to where a model that did not stop asks for the next program itself."""
+    for turn in NEXT_TURN.finditer(reply):
+        if DEFINITION.search(reply[: turn.start()]):
+            return reply[: turn.start()]
+    return reply
+
+
+def _segments(reply: str, parses: Parses) -> Iterator[Segment]:
+    while reply:
+        start, segment, end = next(_marked(reply, parses), (len(reply), None, len(reply)))
+        if text := reply[:start]:
+            yield Segment("text", text, text.split("\n"))
+        if segment:
+            yield segment
+        reply = reply[end:]
+
+
+def _marked(reply: str, parses: Parses) -> Iterator[tuple[int, Segment, int]]:
+    """Where each fence and each thought starts, what it is, and where it ends; only the first is certain."""
+    for line in LINE.finditer(reply):
+        start, end, text = line.start(), line.end(), line[0]
+        if (fence := FENCE.match(text)) and not _is_in_code(fence, reply[:start]):
+            code, length = _fenced(fence, reply[end:], parses)
+            yield start, Segment("fence", reply[start : end + length], code), end + length
+        for marker in _markers_at_ends(text):
+            if found := _thought(marker, reply[start:]):
+                segment, length = found
+                yield start + marker.start, segment, start + length
+
+
+# --- fences
+
+
+def _is_in_code(fence: re.Match[str], before: str) -> bool:
+    """Whether an indented fence is in code without fences, such as in a docstring, instead of in a list."""
+    lines = reversed(before.split("\n"))
+    head = next((line for line in lines if line and not line[0].isspace()), "")
+    return not fence["indent"].strip() and len(fence["indent"]) > MARGIN and is_code(head)
+
+
+def _fenced(fence: re.Match[str], rest: str, parses: Parses) -> tuple[Sequence[str], int]:
+    """The code behind a fence, and its length with the fence that closes it.
+
+    A text in the code may hold a fence, and the last fence may follow on a line of code. So the first end
+    counts at which the code parses; where there is none, the next fence ends it.
+    """
+    lines = rest.split("\n")
+    indent = re.sub(r"\S", " ", fence["indent"])
+    code = [line.removeprefix(indent) for line in lines]
+    closing = re.compile(rf"[ ]{{0,{max(MARGIN, len(indent))}}}{fence['marks']}{fence['marks'][0]}*\s*$")
+    ends = (i for i, line in enumerate(lines) if line.rstrip().endswith(fence["marks"]))
+    for end in chain(islice(ends, MAX_ENDS), [len(lines)]):
+        last = [line.rstrip().rstrip(fence["marks"][0]) for line in code[end : end + 1]]
+        is_end = end == len(lines) or closing.match(lines[end]) or last[0].strip()
+        if is_end and parses([*code[:end], *last]):
+            return [*code[:end], *last], _length(lines[: end + 1])
+    end = next((i for i, line in enumerate(lines) if closing.match(line) or _interrupts(line)), len(lines))
+    is_closed = end < len(lines) and closing.match(lines[end])
+    return code[:end], _length(lines[: end + 1 if is_closed else end])
+
+
+def _interrupts(line: str) -> bool:
+    """Whether a line shows that a fence was not closed: it opens another one, or ends a thought."""
+    fence = FENCE.match(line)
+    is_end = any(
+        marker.is_last and marker.is_thought and marker.is_at_edge(line) for marker in _markers(line)
+    )
+    return bool(fence and fence["info"].strip()) or is_end
+
+
+def _length(lines: Sequence[str]) -> int:
+    return sum(len(line) + 1 for line in lines)
+
+
+# --- thoughts
+
+
+@dataclass(frozen=True)
+class _Marker:
+    """One of a pair of markers, such as `<think>`, `[/THINK]` or `<|END_THINKING|>`."""
+
+    name: str  # without what makes it the first or the last one
+    is_last: bool
+    is_token: bool  # of a chat template, as bars say
+    start: int
+    end: int
+
+    @property
+    def is_thought(self) -> bool:
+        return bool(THOUGHT.search(self.name))
+
+    def ends_with(self, other: _Marker) -> bool:
+        """Whether the other is the last one of this pair."""
+        names = {self.name, "", "channel"} if self.is_token else {self.name}
+        return other.is_last and (other.name in names or (self.is_thought and other.is_thought))
+
+    def is_at_edge(self, text: str) -> bool:
+        """Whether it begins or ends a line of the text that it is in."""
+        before = text[text.rfind("\n", 0, self.start) + 1 : self.start]
+        return not before.strip() or not text[self.end :].partition("\n")[0].strip()
+
+
+def _markers(text: str, start: int = 0) -> Iterator[_Marker]:
+    for found in MARKER.finditer(text, start):
+        words = re.split(r"[_\u2581]", (found["channel"] or found["name"]).lower())
+        is_last = bool(found["slash"] or (found["right"] and not found["left"]) or LAST & {*words})
+        name = "_".join(word for word in words if word not in {*FIRST, *LAST, "of"})
+        yield _Marker(name, is_last, bool(found["channel"] or found["left"]), *found.span())
+
+
+def _markers_at_ends(line: str) -> Iterator[_Marker]:
+    markers = _markers(line)
+    yield from islice(markers, MAX_MARKERS)
+    yield from deque(markers, maxlen=1)
+
+
+def _thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:
+    """The thought that a marker of the first line begins or ends, and where it ends; None if it does neither.
+
+    A thought without an end was cut off. A pair of any other name holds a thought if a program follows.
+    """
+    if marker.is_last:
+        is_end = marker.is_thought and marker.is_at_edge(rest)
+        return (Segment("end", rest[marker.start : marker.end]), marker.end) if is_end else None
+    if not is_residue(rest[: marker.start]):
+        return None
+    ends = [other for other in _markers(rest, marker.end) if marker.ends_with(other)]
+    last = next((end for end in ends if end.is_at_edge(rest)), ends[0] if ends else None)
+    if last is None:
+        return (Segment("thought", rest[marker.end :]), len(rest)) if marker.is_thought else None
+    if marker.is_thought or (not marker.is_token and DEFINITION.search(rest[last.end :])):
+        return Segment("thought", rest[marker.end : last.start]), last.end
+    return None
