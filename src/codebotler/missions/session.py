@@ -248,7 +248,7 @@ class MissionSession:
                     mission.run(reserved, place, rules=self._view.rules_in_force, room_map=room_map)
 
     def _note_warnings(self, mission: Mission) -> None:
-        """Log what speaks against the program that was approved; drafts before it had warnings of their own."""
+        """Log what speaks against the approved program; drafts before it had warnings of their own."""
         for sentence in (*self._view.missing_skills, *self._view.unknown_rooms):
             mission.note(f"before the robot moves: {sentence}")
 
