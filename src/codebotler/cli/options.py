@@ -111,7 +111,11 @@ BehindProxyOption = Annotated[
 ]
 TokenOption = Annotated[str | None, typer.Option(help="The token that opens the page; a new one by default.")]
 NoTokenOption = Annotated[
-    bool, typer.Option("--no-token", help="Let anyone on this machine in without a token; not with --host.")
+    bool,
+    typer.Option(
+        "--no-token",
+        help="Let anyone on this machine in without a token; not with --host or --behind-proxy.",
+    ),
 ]
 
 
