@@ -86,7 +86,9 @@ def program_in(completion: Completion, opening: str = "") -> str:
         UserError: there is no message, or one without content.
     """
     text = completion if isinstance(completion, str) else _said(completion)
-    return prompt_for("go on").program_from(text) if opening else program_of(text).source
+    if not opening:
+        return program_of(text).source
+    return program_of(prompt_for("go on").program_from(text), continues=True).source
 
 
 def _said(messages: Sequence[Mapping[str, Any]]) -> str:
