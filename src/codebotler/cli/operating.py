@@ -130,6 +130,7 @@ def serve_page(
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
     name: options.NameOption = None,
+    behind_proxy: options.BehindProxyOption = None,
     token: options.TokenOption = None,
     no_token: options.NoTokenOption = False,
     robot: options.RobotOption = "sim",
@@ -171,13 +172,14 @@ def serve_page(
     from codebotler.web.access import Access, Place
     from codebotler.web.console import Console
     from codebotler.web.frame import installed_pages
+    from codebotler.web.proxy import proxies_in_front
     from codebotler.web.server import serve
 
     table = skills_from(*(skills or ()))
     known = options.world_or_office(robot, world, table)
     house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
-    place = Place(host, port, tuple(name or ()))
-    access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
+    place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
+    access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
     options.note_office(robot, world)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
     settings = Options(known, speed or None, address, ros_python, table)

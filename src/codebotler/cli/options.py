@@ -105,9 +105,21 @@ PortOption = Annotated[
 NameOption = Annotated[
     list[str] | None, typer.Option(help="Another host name for the page, besides its address.")
 ]
+BehindProxyOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Where a reverse proxy offers the page: https://HOST, with :PORT and /PATH if it has them; "
+        "may be given several times. By default the list behind_proxy of config.yaml.",
+        metavar="ADDRESS",
+    ),
+]
 TokenOption = Annotated[str | None, typer.Option(help="The token that opens the page; a new one by default.")]
 NoTokenOption = Annotated[
-    bool, typer.Option("--no-token", help="Let anyone on this machine in without a token; not with --host.")
+    bool,
+    typer.Option(
+        "--no-token",
+        help="Let anyone on this machine in without a token; not with --host or --behind-proxy.",
+    ),
 ]
 
 

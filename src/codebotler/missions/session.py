@@ -263,8 +263,14 @@ class MissionSession:
             while mission.state.is_open:
                 self._wait_for_a_person(mission)
             if mission.state is State.APPROVED:
+                self._note_warnings(mission)
                 with suppress(MissionError):  # it was stopped before it could run
                     mission.run(reserved, place, rules=self._view.rules_in_force, room_map=room_map)
+
+    def _note_warnings(self, mission: Mission) -> None:
+        """Log what speaks against the approved program; drafts before it had warnings of their own."""
+        for sentence in (*self._view.missing_skills, *self._view.unknown_rooms):
+            mission.note(f"before the robot moves: {sentence}")
 
     def _is_stopped(self) -> bool:
         return self._stopped_by is not None
@@ -374,8 +380,6 @@ class MissionSession:
             if not mission.has_ended:
                 raise
             return
-        for sentence in (*missing, *unknown):
-            mission.note(f"before the robot moves: {sentence}")
         with self._lock:
             if self._edited is None:
                 names = (*UNCHECKED, "busy")

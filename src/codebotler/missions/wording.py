@@ -55,6 +55,11 @@ def state_text(state: str, reason: str) -> str:
     return f"{state}: {shortened(reason)}"
 
 
+def reason_text(reason: str, line: int | None) -> str:
+    """Why a mission ended, with the line of the program if one is to blame."""
+    return reason if line is None else f"line {line}: {reason}"
+
+
 def title(summary: Summary) -> str:
     """The instruction of a mission, or else the first skills that its program calls."""
     if summary.instruction:

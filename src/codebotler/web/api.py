@@ -210,8 +210,13 @@ def _add_rest(api: APIRouter, console: Console) -> None:
         once_over: Annotated[
             bool, Query(description="Wait for the end of the mission, at most 15 s.")
         ] = False,
+        once_begun: Annotated[
+            bool, Query(description="Wait for the beginning of a mission, at most 15 s.")
+        ] = False,
     ) -> dict[str, Any]:
         """The robot, its skills and its mission."""
+        if once_begun:
+            await console.view_begun()
         view = await console.view_over() if once_over else console.view
         return {
             "robot": console.robot.name,

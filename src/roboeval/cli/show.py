@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.cli.options import HostOption, NameOption, NoTokenOption, PortOption, TokenOption
+from codebotler.cli.options import (
+    BehindProxyOption,
+    HostOption,
+    NameOption,
+    NoTokenOption,
+    PortOption,
+    TokenOption,
+)
 from roboeval.cli.options import (
     AblationOption,
     JsonOption,
@@ -207,6 +214,7 @@ def serve(
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
     name: NameOption = None,
+    behind_proxy: BehindProxyOption = None,
     token: TokenOption = None,
     no_token: NoTokenOption = False,
     suite: Annotated[
@@ -221,11 +229,12 @@ def serve(
     from codebotler.core.errors import UserError
     from codebotler.web import server
     from codebotler.web.access import Access, Place
+    from codebotler.web.proxy import proxies_in_front
     from roboeval.web.pages import pages
     from roboeval.web.run_store import RunStore
 
-    place = Place(host, port, tuple(name or ()))
-    access = Access.asked_for(token, None, open_to_all=no_token, is_loopback=place.is_loopback)
+    place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
+    access = Access.asked_for(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
         raise UserError("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
     suites = [load(each) for each in suite or ()]

@@ -15,7 +15,7 @@ from codebotler.core.terminal import shortened
 from codebotler.core.words import counted
 from codebotler.core.world import World
 from codebotler.web.floorplan import MapState, floorplan
-from codebotler.web.frame import PlainText
+from codebotler.web.frame import PlainText, outside
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.cluster import Fix, nearest_fix
 from roboeval.evaluation.explanation import (
@@ -77,14 +77,14 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
 def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: Filter, query: str) -> None:
     key: Key = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
-        html.a(shortened(run.name, MOST_NAME), href=f"{address(run.name)}{query}#completions").props(
+        html.a(shortened(run.name, MOST_NAME), href=outside(f"{address(run.name)}{query}#completions")).props(
             "dir=auto"
         )
         for text, other in zip(NEIGHBOURS, run.neighbours(key, chosen), strict=True):
             if other is not None:
                 task, prompt, index = other
                 href = f"{address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
-                html.a(text, href=href).classes("beside")
+                html.a(text, href=outside(href)).classes("beside")
     PlainText("h1", shortened(name_of(key), MOST_NAME))
     with ui.element("p").classes("facts"):
         why, state = data["failure"], {None: "waits", True: "done", False: "failed"}[data["passed"]]
@@ -96,7 +96,7 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: 
             PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
         if fix is not None:
             text = f"Nearest program that passes: {counted(fix.changed, 'line')} changed"
-            html.a(text, href=f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}")
+            html.a(text, href=outside(f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
     if data["stale"]:
         PlainText("p", CHANGED, "trouble")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])

@@ -11,7 +11,7 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import PlainText
+from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.compare import compared, pairs_to_compare, verdict
 from roboeval.analysis.metrics import Estimate, by_formula, pass_at_1
 from roboeval.analysis.statistics import DIFFERENCE
@@ -107,7 +107,7 @@ def draw_differences(found: Sequence[Difference]) -> None:
             with ui.element("li"):
                 PlainText("span", one.told)
                 query = urlencode([("run", run.name) for run in one.runs], errors="replace")
-                html.a("Task by task", href=f"/side-by-side?{query}")
+                html.a("Task by task", href=outside(f"/side-by-side?{query}"))
 
 
 def _draw_difference(difference: Difference) -> None:
@@ -150,7 +150,7 @@ def _draw_differing(row: TaskRow, runs: Sequence[Snapshot]) -> None:
                     PlainText("span", f"{name_of(key)}: ")
                     for run, text in zip(runs, _verdicts(is_second), strict=True):
                         link = html.a(f"{shortened(run.name, MOST_NAME)} {text}")
-                        link.props["href"] = f"{address(run.name)}/{name_of(key)}"
+                        link.props["href"] = outside(f"{address(run.name)}/{name_of(key)}")
             if (left := len(row.differing) - MOST_KEYS) > 0:
                 PlainText("li", f"and {left:,} more")
 

@@ -11,7 +11,7 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import Button, PlainText
+from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList
@@ -54,7 +54,7 @@ class _Table:
         with self._empty:
             PlainText("p", NOTHING, "quiet")
             PlainText("pre", f"roboeval {FIRST}", "source").props("tabindex=0")
-        self._form = ui.element("form").props("action=/side-by-side method=get")
+        self._form = ui.element("form").props(f"action={outside('/side-by-side')} method=get")
         with self._form:
             region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Runs"')
             with region, html.table().classes("runs"):
@@ -109,7 +109,7 @@ class _Row:
                 box.props["value"] = name
                 box.props["aria-label"] = f"Show {shortened(name, MOST_NAME)} side by side with others"
             with html.th().props("scope=row"):
-                with html.a(href=address(name)):
+                with html.a(href=outside(address(name))):
                     PlainText("b", shortened(name, MOST_NAME))
                 self._models = PlainText("span", "", "quiet")
                 self._notes = PlainText("span", "", "bad note")

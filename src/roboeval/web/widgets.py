@@ -14,14 +14,14 @@ from nicegui.element import Element
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import all_names
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import Frame, PlainText
+from codebotler.web.frame import Frame, PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.evaluation.explanation import shown_lines
 from roboeval.web.heat_map import NONE
 from roboeval.web.run_store import MissingError
 from roboeval.web.serializers import State
 
-STYLE = '<link rel="stylesheet" href="/static/benchmark/benchmark.css">'
+STYLE = '<link rel="stylesheet" href="{prefix}/static/benchmark/benchmark.css">'
 EVERY = 1.0  # seconds after which a page looks whether something has changed
 MOST_TITLE = 80
 
@@ -30,7 +30,7 @@ MOST_TITLE = 80
 def page_of(frame: Frame, title: str) -> Iterator[None]:
     """A page of the benchmark; of an error that a user can cause, only its sentence is shown."""
     frame(shortened(title, MOST_TITLE), "/runs")
-    ui.add_head_html(STYLE)
+    ui.add_head_html(STYLE.format(prefix=outside("")))
     with ui.element("div").classes("benchmark"):
         try:
             yield
@@ -38,7 +38,7 @@ def page_of(frame: Frame, title: str) -> Iterator[None]:
             if isinstance(error, MissingError):
                 ui.context.client.status_code = HTTPStatus.NOT_FOUND
             PlainText("p", error.sentence, "trouble").props("role=alert")
-            html.a("All runs", href="/runs")
+            html.a("All runs", href=outside("/runs"))
 
 
 class _DataElement(Element):
@@ -60,7 +60,8 @@ class HeatMap(_DataElement, component="static/heat.js"):
         self, label: str, corner: str, chosen: Callable[[str, int | None], None] | None = None
     ) -> None:
         super().__init__()
-        self._props.update(label=label, corner=corner, groups=[], rows=[], chooses=chosen is not None)
+        props = {"prefix": outside(""), "label": label, "corner": corner, "chooses": chosen is not None}
+        self._props.update(props, groups=[], rows=[])
         if chosen is not None:
             self.on("choose", lambda event: chosen(*event.args))
 

@@ -17,7 +17,7 @@ from codebotler.missions.wording import title
 from codebotler.robots.simulated import OFFICE
 from codebotler.simulator.sampled_robot import Fact, GivenAnswer, RoomMap, Whereabouts
 from codebotler.web.floorplan import HALO, MOST_ROOMS, MapState, floorplan
-from codebotler.web.panes.past_missions import timeline
+from codebotler.web.panes.past_mission import timeline
 from codebotler.web.panes.robot import map_state
 from codebotler.web.storyboard import (
     LEFT_OUT,

@@ -20,7 +20,7 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MOST_PROGRAM, Console
-from codebotler.web.frame import Button, PlainText, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
 from codebotler.web.storyboard import Reached, draw_strips
@@ -28,7 +28,6 @@ from codebotler.web.storyboard import Reached, draw_strips
 CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
 MOST_MARKS, MOST_ESCAPES = 400, 2_000
 MOST_PROBLEMS = 20
-SCRIPT = '<script src="/static/editor.js"></script>'
 
 
 class ProgramPane:
@@ -39,7 +38,7 @@ class ProgramPane:
         self._heard = 0  # texts from this browser
         self._told: dict[str, object] = {}
         self._drawn: tuple[object, ...] = ()
-        ui.add_head_html(SCRIPT)
+        script("editor.js")
         ui.on("program-typed", self._typed)
         with ui.element("section").classes("pane program").props("aria-labelledby=h-program"):
             with ui.element("div").classes("head"):

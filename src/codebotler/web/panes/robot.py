@@ -13,9 +13,10 @@ from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import State, Summary
 from codebotler.missions.progress import ANSWER, Moment, position
 from codebotler.missions.view import Phase, SessionView
+from codebotler.missions.wording import reason_text
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
-from codebotler.web.frame import Button, PlainText
+from codebotler.web.frame import Button, PlainText, script
 from codebotler.web.panes.question import QuestionPane
 
 HEADLINES: Mapping[Phase, str] = {
@@ -27,7 +28,6 @@ HEADLINES: Mapping[Phase, str] = {
     State.APPROVED: "Starting",
 }
 MOST_MOMENTS = 60
-SCRIPT = '<script src="/static/moments.js"></script>'
 
 
 class RobotPane:
@@ -37,7 +37,7 @@ class RobotPane:
         self._console = console
         self._drawn: tuple[Moment, ...] = ()
         self._mapped: object = None
-        ui.add_head_html(SCRIPT)
+        script("moments.js")
         with ui.element("section").classes("pane status").props("aria-labelledby=h-status"):
             with ui.element("div").classes("head"):
                 PlainText("h2", "Status").props("id=h-status")
@@ -67,7 +67,7 @@ class RobotPane:
             [f"{progress.clock:.1f} s on the robot's clock"] if progress.moments and progress.clock else []
         )
         self._where.say(" · ".join(where))
-        self._reason.say(view.reason if view.line is None else f"line {view.line}: {view.reason}")
+        self._reason.say(reason_text(view.reason, view.line))
         if self._asking is not None:
             self._asking.show(is_over=view.is_over)
         self._draw_map(view)
