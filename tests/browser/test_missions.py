@@ -163,7 +163,7 @@ def test_what_the_robot_cannot_do_is_not_said_once_the_line_is_gone(tmp_path: Pa
         server.call("POST", "/api/missions", {"program": FAILS})
         cannot = page.get_by_text(re.compile("has no .pick. skill"))
         expect(cannot.first).to_be_visible()
-        expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
+        expect(page.locator(".headline")).to_have_text("The program has problems")
         server.call("PUT", "/api/missions/current/program", {"program": HELLO})
         expect(page.locator(".verdict")).to_have_text("Checked: no problems.")
         expect(cannot).to_have_count(0)
