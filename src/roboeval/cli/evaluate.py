@@ -70,7 +70,7 @@ def evaluate(
         from roboeval.analysis.summary import summary
         from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
-        from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+        from roboeval.evaluation.runs.folder import Run, about_of, tasks_to_judge
         from roboeval.evaluation.runs.scope import Scope
 
         judged_by = load(suite, rules, skills)
@@ -84,7 +84,8 @@ def evaluate(
         try:
             opened = opened_source(source, judged_by)
             run = run or opened.run
-            scope = Scope.of(opened.completions, wanted)
+            about = {} if opened.run is None else about_of(opened.run)
+            scope = Scope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
                 fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):

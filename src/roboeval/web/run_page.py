@@ -16,7 +16,16 @@ from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import Filter, Snapshot
-from roboeval.web.widgets import EVERY, CompletionList, HeatMap, completions_text, score_text, show_state
+from roboeval.web.widgets import (
+    EVERY,
+    CompletionList,
+    HeatMap,
+    completions_text,
+    date_text,
+    score_text,
+    show_state,
+    tasks_text,
+)
 
 MOST_NAME = 80
 SCROLL = "document.getElementById('completions').scrollIntoView()"
@@ -145,7 +154,11 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
         state = PlainText("small")
         PlainText("span", models_of(run) + (f", judged by {shortened(key, MOST_NAME)}" if key else ""))
         PlainText("b", score_text(data))
-        PlainText("span", completions_text(data))
+        PlainText("span", f"{completions_text(data)}, {tasks_text(data)} tasks")
+        if data["date"] is not None:
+            PlainText("span", f"started {date_text(data)} UTC", "quiet")
+        if data["settings"]:
+            PlainText("span", shortened(data["settings"], 200), "quiet")
     bar = html.progress(max="1").classes("long")
     show_state(data, state, bar)
     with ui.element("ul").classes("notes"):
@@ -164,7 +177,7 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
 
 def _verb(chosen: Filter, *, past: bool = False) -> str:
     if (by := failure_text(chosen)) is not None:
-        return f"{'ended' if past else 'end'} in {by}"
+        return f"{'ended' if past else 'end'} {by}"
     verb = "fail" if chosen.passed is False else "pass"
     return f"{verb}ed" if past else verb
 

@@ -17,6 +17,7 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame, PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.evaluation.explanation import shown_lines
+from roboeval.evaluation.runs.scope import Coverage
 from roboeval.web.heat_map import NONE
 from roboeval.web.run_store import MissingError
 from roboeval.web.serializers import State
@@ -92,28 +93,41 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
     label.say(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
     if bar is not None:
-        names = ("completions", "wanted") if state == State.GENERATING else ("judged", "to_judge")
+        names = ("completions", "requested") if state == State.GENERATING else ("judged", "to_judge")
         done, of = (data.get(name) or 0 for name in names)
         bar.set_visibility(state in {State.GENERATING, State.JUDGING})
         bar.props(f"value={done / of if of else 0:.3f}").props["aria-label"] = f"{done:,} of {of:,}"
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """How many completions a run has, and of how many, where some are missing."""
+    """Of how many completions a run's numbers speak, where there is little room."""
     if "completions" not in data:
         return NONE
-    written, wanted, judged = data["completions"], data["wanted"], data["judged"]
-    if wanted is not None and written < wanted:
-        return f"{written:,} of {wanted:,} written"
-    if judged < data["to_judge"]:
-        return f"{judged:,} of {data['to_judge']:,} judged"
-    return f"{judged or written:,}"
+    coverage = _coverage(data)
+    done, what = (coverage.judged, "judged") if coverage.judged else (coverage.there, "written")
+    return f"{done:,} of {coverage.total:,} {what}"
 
 
 def completions_text(data: Mapping[str, Any]) -> str:
-    """How many completions a run has, with the noun."""
-    count = count_text(data)
-    return f"{count} completion{'s' * (count != '1')}"
+    """Of how many completions a run's numbers speak."""
+    return str(_coverage(data)) if "completions" in data else NONE
+
+
+def _coverage(data: Mapping[str, Any]) -> Coverage:
+    return Coverage(data["judged"], data["to_judge"], data["requested"])
+
+
+def tasks_text(data: Mapping[str, Any]) -> str:
+    """How many tasks a run has completions of, and how many its suite has."""
+    if "tasks_there" not in data:
+        return NONE
+    of = data["tasks_of_suite"]
+    return f"{data['tasks_there']:,}" + ("" if of is None else f" of {of:,}")
+
+
+def date_text(data: Mapping[str, Any]) -> str:
+    """The day and the time at which a run began, in UTC."""
+    return (data.get("date") or NONE)[:16].replace("T", " ")
 
 
 def interval_text(estimate: Estimate, form: str = ".2f") -> str:
@@ -126,4 +140,5 @@ def score_text(data: Mapping[str, Any]) -> str:
     mean = data.get("pass@1")
     if mean is None:
         return ""
-    return f"pass@1 {mean['mean']:.3f} (95% interval {Estimate(**mean).ends('.2f')})"
+    estimate = Estimate(**mean)
+    return f"pass@1 {estimate.mean:.3f} ({estimate.interval})"

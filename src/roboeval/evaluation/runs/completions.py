@@ -118,7 +118,8 @@ class Completion:
         reply = self.more.get("raw_reply")
         is_chat = isinstance(reply, str) and not (self.model or "").startswith("completions:")
         has_code = read_reply(str(reply)).has_code if is_chat else bool(self.program.strip())
-        return why_no_program(self.program, self.finish_reason, has_code=has_code)
+        text = reply if isinstance(reply, str) else None
+        return why_no_program(text, self.program, self.finish_reason, has_code=has_code)
 
     @property
     def program_sha256(self) -> str:
