@@ -13,7 +13,7 @@ from pathlib import Path
 from statistics import fmean
 
 from codebotler.core.yaml_files import YamlFile
-from roboeval.training.families import family_names, trained_task
+from roboeval.suites.families.tasks import family_names, trained_task
 from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = int(os.environ.get("SEEDS", "5"))

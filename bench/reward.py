@@ -3,8 +3,9 @@
 Beside it stands what one call of `evaluate` does with the same programs, as what could be reached. Both are
 printed for the suites `paper` and `plus`; under `plus`, which has more worlds, a quarter as many programs.
 They are those that models wrote, where CODEBOTLER_CORPUS names the corpus, and the recorded ones, of which
-one in ten was written to use all of Python, and has a process for each run. Then ROLLOUTS rollouts of the
-families to train on are judged at once, with 1 to 8 workers in turns.
+one in ten was written to use all of Python, and has a process for each run. Then PROMPTS prompts of the
+families to train on are made, and some of their tasks, and ROLLOUTS rollouts are judged at once, with 1 to 8
+workers in turns.
 """
 
 import os
@@ -21,8 +22,8 @@ from codebotler.simulator.pool import SHARED, WorkerPool, cores
 from completions import models
 from roboeval import Completion, evaluate, load_suite, recorded_completions, reward
 from roboeval.evaluation.runs.completions import read_completions
+from roboeval.suites.families.tasks import trained_task
 from roboeval.suites.load import Suite
-from roboeval.training.families import trained_task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
@@ -30,6 +31,7 @@ COUNT = int(sys.argv[1]) if len(sys.argv) > 1 else 2_000
 BATCH = 64
 WORKERS = 2
 ROLLOUTS, TURNS = 1_024, 3
+PROMPTS, TASKS = 10_000, 500
 
 
 def main() -> None:
@@ -45,7 +47,20 @@ def main() -> None:
             for completion in recorded_completions(model, suite)
         ]
         measure("recorded programs", suite, recorded, count)
+    measure_prompts()
     measure_families()
+
+
+def measure_prompts() -> None:
+    """Print how long prompts take, as a ratio to making their tasks with all worlds."""
+    began = time.monotonic()
+    rows = load_prompts("test", count=PROMPTS)
+    prompts = time.monotonic() - began
+    began = time.monotonic()
+    for row in rows[-TASKS:]:
+        trained_task(row["family"], row["seed"])
+    tasks = (time.monotonic() - began) * PROMPTS / TASKS
+    print(f"{PROMPTS:,} prompts: {prompts:.1f} s, {prompts / tasks:.2f} times what their tasks would take")
 
 
 def measure_families() -> None:

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from roboeval.training.families import trained_task
+from roboeval.suites.families.tasks import trained_task
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Rollout, judge
 

@@ -42,7 +42,7 @@ MODULES = {
         "roboeval.evaluation.runs.completions",
         "roboeval.evaluation.runs.traces",
         "roboeval.analysis.metrics",
-        "roboeval.training.families",
+        "roboeval.suites.families.tasks",
         "roboeval.training.prompts",
         "roboeval.training.rollouts",
     ),

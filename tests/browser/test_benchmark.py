@@ -15,6 +15,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from codebotler.core.files import to_line
+from codebotler.models.no_program import IN_WORDS
 from command_line import forked
 from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer
@@ -154,6 +155,42 @@ def test_a_line_that_ends_a_program_is_marked(served: PageServer, opened: OpenPa
     expect(page.locator(".world-of .trouble").first).to_contain_text("there is no room")
 
 
+def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
+    few_runs: Path, opened: OpenPage
+) -> None:
+    run = Run(few_runs / "hasty")
+    said = {"no_program": "cut-off", "finish_reason": "length", "latency_s": 2.5}
+    said |= {"usage": {"input_tokens": 900, "output_tokens": 512, "reasoning_tokens": 400}}
+    said |= {"reasoning": "Let me think <b>hard</b>.", "raw_reply": "I will"}
+    rows = [json.loads(line) for line in run.completions.read_bytes().splitlines()]
+    written = {**rows[0], **said}
+    run.completions.write_bytes(b"".join(map(to_line, [written, *rows[1:]])))
+    judged = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
+    failure = {"class": "NoProgram", "kind": "cut-off", "world": 0, "check": None}
+    name = f"{written['task']}/{written['prompt']}/{written['index']}"
+    for row in judged:
+        if f"{row['task']}/{row['prompt']}/{row['index']}" == name:
+            row |= {"passed": False, "failure": failure}
+            row["verdicts"][0]["satisfied"] = False
+    run.rows("paper").write_bytes(b"".join(map(to_line, judged)))
+    unseal(run.path)
+    with serving(few_runs) as server:
+        page = opened(server, f"runs/hasty/{name}")
+        expect(page.locator(".facts .state")).to_have_text("no program: cut-off")
+        expect(page.locator(".worlds-of .trouble")).to_have_text(IN_WORDS["cut-off"])
+        expect(page.locator(".world-of")).to_have_count(0)
+        reply = page.locator(".reply")
+        expect(reply).to_contain_text("512 of the reply")
+        expect(reply.locator("pre")).to_have_count(0)
+        reply.locator("summary", has_text="Reasoning").click()
+        expect(reply.locator("pre")).to_have_text("Let me think <b>hard</b>.")
+        page.get_by_role("link", name="hasty").click()
+        expect(page.locator(".kind", has_text="cut-off")).to_contain_text("1")
+        page.locator(".kind", has_text="without a program").click()
+        expect(page.get_by_role("heading", name="Where they end without a program")).to_be_visible()
+        page.context.close()
+
+
 def test_what_is_chosen_stands_in_the_address(served: PageServer, opened: OpenPage) -> None:
     page = opened(served, "runs/hasty")
     page.get_by_role("link", name=re.compile("^SayGoodDay, prompt 3")).click()
@@ -274,7 +311,9 @@ def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> N
         expect(row).to_have_count(1)
         assert made.wait() == 0
         expect(row.locator(".state")).to_have_text("judged")
-        expect(row.locator(".count")).to_have_text("30")
+        expect(row.locator(".count")).to_have_text("30 of 30 judged")
+        expect(row.locator(".tasks")).to_have_text("3 of 16")
+        expect(row.locator(".date")).to_have_text(re.compile(r"^20\d\d-\d\d-\d\d \d\d:\d\d$"))
         expect(page.get_by_text("There are no runs yet.")).to_be_hidden()
         page.context.close()
 

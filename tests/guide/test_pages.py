@@ -31,7 +31,7 @@ PAGES = {path.name: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.m
 NOT_RUN = {
     "README.md": ["makes an environment of its own"],
     "evaluate-your-model.md": [
-        *("needs a key, and costs money", "needs Inspect, and a model behind it"),
+        *("needs a key, and costs money", "needs a model behind it", "needs Inspect, and a model behind it"),
         *("needs a key, and costs money", "needs a Ray cluster"),
     ],
     "house-rules.md": ["needs a model behind it", "needs Inspect, and a model behind it"],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -38,6 +38,7 @@ FAILURES = (
     ("TaskCompletionError", "InitialTerminal"),
     ("TaskCompletionError", "EventOrdering"),
 )
+WITHOUT = (("NoProgram", "cut-off"), ("NoProgram", "tool-call"), *FAILURES)
 PROGRAM = 'def task_program():\n    say("hello")\n'
 UNCHECKED = pl.lit(None)
 RUNS = pl.col("passed") | (pl.col("failure_class") == "TaskCompletionError")
@@ -48,6 +49,7 @@ def made_up(
     passes: Mapping[str, tuple[int, ...]],
     *,
     of: int = 10,
+    failures: Sequence[tuple[str, str]] = FAILURES,
     suite: Suite = SUITE,
     ablated: tuple[str, ...] = (),
     accepted: pl.Expr = RUNS,
@@ -60,6 +62,7 @@ def made_up(
         name: of its model, and of its folder, if no other is given.
         passes: how many completions of each prompt pass, by task.
         of: how many completions each prompt has.
+        failures: classes and kinds.
         suite: by which they were judged.
         ablated: the tasks that were judged by common sense only as well.
         accepted: what the check says; null where it was not asked.
@@ -67,7 +70,7 @@ def made_up(
         about: the name of the `folder`, and fields of the results.
     """
     rows = [
-        _row(task, prompt, index, passed=index < passed)
+        _row(task, prompt, index, failures, passed=index < passed)
         for task, prompts in passes.items()
         for prompt, passed in enumerate(prompts)
         for index in range(of)
@@ -110,11 +113,13 @@ def judged(
     )
 
 
-def _row(task: str, prompt: int, index: int, *, passed: bool) -> dict[str, Any]:
+def _row(
+    task: str, prompt: int, index: int, failures: Sequence[tuple[str, str]], *, passed: bool
+) -> dict[str, Any]:
     row = {"task": task, "prompt": prompt, "index": index, "passed": passed}
     if passed:
         return row
-    name, kind = FAILURES[(index + 3 * prompt) % len(FAILURES)]
+    name, kind = failures[(index + 3 * prompt) % len(failures)]
     check = f"{kind.lower()}()" if name == "TaskCompletionError" else None
     verdict = {
         **VERDICT,
@@ -160,6 +165,7 @@ def cases() -> dict[str, list[JudgedRun]]:
         "no failures": [made_up("perfect", {"Visit": (10, 10), "CountMugs": (10,)})],
         "all failures": [made_up("hopeless", {"Visit": (0, 0), "CountMugs": (0,)}, accepted=UNCHECKED)],
         "unfinished": [unfinished(one, 500), *usual()[:1]],
+        "without programs": [made_up("cut off", {"Visit": (2, 4), "CountMugs": (3,)}, failures=WITHOUT)],
         "40 models": many,
         "long names": [
             made_up(f"openai-chat:somebody/model-34b-hf-{n}", {"Visit": (n, 5)}) for n in range(7)

@@ -78,7 +78,7 @@ def test_skill_that_the_robot_lacks_is_said_before_it_moves(graph: Graph, tmp_pa
         out, err = tool.communicate()
 
     assert (tool.returncode, "running on" in out) == (1, False)
-    assert re.search("line 4: .*cannot pick: .*/pick_server", err)
+    assert re.search("line 4: this robot has no `pick` skill: .*/pick_server", err)
     assert "--despite-problems" in err
     assert '"the hall"' not in str(list(server.said.queue))
 

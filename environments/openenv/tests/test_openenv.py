@@ -26,8 +26,9 @@ from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
 from openenv.validation.runtime.collector import collect_runtime_evidence
 from openenv.validation.runtime.contracts import load_runtime_plan
 
-from roboeval.training.families import family_file, family_names, trained_task
-from roboeval.training.prompts import SPLITS, load_prompts
+from roboeval.suites.families.suite import SPLITS
+from roboeval.suites.families.tasks import family_file, family_names, trained_task
+from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
 PACKAGE = Path(__file__).parents[1]

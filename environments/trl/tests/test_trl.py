@@ -15,8 +15,8 @@ import trl
 from codebotler_trl import load_prompts, parses, passed, reward, without_errors
 
 from codebotler.simulator.worker import EngineError
+from roboeval.suites.families.tasks import trained_task
 from roboeval.training import rollouts
-from roboeval.training.families import trained_task
 
 FAMILY = "BringThing"
 END = "<end>"

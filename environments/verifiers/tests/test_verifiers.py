@@ -33,7 +33,7 @@ from verifiers.v1.utils.loaders import environment_class, resolve_env_config, ta
 
 from codebotler.simulator.pool import SHARED, shared_pool
 from codebotler.simulator.worker import EngineError
-from roboeval.training.families import trained_task
+from roboeval.suites.families.tasks import trained_task
 from roboeval.training.prompts import load_prompts
 
 NAME, FAMILY = "codebotler-verifiers", "BringThing"

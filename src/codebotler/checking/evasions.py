@@ -7,16 +7,15 @@ import inspect
 from collections.abc import Iterator, Sequence
 from textwrap import dedent
 
+from codebotler.checking.rule_rooms import room_patterns
 from codebotler.core.errors import UserError
 from codebotler.core.labels import PLAIN
-from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.trace import Names
 from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.rule_guard import DRIVE, Rule
 from codebotler.simulator.rules import resolve_room
 
@@ -87,7 +86,7 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
         return resolve_room(rooms, request) == room
 
     for rule in rules:
-        for pattern in dict.fromkeys(_room_patterns(rule) if regexes else ()):
+        for pattern in dict.fromkeys(room_patterns(rule) if regexes else ()):
             for room in regexes:
                 text = Regex(pattern)
                 requests = [one for one in (*samples(room), *samples(pattern)) if leads_to(room, one)]
@@ -104,12 +103,3 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
                         f'the rule "{rule.name}" names the room "{room}" by some of its names only; '
                         f'"{missed}" does not count'
                     )
-
-
-def _room_patterns(rule: Rule) -> Iterator[str]:
-    for element in elements(rule.formula):
-        if element.place is not None:
-            yield element.place
-        row = by_event(element.kind)
-        if row is not None and row.is_drive:
-            yield from patterns(element.text)

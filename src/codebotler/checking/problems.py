@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -144,6 +145,10 @@ class Check:
 def no_room(request: str, room_map: RoomMap) -> str:
     """The message for an unknown room, with the closest match."""
     name = brief(request)
-    closest = difflib.get_close_matches(name.lower(), room_map.rooms, n=1)
-    hint = f'; the closest is "{closest[0]}"' if closest else ""
-    return f'there is no room "{name}"{hint}'
+    return f'there is no room "{name}"{closest_room(name, room_map.rooms)}'
+
+
+def closest_room(name: str, rooms: Sequence[str]) -> str:
+    """A clause that names the room with the closest name; empty if none is close."""
+    closest = difflib.get_close_matches(name.lower(), rooms, n=1)
+    return f'; the closest is "{closest[0]}"' if closest else ""

@@ -11,7 +11,7 @@ from codebotler.core.program import names_bound, nodes
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 
-DRIVE, LIST, HERE = "goto", "get_all_rooms", "get_current_location"
+LIST, HERE = "get_all_rooms", "get_current_location"
 MOST_ROOMS = 100
 ROUNDS = 6  # in which names are passed on from variable to variable; longer chains are unusual
 SAME_VALUES = frozenset({"sorted", "list", "set", "tuple", "reversed", "iter", "filter", "frozenset"})
@@ -63,19 +63,21 @@ def _texts(expression: ast.expr) -> Iterator[str]:
 
 
 def _drives(skills: SkillTable) -> dict[str, Skill]:
-    return {s.name: s for s in skills.rows if s.recording is not None and s.recording.kind == DRIVE}
+    """The skills of which an argument names a room."""
+    return {row.name: row for row in skills.rows if row.is_drive and row.recording and row.recording.text}
 
 
 def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.Call, ast.expr]]:
     """The calls that drive, with where to."""
     for node in nodes(tree):
         match node:
-            case ast.Call(ast.Name(name), [first, *_]) if name in drives:
-                yield node, first
-            case ast.Call(ast.Name(name)) if name in drives:
+            case ast.Call(ast.Name(name), arguments, keywords) if name in drives:
                 recording = drives[name].recording
-                assert recording is not None
-                yield from ((node, k.value) for k in node.keywords if k.arg == recording.text)
+                assert recording is not None, "a drive is recorded"
+                at = [one.name for one in drives[name].parameters].index(recording.text)
+                if not any(isinstance(one, ast.Starred) for one in arguments[:at]):
+                    yield from ((node, one) for one in arguments[at : at + 1])
+                yield from ((node, one.value) for one in keywords if one.arg == recording.text)
 
 
 class _Variables:

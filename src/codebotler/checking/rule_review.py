@@ -6,16 +6,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
+from codebotler.checking.rule_rooms import may_mean
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Names, Option, Trace
 from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
-from codebotler.rtl.reasoning import Reasoner, Undecided, samples
+from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError, names_of
-from codebotler.simulator.rules import finds, found_in
+from codebotler.simulator.rules import finds
 from codebotler.simulator.sampled_robot import PEOPLE
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
@@ -186,24 +187,6 @@ def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
 # --- names
 
 
-def unknown_rooms_in(rules: Sequence[Rule], rooms: Sequence[str]) -> list[str]:
-    """A sentence for each room that a rule names and that is not among these."""
-    return [
-        f'the rule "{rule.name}" names the room "{pattern}", which is not there; look for a misspelt name'
-        for rule in rules
-        for pattern in dict.fromkeys(_room_patterns(rule))
-        if not may_mean(pattern, rooms)
-    ]
-
-
-def _room_patterns(rule: Rule) -> Iterator[str]:
-    for element in elements(rule.formula):
-        if element.place is not None:
-            yield element.place
-        if element.kind == "goto" and isinstance(element.text, Regex):
-            yield element.text.pattern
-
-
 def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
     """Rooms, things and people that a rule names, and its world lacks."""
     if world is None:
@@ -220,19 +203,9 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         sort = row.recording.names if row is not None and row.recording is not None else ""
         named.append((SORTS.get(sort, sort), element.text if sort in sorts else None, sorts.get(sort, [])))
         for what, text, known in named:
-            if isinstance(text, Regex) and not may_mean(text.pattern, known):
+            may_lack = what == "room" and rule.any_room
+            if isinstance(text, Regex) and not may_lack and not may_mean(text.pattern, known):
                 yield f'it names the {what} "{text.pattern}", which is not in this world'
 
 
 SORTS = {"object": "thing", "object or person": "thing or person"}
-
-
-def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may mean one of these labels; true also if it matches anything, or nothing."""
-    matches, texts = Regex(pattern).matches, samples(pattern)
-    return (
-        not texts
-        or matches("")
-        or matches("\uffff")
-        or any(matches(label) or any(found_in(label, text) for text in texts) for label in labels)
-    )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from codebotler.checking.rule_rooms import unknown_rooms_in
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import brief
@@ -44,6 +45,7 @@ class RuleFile(BaseModel):
     always: Text | None = None
     finally_: Annotated[Text | None, Field(alias="finally")] = None
     refuse: Annotated[bool, Field(strict=True)] = False
+    any_: Annotated[bool, Field(alias="any", strict=True)] = False
     for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
 
     def rule(self, file: YamlFile, at: Place, skills: SkillTable) -> Rule:
@@ -60,14 +62,14 @@ class RuleFile(BaseModel):
                 sentence = 'what holds "finally" cannot be refused; remove "refuse", or write "always"'
                 raise file.wrong(sentence, *at, "refuse")
             formula = self._formula(self.finally_ or "", file, (*at, "finally"), skills)
-            return Rule(self.name, self.says, formula, "finally")
+            return Rule(self.name, self.says, formula, "finally", any_room=self.any_)
         formula = self._formula(self.always, file, (*at, "always"), skills)
         if not holds(formula, ()):
             whenever = f'not tr.Last(goto(".*")) or {_bracketed(formula)}'
             sentence = f'the rule "{self.name}" is broken before anything has happened'
             mend = f'say when it counts, such as on each drive: {whenever}, or write "finally" for the end'
             raise file.wrong(f"{sentence}; {mend}", *at, "always")
-        return Rule(self.name, self.says, formula, "always", self.refuse)
+        return Rule(self.name, self.says, formula, "always", self.refuse, self.any_)
 
     def _formula(self, text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula:
         """The formula, or that of each name joined by `and`."""
@@ -87,15 +89,28 @@ class RulesFile(BaseModel):
     rules: Annotated[list[RuleFile], Field(min_length=1)]
 
 
-def read_rules(path: Path, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read a file of rules; a UserError names the line of what is wrong, and how to mend it."""
+def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = ()) -> tuple[Rule, ...]:
+    """Read a file of rules.
+
+    Args:
+        path: the file.
+        skills: those that its formulas may name.
+        rooms: all rooms of the house; none if they are unknown, and then rules may name any.
+
+    Raises:
+        UserError: something is wrong; it names the line, and how to mend it.
+    """
     file = YamlFile.read(path)
     forms = file.validate(RulesFile).rules
     names = [form.name for form in forms]
     for number, name in enumerate(names):
         if name in names[:number]:
             raise file.wrong(f'the rule "{name}" is listed twice; rename one', "rules", number, "name")
-    return tuple(form.rule(file, ("rules", number), skills) for number, form in enumerate(forms))
+    rules = tuple(form.rule(file, ("rules", number), skills) for number, form in enumerate(forms))
+    for number, rule in enumerate(rules):
+        for sentence in unknown_rooms_in(rule, rooms):
+            raise file.wrong(sentence, "rules", number, rule.when)
+    return rules
 
 
 def _parsed(text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula:

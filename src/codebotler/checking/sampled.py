@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -162,6 +163,10 @@ def _only_computed(sample: Sample) -> bool:
 # --- problems
 
 
+NO_ROOM = re.compile('there is no room "(?P<request>.*)"', re.DOTALL)
+"""The message of a simulated robot that is sent to an unknown room."""
+
+
 def failures(ran: Sequence[Sample], room_map: RoomMap) -> Iterator[Problem]:
     """One problem for the runs that ended at the same line in the same way, by the same rule if by one."""
     in_vain = all(sample.in_vain for sample in ran)
@@ -184,9 +189,8 @@ def _message(same: Sequence[Sample], ran: Sequence[Sample], room_map: RoomMap) -
         all_or_some = "each" if len(same) == len(ran) else str(len(same))
         often = f"in {all_or_some} of {len(ran)} imagined worlds " if same[0].draws else ""
         return f"the program never ends: {often}it reached a limit, {first.error.message}"
-    if first.error.kind == "GoToInvalidLocation" and first.trace and first.trace[-1].kind == "goto":
-        return no_room(first.trace[-1].text, room_map)
-    return first.error.message
+    found = NO_ROOM.fullmatch(first.error.message)
+    return no_room(found["request"], room_map) if found else first.error.message
 
 
 def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:

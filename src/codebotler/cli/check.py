@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -17,7 +16,6 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_BYTES, read_text, text_of
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import RunError
-from codebotler.core.words import room_name
 from codebotler.prompts.extract import program_in
 
 INPUT = "standard input"
@@ -131,19 +129,11 @@ def _kinds(found: Check) -> list[Sample]:
     return sorted(different.values(), key=rank)
 
 
-def _for_people(step: dict[str, Any]) -> dict[str, Any]:
-    """A step with the name that the place where robots start has on the page."""
-    names = {key: room_name(step[key]) for key in ("place", "to") if step.get(key)}
-    if step["kind"] == "goto":
-        names["text"] = room_name(step["text"])
-    return {**step, **names}
-
-
 def _sample(sample: Sample) -> Iterator[RenderableType]:
     where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
     yield Text.assemble(("what the robot would do", "bold"), where)
     steps = steps_of(sample.outcome.trace, has_places=True)
-    yield storyboard([_for_people(step) for step in steps], set())
+    yield storyboard(steps, set())
     if sample.outcome.error is not None:
         told = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
         yield Padding(Text(told, "red"), (0, 0, 0, 4))

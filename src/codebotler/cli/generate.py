@@ -9,9 +9,11 @@ from pathlib import Path
 from codebotler.core.files import Appender, expect_replaceable, to_line
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.terminal import busy, note, print_source, visible
+from codebotler.core.terminal import busy, note, print_source, shortened, visible
+from codebotler.core.words import brief
 from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore, write_checked_program
+from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.preflight import with_closest_here
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import NOTICE, UnknownInstructionError, is_recorded
@@ -19,6 +21,8 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
+
+MOST_SAID = 300  # characters of a reply without a program
 
 
 def write(
@@ -57,7 +61,8 @@ def write(
                 )
             except UnknownInstructionError as error:
                 raise with_closest_here(error, room_map) from None
-        print_source(made.program)
+        if made.programless is None:
+            print_source(made.program)
     if is_recorded(asked.name):
         note(NOTICE)
     return not made.problems
@@ -91,12 +96,22 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
 
 def _tell(attempt: Attempt, most: int) -> None:
     which = f"attempt {attempt.number + 1} of {most}" if most > 1 else "the program"
-    if attempt.problems:
+    if attempt.programless is not None:
+        tell_programless(attempt.programless, f"attempt {attempt.number + 1} of {most}: " if most > 1 else "")
+    elif attempt.problems:
         note(f"{which} has {'problems' if len(attempt.problems) > 1 else 'a problem'}:")
         for problem in attempt.problems:
             note(f"  {visible(problem)}")
     elif attempt.number:
         note(f"{which} is accepted")
+
+
+def tell_programless(none: ProgramlessReply, which: str = "") -> None:
+    """Say why there is no program, and what the reply says instead."""
+    hint = "" if none.higher_limit is None else f" --max-tokens {none.higher_limit} sets a higher limit."
+    note(f"{which}{visible(none.sentence)}{hint}")
+    if none.kind != "refusal" and none.text.strip():
+        note(f"  it says: {shortened(brief(none.text, MOST_SAID))}")
 
 
 def show(prompt: Prompt, model: str) -> None:

@@ -16,6 +16,9 @@ from codebotler.models.sampling import PAPER_MAX_TOKENS, SamplingSettings
 if TYPE_CHECKING:
     from codebotler.models.base import Model
 
+if TYPE_CHECKING:
+    from codebotler.models.batch import BatchModel  # which imports large libraries
+
 Command = TypeVar("Command", bound=Callable[..., object])
 
 TemperatureOption = Annotated[
@@ -112,7 +115,7 @@ def _json_object(text: str) -> dict[str, Any]:
     return value
 
 
-def note_unsent(asked: SamplingSettings, model: Model) -> None:
+def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
     """Say which settings a model does not take, so that they are not sent."""
     from codebotler.models.recorded import is_recorded
 

@@ -45,10 +45,10 @@ def run(
     """
     from codebotler.checking.rules import read_rules
     from codebotler.cli import run
+    from codebotler.cli.rules import rooms_of
     from codebotler.cli.run import Request
     from codebotler.core.files import home
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.world import World
     from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
     from codebotler.robots.base import Options
@@ -56,12 +56,13 @@ def run(
 
     chosen = chosen_model(model, base_url)
     table = skills_from(*(skills or ()))
-    house_rules = () if rules is None else read_rules(rules, table)
+    known = options.world_or_office(robot, world, table)
+    house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
     request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
     asked = chosen.with_its_server(model_settings(**sampling))
-    world = options.world_or_office(robot, world)
+    options.note_office(robot, world)
     settings = Options(
-        world=None if world is None else World.read(world, table),
+        world=known,
         speed=speed or None,
         address=address,
         ros_python=ros_python,
@@ -129,6 +130,7 @@ def serve_page(
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
     name: options.NameOption = None,
+    behind_proxy: options.BehindProxyOption = None,
     token: options.TokenOption = None,
     no_token: options.NoTokenOption = False,
     robot: options.RobotOption = "sim",
@@ -159,10 +161,10 @@ def serve_page(
     Ctrl-C ends it, which also stops the robot.
     """
     from codebotler.checking.rules import read_rules
+    from codebotler.cli.rules import rooms_of
     from codebotler.cli.run import tell_missing
     from codebotler.core.files import home
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.world import World
     from codebotler.models.chosen import chosen_model, opener
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
@@ -170,14 +172,15 @@ def serve_page(
     from codebotler.web.access import Access, Place
     from codebotler.web.console import Console
     from codebotler.web.frame import installed_pages
+    from codebotler.web.proxy import proxies_in_front
     from codebotler.web.server import serve
 
     table = skills_from(*(skills or ()))
-    house_rules = () if rules is None else read_rules(rules, table)
-    place = Place(host, port, tuple(name or ()))
-    access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
-    world = options.world_or_office(robot, world)
-    known = None if world is None else World.read(world, table)
+    known = options.world_or_office(robot, world, table)
+    house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
+    place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
+    access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
+    options.note_office(robot, world)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
     settings = Options(known, speed or None, address, ros_python, table)
     shown = Face(face_timeout) if face else None

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from codebotler import __version__
 from codebotler.core.terminal import note, print_text
+
+if TYPE_CHECKING:
+    from codebotler.core.skills.table import SkillTable
+    from codebotler.core.world import World
 
 
 def robot_names(incomplete: str) -> list[str]:
@@ -101,20 +105,37 @@ PortOption = Annotated[
 NameOption = Annotated[
     list[str] | None, typer.Option(help="Another host name for the page, besides its address.")
 ]
+BehindProxyOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Where a reverse proxy offers the page: https://HOST, with :PORT and /PATH if it has them; "
+        "may be given several times. By default the list behind_proxy of config.yaml.",
+        metavar="ADDRESS",
+    ),
+]
 TokenOption = Annotated[str | None, typer.Option(help="The token that opens the page; a new one by default.")]
 NoTokenOption = Annotated[
-    bool, typer.Option("--no-token", help="Let anyone on this machine in without a token; not with --host.")
+    bool,
+    typer.Option(
+        "--no-token",
+        help="Let anyone on this machine in without a token; not with --host or --behind-proxy.",
+    ),
 ]
 
 
-def world_or_office(robot: str, world: Path | None) -> Path | None:
-    """The world file that is named, or else an office for the simulated robot."""
+def world_or_office(robot: str, file: Path | None, skills: SkillTable) -> World | None:
+    """The world in the file that is named, or else an office for the simulated robot."""
+    from codebotler.core.world import World
     from codebotler.robots.simulated import OFFICE
 
-    if world is not None or robot != "sim":
-        return world
-    note("the robot works in an example office; --world FILE names another world")
-    return OFFICE
+    file = OFFICE if file is None and robot == "sim" else file
+    return None if file is None else World.read(file, skills)
+
+
+def note_office(robot: str, file: Path | None) -> None:
+    """Say that the simulated robot works in an office where no file names a world."""
+    if file is None and robot == "sim":
+        note("the robot works in an example office; --world FILE names another world")
 
 
 def command_line(name: str, about: str) -> typer.Typer:

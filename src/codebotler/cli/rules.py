@@ -10,7 +10,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from codebotler.checking.evasions import evasions
-from codebotler.checking.rule_review import Review, unknown_rooms_in
+from codebotler.checking.rule_review import Review
 from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
 from codebotler.core.skills.declaration import by_event
@@ -29,18 +29,24 @@ ASPECTS = {"always": "at any time", "finally": "at the end"}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """The rules in a file, if one is named, with remarks on what the world lacks and what evades them."""
-    rules = () if path is None else read_rules(path, skills)
-    for sentence in () if world is None else unknown_rooms_in(rules, [room.name for room in world.rooms]):
-        note(sentence)
+    """The rules in a file, if one is named, with remarks on what evades them.
+
+    Raises:
+        UserError: they cannot be read, or name a room that the world lacks.
+    """
+    rules = () if path is None else read_rules(path, skills, rooms_of(world))
     note_evasions(rules, world, skills)
     return rules
 
 
+def rooms_of(world: World | None) -> list[str]:
+    """The names of the rooms of a world; none without one."""
+    return [] if world is None else [room.name for room in world.rooms]
+
+
 def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable) -> None:
     """Say how programs could evade rules; UserError if one cannot hold in the rooms of the world."""
-    rooms = () if world is None else [room.name for room in world.rooms]
-    for sentence in evasions(rules, rooms, skills):
+    for sentence in evasions(rules, rooms_of(world), skills):
         note(sentence)
 
 

@@ -12,12 +12,14 @@ from pathlib import Path
 from codebotler.checking.check import check
 from codebotler.checking.problems import Check
 from codebotler.cli.check import check_view, read_program
+from codebotler.cli.generate import tell_programless
 from codebotler.cli.views import Watcher, ending, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.core.words import listed
 from codebotler.core.world import World
+from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.log import State
 from codebotler.missions.mission import GRACE, MissionError
 from codebotler.missions.session import MissionSession
@@ -101,8 +103,9 @@ def run(
     session.start()
     try:
         view = _prepared(session)
-        _show_check(view, request)
-        if _is_approved(session, view, robot, request):
+        if view.programless is not None:
+            _give_up(session, view.programless)
+        elif _is_accepted(session, view, robot, request):
             return _watched(session, view, robot, request)
     except BaseException as error:
         session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
@@ -115,7 +118,7 @@ def run(
 def tell_missing(robot: Robot) -> None:
     """Say what a robot lacks, as far as that is known before it is connected."""
     if robot.missing:
-        note(f"{robot.name} lacks {listed(list(robot.missing))}; programs that need them fail")
+        note(f"{robot.name} has no {listed(list(robot.missing))}; models read of its other skills only")
 
 
 def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], Check]:
@@ -130,7 +133,7 @@ def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ..
 def _prepared(session: MissionSession) -> SessionView:
     """Wait for a checked program, and show what goes on meanwhile."""
     view = session.view
-    while not (view.is_over or view.may_be_approved):
+    while not (view.is_over or view.may_be_approved or view.waits_for_program):
         before = view.busy
         with busy(before or "finishing"):
             view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]  # mypy does not infer such lambdas
@@ -139,6 +142,18 @@ def _prepared(session: MissionSession) -> SessionView:
     if session.error is not None:
         raise session.error
     return view
+
+
+def _give_up(session: MissionSession, none: ProgramlessReply) -> None:
+    """End a mission for which the model wrote no program."""
+    tell_programless(none)
+    session.reject(none.sentence)
+
+
+def _is_accepted(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
+    """Show the check, and have the program approved."""
+    _show_check(view, request)
+    return _is_approved(session, view, robot, request)
 
 
 def _show_check(view: SessionView, request: Request) -> None:

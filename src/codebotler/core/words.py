@@ -22,11 +22,6 @@ def times(number: int) -> str:
     return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number:,} times")
 
 
-def room_name(name: str) -> str:
-    """The name of a room for people: worlds call the place where the robot starts `start_loc`."""
-    return "start" if name == "start_loc" else name
-
-
 def brief(text: str, most: int = 70) -> str:
     """A text on one line, and cut where it is too long for a sentence."""
     line = " ".join(text.split())

@@ -13,6 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
+from codebotler.generation.no_program import ProgramlessReply, programless
 from codebotler.models.base import Heard, Model, Reply, unheard
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
@@ -34,6 +35,7 @@ class Attempt:
     prompt: Prompt = field(repr=False)  # for a repair, with the previous program and its problems
     reply: Reply = field(repr=False)
     problems: tuple[str, ...]  # one sentence each; empty if it was accepted, or not checked
+    programless: ProgramlessReply | None = None  # what there is to say where the reply holds no program
 
     def data(self, model: str) -> dict[str, Any]:
         """The attempt as a row of JSON."""
@@ -63,12 +65,17 @@ class Generation:
 
     @property
     def program(self) -> str:
-        """The program of the last attempt."""
-        return self.attempts[-1].reply.program
+        """The program of the last attempt; empty if its reply holds none."""
+        return "" if self.programless else self.attempts[-1].reply.program
+
+    @property
+    def programless(self) -> ProgramlessReply | None:
+        """What there is to say about the last reply where it holds no program."""
+        return self.attempts[-1].programless
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """The problems of that program."""
+        """The problems of that program, or why there is none."""
         return self.attempts[-1].problems
 
 
@@ -88,25 +95,39 @@ async def write_program(
 ) -> Generation:
     """Ask a model until the check accepts a program (rejection sampling; paper, section V); closes the model.
 
-    Each further request is another sample; as a repair, it holds the rejected program and its problems.
+    Each further request is another sample; as a repair, it holds the rejected program and its problems, or
+    why the reply holds none.
     """
     attempts: list[Attempt] = []
     limited, request = RateLimited(model, concurrency=1), prompt
     try:
         for number in range(retries + 1):
             reply = await limited.reply(request, number=number, heard=heard)
-            problems = (
-                () if problems_of is None else tuple(await asyncio.to_thread(problems_of, reply.program))
-            )
-            attempts.append(Attempt(number, request, reply, problems))
+            attempts.append(await _attempt(number, request, reply, model.settings, problems_of))
             tried(attempts[-1])
-            if not problems:
+            if not attempts[-1].problems:
                 break
             if repair:
-                request = prompt.after(reply.program, problems)
+                request = _repair(prompt, attempts[-1])
     finally:
         await model.close()
     return Generation(tuple(attempts))
+
+
+async def _attempt(
+    number: int, prompt: Prompt, reply: Reply, settings: SamplingSettings, problems_of: Checker | None
+) -> Attempt:
+    """A reply and its problems; one without a program has no other problem."""
+    if (none := programless(reply, settings)) is not None:
+        return Attempt(number, prompt, reply, (none.sentence,), none)
+    found = () if problems_of is None else await asyncio.to_thread(problems_of, reply.program)
+    return Attempt(number, prompt, reply, tuple(found))
+
+
+def _repair(prompt: Prompt, attempt: Attempt) -> Prompt:
+    if attempt.programless is not None:
+        return prompt.after_no_program(attempt.programless.sentence)
+    return prompt.after(attempt.reply.program, attempt.problems)
 
 
 def write_checked_program(

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
-from codebotler.core.words import room_name
 from codebotler.core.world import Point, Room
 
 Schema: TypeAlias = Mapping[str, Any]
@@ -155,7 +154,7 @@ def _entity(room: Room, time: int) -> Message:
         "font_size": LETTER_HEIGHT,
         "scale_invariant": False,
         "color": COLOR,
-        "text": room_name(room.name),
+        "text": room.name,
     }
     return {
         "timestamp": _time(time),

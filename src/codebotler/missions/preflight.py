@@ -8,6 +8,8 @@ from codebotler.checking.problems import no_room
 from codebotler.checking.room_names import named_rooms
 from codebotler.core.errors import RobotError
 from codebotler.core.program import called_skills, tree_of
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.live import answered
 from codebotler.models.recorded import UnknownInstructionError, closest_to, recorded_model
@@ -65,13 +67,13 @@ def rooms_to_check(room_map: RoomMap | None, remark: Callable[[str], None]) -> R
     return None
 
 
-def unknown_rooms(program: str, room_map: RoomMap) -> list[str]:
+def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) -> list[str]:
     """A sentence for each room that a program names and the robot does not know."""
 
     def is_part(name: str) -> bool:
         return any(name.casefold() in room.casefold() for room in room_map.rooms)
 
-    named = named_rooms(tree_of(program))
+    named = named_rooms(tree_of(program), skills)
     return [no_room(name, room_map) for name in named if room_map.room(name) is None and not is_part(name)]
 
 

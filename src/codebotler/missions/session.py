@@ -8,18 +8,18 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.checking.evasions import evasions
 from codebotler.checking.problems import Check
-from codebotler.checking.rule_review import unknown_rooms_in
+from codebotler.checking.rule_rooms import expect_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
-from codebotler.generation.generate import write_program
+from codebotler.generation.generate import Generation, write_program
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
@@ -31,6 +31,7 @@ from codebotler.missions.preflight import (
 )
 from codebotler.missions.view import CHECKING, Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
+from codebotler.models.open import open_model
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
@@ -41,6 +42,19 @@ from codebotler.simulator.worker import EngineError
 
 LOG = logging.getLogger("codebotler.missions")
 EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
+
+
+@dataclass(frozen=True)
+class Again:
+    """A person's wish for another program.
+
+    Args:
+        repair: whether the model is shown what was wrong before.
+        max_tokens: the limit for this reply and later ones; None for the last one.
+    """
+
+    repair: bool = False
+    max_tokens: int | None = None
 
 
 class MissionSession:
@@ -82,9 +96,11 @@ class MissionSession:
         self._events: list[Line] = []
         self._mission: Mission | None = None
         self._edited: str | None = None
-        self._ask_again: tuple[Sequence[str], ...] = ()
+        self._again: Again | None = None
+        self._max_tokens: int | None = None  # that a person has chosen
+        self._asked: Model | None = None  # the last one
         self._stopped_by: str | None = None
-        self._asking: tuple[asyncio.AbstractEventLoop, asyncio.Task[str]] | None = None
+        self._asking: tuple[asyncio.AbstractEventLoop, asyncio.Task[Generation]] | None = None
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
         self.on_event: Callable[[Line], None] = lambda _: None  # what it raises stops the robot
         self.error: Exception | None = None  # that ended it, once it is over
@@ -118,7 +134,7 @@ class MissionSession:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._edited = program
-            self._change(program=program, author="", busy=CHECKING, off=(), **UNCHECKED)
+            self._change(program=program, author="", busy=CHECKING, off=(), programless=None, **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
         """Leave out a rule for this program in this mission only, and check it again.
@@ -139,14 +155,18 @@ class MissionSession:
             self._edited = view.program
             self._change(off=(*view.off, name), busy=CHECKING, **UNCHECKED)
 
-    def ask_again(self, *, repair: bool) -> None:
-        """Have the model write another program; with `repair`, it is shown this one and its problems."""
+    def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
+        """Have the model write another program.
+
+        Args:
+            repair: whether it is shown this program with its problems, or why its reply holds none.
+            max_tokens: another limit for this reply and later ones, in tokens; None for the last one.
+        """
         with self._editing, self._lock:
-            view = self._view
-            if not view.may_be_asked_again:
+            if not self._view.may_be_asked_again:
                 raise MissionError("the model cannot be asked again now")
-            self._ask_again = (view.problems if repair else (),)
-            self._change(busy=f"asking {view.model}", is_written=True, off=())
+            self._again = Again(repair, max_tokens)
+            self._change(busy=f"asking {self._view.model}", is_written=True, reply="", off=())
 
     def approve(self, seen: str, *, despite_problems: bool = False) -> None:
         """Let the robot run the program that the person saw, which is named by its digest."""
@@ -233,75 +253,99 @@ class MissionSession:
             self._show(room_map=rooms_to_check(room_map, self._remark))
             rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
             regexes = () if room_map is None or room_map.plain else rooms
-            unknown = unknown_rooms_in(rules, rooms) if rooms else ()
-            for sentence in (*unknown, *evasions(rules, regexes, self._robot.skills)):
+            expect_rooms(rules, rooms)
+            for sentence in evasions(rules, regexes, self._robot.skills):
                 self._remark(sentence)
             if order.has_program:
                 self._take(mission, order.program)
             else:
-                self._ask(mission, ())
+                self._ask(mission, Again())
             while mission.state.is_open:
                 self._wait_for_a_person(mission)
             if mission.state is State.APPROVED:
+                self._note_warnings(mission)
                 with suppress(MissionError):  # it was stopped before it could run
                     mission.run(reserved, place, rules=self._view.rules_in_force, room_map=room_map)
+
+    def _note_warnings(self, mission: Mission) -> None:
+        """Log what speaks against the approved program; drafts before it had warnings of their own."""
+        for sentence in (*self._view.missing_skills, *self._view.unknown_rooms):
+            mission.note(f"before the robot moves: {sentence}")
 
     def _is_stopped(self) -> bool:
         return self._stopped_by is not None
 
     def _wait_for_a_person(self, mission: Mission) -> None:
         with self._lock:
-            self._lock.wait_for(
-                lambda: self._edited is not None or self._ask_again or mission.state is not State.CHECKED
-            )
-            edited, again = self._edited, self._ask_again
-            self._ask_again = ()
+            self._lock.wait_for(lambda: self._edited is not None or self._again or not mission.state.is_open)
+            edited, again = self._edited, self._again
+            self._again = None
         if not mission.state.is_open:
             return
         if again:
-            self._ask(mission, again[0])
+            self._ask(mission, again)
         elif edited is not None:
             self._take(mission, edited)
 
-    def _ask(self, mission: Mission, problems: Sequence[str]) -> None:
-        """Have the model write a program, and take it."""
-        name, before = self._view.model, self._view
-        self._show(busy=f"asking {name}", is_written=True, program="", trouble="", **UNCHECKED)
+    def _ask(self, mission: Mission, how: Again) -> None:
+        """Have the model write a program, and take it; without one, go on as before."""
+        before = self._view
+        self._show(
+            **UNCHECKED,
+            busy=f"asking {before.model}",
+            is_written=True,
+            program="",
+            reply="",
+            programless=None,
+            trouble="",
+        )
         try:
-            model = self._open_model(name)
-            program = asyncio.run(self._written(model, before.program, problems))
+            model = self._opened(how)
+            made = asyncio.run(self._written(model, before, how))
         except asyncio.CancelledError:
-            if before.program:
-                self._restore(before)
+            self._restore(before)
             return
         except UnknownInstructionError as error:
             mission.fail(_unknown(error))
             raise
         except (UserError, ModelError) as error:
-            if not before.program:
+            if not before.program and before.programless is None:
                 raise
             self._restore(before)
             self._show(trouble=visible(str(error)))
             return
+        if (none := made.programless) is not None:
+            mission.note(none.sentence)
+            self._restore(replace(before, programless=none))
+            return
         self._show(is_written=False, author=model.name)
-        self._take(mission, program)
+        self._take(mission, made.program)
+
+    def _opened(self, how: Again) -> Model:
+        """The model, with the limit that a person has chosen."""
+        self._max_tokens = how.max_tokens or self._max_tokens
+        if self._max_tokens is None or self._asked is None:
+            self._asked = self._open_model(self._order.model)
+        if self._max_tokens is not None:
+            settings = replace(self._asked.settings, max_tokens=self._max_tokens)
+            self._asked = open_model(self._asked.name, settings)
+        return self._asked
 
     def _restore(self, before: SessionView) -> None:
-        """Show the previous program: no other was written."""
-        kept = ("program", "author", "check", "missing_skills", "unknown_rooms")
-        self._show(**{name: getattr(before, name) for name in kept}, busy="", is_written=False)
+        """Show what was there before: no other program was written."""
+        kept = ("program", "author", "check", "missing_skills", "unknown_rooms", "programless")
+        self._show(**{name: getattr(before, name) for name in kept}, busy="", is_written=False, reply="")
 
-    async def _written(self, model: Model, before: str, problems: Sequence[str]) -> str:
-        rooms = () if self._view.room_map is None else self._view.room_map.rooms
+    async def _written(self, model: Model, before: SessionView, how: Again) -> Generation:
+        rooms = () if before.room_map is None else before.room_map.rooms
         rules = [rule.says for rule in self._view.rules_in_force]
-        prompt = prompt_for(self._order.instruction, rooms=rooms, rules=rules, skills=self._robot.skills)
-        if problems:
-            prompt = prompt.after(before, problems)
-
-        async def written() -> str:
-            return (await write_program(model, prompt, heard=self._heard)).program
-
-        task = asyncio.create_task(written())
+        skills = self._robot.skills.without(self._robot.missing)
+        prompt = prompt_for(self._order.instruction, rooms=rooms, rules=rules, skills=skills)
+        if how.repair and before.problems:
+            prompt = prompt.after(before.program, before.problems)
+        elif how.repair and before.programless is not None:
+            prompt = prompt.after_no_program(before.programless.sentence)
+        task = asyncio.create_task(write_program(model, prompt, heard=self._heard))
         self._asking = (asyncio.get_running_loop(), task)
         try:
             if self._is_stopped():
@@ -312,7 +356,7 @@ class MissionSession:
 
     def _heard(self, piece: str) -> None:
         with self._lock:
-            self._change(program=self._view.program + piece)
+            self._change(reply=self._view.reply + piece)
 
     def _take(self, mission: Mission, program: str) -> None:
         """Make a program the mission's, and check it."""
@@ -320,13 +364,14 @@ class MissionSession:
             if self._edited not in {None, program}:
                 return  # another one was typed meanwhile
             self._edited = None
-            self._change(program=program, busy=CHECKING, trouble="", **UNCHECKED)
+            self._change(program=program, busy=CHECKING, trouble="", reply="", programless=None, **UNCHECKED)
             view = self._view
         try:
             mission.draft(program, view.author)
             check = self._check(program, view.room_map, view.rules_in_force)
             missing = tuple(missing_skills(program, self._robot))
-            unknown = unknown_rooms(program, view.room_map) if view.room_map and not check.problems else ()
+            known = None if check.problems else view.room_map
+            unknown = unknown_rooms(program, known, self._robot.skills) if known else ()
             checked = replace(
                 view, check=check, missing_skills=missing, unknown_rooms=tuple(unknown), busy=""
             )
@@ -335,8 +380,6 @@ class MissionSession:
             if not mission.has_ended:
                 raise
             return
-        for sentence in (*missing, *unknown):
-            mission.note(f"before the robot moves: {sentence}")
         with self._lock:
             if self._edited is None:
                 names = (*UNCHECKED, "busy")

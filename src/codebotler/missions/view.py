@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from codebotler.checking.problems import Check
+from codebotler.generation.arriving import ArrivingReply, arriving
+from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
@@ -18,7 +20,7 @@ UNREADABLE = frozenset({"SyntaxError", "IndentationError", "TabError"})
 
 CHECKING = "checking"  # what a session is busy with
 
-Phase: TypeAlias = State | Literal["", "starting", "writing", "checking"]
+Phase: TypeAlias = State | Literal["", "starting", "writing", "checking", "no-program"]
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,9 @@ class SessionView:
     known: tuple[str, ...] | None = None  # by the model, where it does not know this instruction
     instruction: str = ""
     model: str = ""  # its name; empty where none may be asked
-    program: str = ""  # while a model writes, as much as has arrived
+    program: str = ""
+    reply: str = ""  # while a model writes, as much as has arrived
+    programless: ProgramlessReply | None = None  # the model's last reply, if that holds no program
     author: str = ""  # the model that wrote it; empty if a person did
     is_written: bool = False  # whether a model is writing now
     check: Check | None = None  # of this very program
@@ -88,6 +92,11 @@ class SessionView:
         return self.check is None or not any(one.kind in UNREADABLE for one in self.check.problems)
 
     @property
+    def arriving(self) -> ArrivingReply:
+        """The reply that a model is writing, as much as has arrived."""
+        return arriving(self.reply)
+
+    @property
     def digest(self) -> str:
         """Names this program and no other, for those who approve it."""
         return digest(self.program)
@@ -101,6 +110,8 @@ class SessionView:
             return "writing"
         if self.busy == CHECKING:
             return "checking"
+        if self.waits_for_program:
+            return "no-program"
         return "starting" if self.busy or self.state is None else self.state
 
     @property
@@ -114,9 +125,16 @@ class SessionView:
         return self.state is State.CHECKED and not self.is_over and not self.busy
 
     @property
+    def waits_for_program(self) -> bool:
+        """Whether a person has to go on, since a model has replied without a program."""
+        is_open = self.state is State.DRAFTING and not self.is_over and not self.busy
+        return is_open and self.programless is not None
+
+    @property
     def may_be_asked_again(self) -> bool:
         """Whether the model can write another program."""
-        return self.may_be_approved and bool(self.instruction and self.model)
+        is_waiting = self.may_be_approved or self.waits_for_program
+        return is_waiting and bool(self.instruction and self.model)
 
     @property
     def may_be_edited(self) -> bool:

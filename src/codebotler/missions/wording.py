@@ -11,7 +11,7 @@ from codebotler.core.skills.table import Recording
 from codebotler.core.skills.values import as_text, written_call
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import trace_from
-from codebotler.core.words import brief, room_name
+from codebotler.core.words import brief
 from codebotler.missions.log import Line, Summary
 from codebotler.rtl.wording import event_words
 
@@ -36,7 +36,7 @@ def activity(line: Line) -> str:
         return skill.verb.ing
     if skill.recording.more or skill.verb.object or not skill.recording.text:
         return skill.verb.with_object(skill.verb.ing, _given(skill.recording, line))
-    text = shortened(room_name(as_text(line["arguments"][skill.recording.text])), 100)
+    text = shortened(as_text(line["arguments"][skill.recording.text]), 100)
     if skill.recording.is_drive:
         return f"driving to {text}"
     return f'{skill.verb.ing} "{text}"' if skill.recording.is_spoken else f"{skill.verb.ing} {text}"
@@ -53,6 +53,11 @@ def state_text(state: str, reason: str) -> str:
     if not reason or reason.startswith(state):
         return shortened(reason) or state
     return f"{state}: {shortened(reason)}"
+
+
+def reason_text(reason: str, line: int | None) -> str:
+    """Why a mission ended, with the line of the program if one is to blame."""
+    return reason if line is None else f"line {line}: {reason}"
 
 
 def title(summary: Summary) -> str:
@@ -85,7 +90,7 @@ def _skill(line: Line) -> str:
     if skill.recording.more or skill.verb.object or not skill.recording.text:
         return skill.verb.with_object(skill.verb.third, _given(skill.recording, line))
     text = as_text(arguments[skill.recording.text])
-    words = f'{skill.verb.third} "{shortened(room_name(text) if skill.recording.is_drive else text)}"'
+    words = f'{skill.verb.third} "{shortened(text)}"'
     options = arguments.get(skill.recording.options or "")
     return f"{words} [{shortened(' | '.join(options))}]" if options else words
 
@@ -98,9 +103,9 @@ def _result(line: Line) -> str:
             skill = by_name(line["skill"])
             return f"→ {skill.verb.results[result]}" if skill and skill.verb else f"→ {result}"
         case list(texts):
-            return f"→ {shortened(', '.join(room_name(str(text)) for text in texts))}"
+            return f"→ {shortened(', '.join(map(str, texts)))}"
         case result:
-            return f"→ {shortened(room_name(str(result)))}"
+            return f"→ {shortened(str(result))}"
 
 
 def _rule(line: Line) -> str:

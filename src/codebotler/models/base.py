@@ -103,7 +103,8 @@ def reply_from(
     found = read_reply(
         answer if opening is None else opening.program_from(answer), continues=opening is not None
     )
-    why = why_no_program(found.program, finish_reason, has_code=found.has_code and has_answer, said=said)
+    has_code = found.has_code and has_answer
+    why = why_no_program(text, found.program, finish_reason, has_code=has_code, said=said)
     thoughts = "\n".join(filter(None, (reasoning, found.reasoning)))
     return Reply(text, found.program, usage, latency_s, finish_reason, thoughts, why)
 

@@ -50,14 +50,20 @@ class ChatModel:
     """A chat model, named `provider:model` as in pydantic-ai.
 
     With a base URL `openai:` means `openai-chat:`, for hardly any other server has the Responses API.
+
+    Args:
+        name: of the model.
+        settings: the settings of its requests.
+        http_client: the client that sends them, of the library that the provider uses; one of its own by
+            default.
     """
 
-    def __init__(self, name: str, settings: SamplingSettings) -> None:
+    def __init__(self, name: str, settings: SamplingSettings, http_client: object = None) -> None:
         provider, _, model = name.partition(":")
         if provider == "openai" and settings.base_url is not None:
             name = f"{OWN_SERVER}:{model}"
         self.name = name
-        self._model = _model(name, settings)
+        self._model = _model(name, settings, http_client)
         self.settings = taken_settings(self._model, name, settings)
         self._asked = _request_settings(self._model, self.settings)
         guard_logs()
@@ -250,7 +256,7 @@ def _request_settings(model: Model, settings: SamplingSettings) -> ModelSettings
 # --- opening
 
 
-def _model(name: str, settings: SamplingSettings) -> Model:
+def _model(name: str, settings: SamplingSettings, http_client: object) -> Model:
     provider = name.partition(":")[0]
     try:
         variables = _key_variables(provider)
@@ -259,7 +265,10 @@ def _model(name: str, settings: SamplingSettings) -> Model:
         with blank_is_unset(variables):
             with without_proxy(settings.base_url):
                 model = infer_model(
-                    name, lambda wanted: _bounded(_provider(wanted, settings.base_url), name, settings)
+                    name,
+                    lambda wanted: _bounded(
+                        _provider(wanted, settings.base_url, http_client), name, settings
+                    ),
                 )
             if settings.base_url is not None and isinstance(model, OpenAIChatModel):
                 # Own servers know `max_tokens`, and many of them ignore OpenAI's newer name for it.
@@ -295,7 +304,7 @@ def _unknown(provider: str) -> str:
     return f'there is no provider "{provider}"; {mend}'
 
 
-def _provider(name: str, base_url: str | None) -> Provider[object]:
+def _provider(name: str, base_url: str | None, http_client: object) -> Provider[object]:
     if base_url is None:
         return infer_provider(name)
     made: Callable[..., Provider[object]] = infer_provider_class(name)
@@ -303,7 +312,9 @@ def _provider(name: str, base_url: str | None) -> Provider[object]:
         raise UserError(
             f'the provider "{name}" takes no base URL; for a server of your own use {OWN_SERVER}:MODEL'
         )
-    return made(base_url=base_url)
+    return (
+        made(base_url=base_url) if http_client is None else made(base_url=base_url, http_client=http_client)
+    )
 
 
 def _bounded(provider: Provider[object], name: str, settings: SamplingSettings) -> Provider[object]:

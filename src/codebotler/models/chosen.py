@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
@@ -45,9 +45,16 @@ class ConfigFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    model: Annotated[str, Field(min_length=1)]
+    model: Annotated[str, Field(min_length=1)] = RECORDED
     base_url: str | None = None
     max_tokens: Annotated[int, Field(ge=1)] | None = None
+    behind_proxy: tuple[str, ...] = ()  # where a reverse proxy offers the page
+
+    @model_validator(mode="after")
+    def _has_a_model_for_its_settings(self) -> Self:
+        if self.model_fields_set & {"base_url", "max_tokens"} and "model" not in self.model_fields_set:
+            raise ValueError("base_url and max_tokens belong to a model; name it as model:")
+        return self
 
 
 def chosen_model(name: str | None = None, base_url: str | None = None) -> ChosenModel:
@@ -62,7 +69,7 @@ def chosen_model(name: str | None = None, base_url: str | None = None) -> Chosen
     if name is not None and is_recorded(name):
         return ChosenModel(name, base_url)
     file = config_file()
-    config = ConfigFile(model=RECORDED)
+    config = ConfigFile()
     if file is not None and file.is_file():
         config = YamlFile.read(file).validate(ConfigFile)
     name = name or os.environ.get(VARIABLE, "").strip() or config.model

@@ -6,6 +6,7 @@ import asyncio
 import json
 import time
 
+import httpx2
 import openai
 from pydantic_ai.exceptions import ModelHTTPError
 
@@ -35,7 +36,9 @@ NO_MONEY = "insufficient_quota"  # a 429 that no waiting mends
 class CompletionsModel:
     """A base model on a server, which continues a text."""
 
-    def __init__(self, model: str, settings: SamplingSettings) -> None:
+    def __init__(
+        self, model: str, settings: SamplingSettings, http_client: httpx2.AsyncClient | None = None
+    ) -> None:
         self.name = f"completions:{model}"
         key = key_in(KEY)
         if settings.base_url is None and not key:
@@ -43,7 +46,7 @@ class CompletionsModel:
         self.model, self.settings = model, settings.for_base_model(self.name)
         try:
             with without_proxy(settings.base_url):
-                client = openai.DefaultAsyncHttpxClient()
+                client = http_client or openai.DefaultAsyncHttpxClient()
         except Exception as error:  # noqa: BLE001 - of wrong proxies and certificates
             raise cannot_open(self.name, error) from None
         self.client = make_lenient(

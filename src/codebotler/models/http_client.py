@@ -15,7 +15,7 @@ from urllib.request import getproxies, proxy_bypass
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
 from codebotler.models.keys import redacted
-from codebotler.models.server_errors import error_in_reply, failure, told
+from codebotler.models.server_errors import FIRST_ERROR, error_in_reply, failure, told
 
 Client = TypeVar("Client", bound=Any)  # of httpx or httpx2, which share no type
 
@@ -25,7 +25,6 @@ UNKNOWN_TOKENS = 100_000  # for which room is left where no limit is set
 NO_PROXY = ("NO_PROXY", "no_proxy")
 CERTIFICATES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 ENDPOINTS = ("/chat/completions", "/completions", "/responses", "/messages")
-FIRST_ERROR = 400
 
 
 def limit_of(max_tokens: int | None) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, TypeAlias, get_args
 
+from codebotler.core.unicode import composed
 from codebotler.prompts.extract import defines_task
 from codebotler.simulator.isolated_call import IsolatedCallError
 
@@ -39,13 +40,20 @@ def is_cut_off(finish_reason: str | None) -> bool:
 
 
 def why_no_program(
-    program: str, finish_reason: str | None, *, has_code: bool, said: NoProgram | None = None
+    reply: str | None,
+    program: str,
+    finish_reason: str | None,
+    *,
+    has_code: bool,
+    said: NoProgram | None = None,
 ) -> NoProgram | None:
     """Why a reply holds no program; None if it holds one, or something that may be meant as one.
 
-    A reply that was cut off behind a whole program holds one.
+    A reply that was cut off behind a whole program holds one. A program up to whose end it was cut off is not
+    whole, even if it parses.
 
     Args:
+        reply: the text; None if nobody recorded it.
         program: what was taken for the program.
         finish_reason: why the reply ended, as the server said it; None if it said nothing.
         has_code: whether there is any code in the reply.
@@ -55,11 +63,16 @@ def why_no_program(
         EngineError: no isolated process can be started.
     """
     kind = said or _BY_REASON.get((finish_reason or "").lower())
-    if kind is not None and not (program.strip() and _is_whole(program)):
+    is_open = kind == "cut-off" and reply is not None and _last_line(reply) == _last_line(program)
+    if kind is not None and (is_open or not program.strip() or not _is_whole(program)):
         return kind
     if has_code or kind is not None:
         return None
     return "no-code" if program.strip() else "empty"
+
+
+def _last_line(text: str) -> str:
+    return composed(text).rstrip().rpartition("\n")[2].strip()
 
 
 def _is_whole(program: str) -> bool:

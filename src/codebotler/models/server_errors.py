@@ -9,7 +9,7 @@ from codebotler.core.words import brief
 from codebotler.models.base import ModelError
 from codebotler.models.keys import redacted
 
-SUCCESS, SERVER_ERROR = 299, 500
+SUCCESS, FIRST_ERROR, SERVER_ERROR = 299, 400, 500
 LATER = (408, 409, 425, 429)  # the statuses below 500 that may pass
 MENDS = {
     401: "; is the right key in the environment?",

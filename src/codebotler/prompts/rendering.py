@@ -14,7 +14,7 @@ from string import Template
 from typing import Literal
 
 from codebotler.core.errors import UserError, expect_list
-from codebotler.core.program import TASK, Flaw, parsed
+from codebotler.core.program import TASK, Flaw, called_skills, parsed, tree_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.unicode import composed
@@ -47,6 +47,7 @@ class Example:
 
     instruction: str
     program: str
+    skills: frozenset[str]  # that the program calls
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,16 @@ class Prompt:
             messages=(*self.messages, answer, repair),
             text=self.text.removesuffix(self.opening) + text + "\n",
         )
+
+    def after_no_program(self, why: str) -> Prompt:
+        """The request once more after a reply without a program; base models get the same one again.
+
+        Args:
+            why: what was wrong with the reply, in a sentence.
+        """
+        *before, request = self.messages
+        asked = f"{request.text}\n\n{_filled('no-program', why=why)}"
+        return replace(self, messages=(*before, replace(request, text=asked)))
 
     def program_from(self, reply: str) -> str:
         """The program in a base model's continuation of `text`, without whatever follows it."""
@@ -113,7 +124,7 @@ def prompt_for(
         instruction: what the robot is to do, in plain words.
         rooms: the names of all rooms, if they are known.
         rules: what every program must keep to, in sentences.
-        skills: the skills that a program may call.
+        skills: the skills that a program may call; examples that call others are left out.
 
     Raises:
         UserError: the instruction is empty, or the rooms are a single text.
@@ -124,7 +135,7 @@ def prompt_for(
     about_rules = _filled("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
     wish = "\n\n".join(filter(None, (instruction, about_rooms, about_rules)))
     stubs = [stub(skill) for skill in skills.values()]
-    shown = examples()
+    shown = [example for example in examples() if example.skills <= skills.keys()]
     messages = [Message("system", _filled("system", skills="\n\n".join(stubs)))]
     for example in shown:
         messages.append(Message("user", example.instruction))
@@ -162,7 +173,10 @@ def examples() -> tuple[Example, ...]:
     """The examples in the order of their files."""
     files = (path.read_text(encoding="utf-8") for path in sorted((FOLDER / "examples").glob("*.txt")))
     parts = (text.partition("\n\n") for text in files)
-    return tuple(Example(instruction, program) for instruction, _, program in parts)
+    return tuple(
+        Example(instruction, program, frozenset(called_skills(tree_of(program))))
+        for instruction, _, program in parts
+    )
 
 
 @cache

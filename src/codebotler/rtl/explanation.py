@@ -19,7 +19,7 @@ from codebotler.rtl.semantics import (
     narrowed,
     scoped,
 )
-from codebotler.rtl.wording import deed, few, happening, inside, is_any, is_plain, room, verb
+from codebotler.rtl.wording import deed, few, happening, is_any, is_plain, room, verb
 
 
 @dataclass(frozen=True)
@@ -153,8 +153,8 @@ def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
     at = next(at for at in _positions(test, trace) if matches(test.element, trace, at))
     element = replace(test.element, place=None)
     done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
-    place = "" if test.element.place is None else f" {inside(room(formulas.Regex(test.element.place)))}"
-    stay = f" {inside(room(test.arrival.text))}" if isinstance(test, _AtPlace) else ""
+    place = "" if test.element.place is None else f" in {room(formulas.Regex(test.element.place))}"
+    stay = f" in {room(test.arrival.text)}" if isinstance(test, _AtPlace) else ""
     step = f"{place}{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
     where = _where(test.scopes, trace, is_true=True)
     if is_plain(element):
@@ -192,7 +192,7 @@ def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
     visits = arrivals[:1] if first else arrivals
     rooms = dict.fromkeys(happening(trace[at], test.arrival) for at in visits)
     failed = f"did not {deed(element, 'base', negated=True, when=f' {there}', where=where)}"
-    stay = f" {inside(room(test.arrival.text))}"
+    stay = f" in {room(test.arrival.text)}"
     short = f"did not {deed(element, 'base', negated=True, when=stay, where=where)}"
     text = f"went to {listed(few([*rooms]))} at {_steps(visits)} but {failed}"
     return _Fact(arrivals[0] if event is None else event, text, detail=detail, short=short)

@@ -44,7 +44,7 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False, when: str 
     is_open = is_any(element.text) and is_any(element.options)
     means = None if is_open and element.answer is None else element.means
     if element.place is not None:
-        when = f" {inside(room(Regex(element.place)))}{when}"
+        when = f" in {room(Regex(element.place))}{when}"
     if means is not None and means.startswith(_CLAUSES):
         return f"{getattr(verb(element.kind), form)}{when}{where and f',{where},'} {means}"
     if means is not None and negated:
@@ -164,7 +164,7 @@ def happening(event: Event, element: EventPattern) -> str:
         thing += f" of {quoted(event.to or '')}"
     if element.holding is not None:
         thing += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
-    return f"{thing} {inside(room_name(event.place))}" if element.place is not None and event.place else thing
+    return f"{thing} in {room_name(event.place)}" if element.place is not None and event.place else thing
 
 
 def _offered(event: Event, element: EventPattern) -> str:
@@ -176,7 +176,7 @@ def _offered(event: Event, element: EventPattern) -> str:
 
 def event_words(event: Event) -> str:
     """What a robot does, such as `driving to "kitchen"`, and what has come of it if that is known."""
-    text = words.room_name(event.text) if event.kind == "goto" else event.text
+    text = event.text
     if event.answer is not None:
         return f"the answer {quoted(event.answer)} to {quoted(text)}"
     doing = verb(event.kind)
@@ -224,13 +224,8 @@ def room(text: Text, article: str = "a") -> str:
 
 def room_name(name: str) -> str:
     """The name of a room, with an article if it is a common noun."""
-    short = words.room_name(brief(name))
+    short = brief(name)
     return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", short) else short or '""'
-
-
-def inside(place: str) -> str:
-    """Where something happens: `in the lobby`, but `at the start`."""
-    return f"{'at' if place.startswith('the start') else 'in'} {place}"
 
 
 def described(text: Text) -> str:

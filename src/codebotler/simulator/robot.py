@@ -160,7 +160,7 @@ class SimulatedRobot:
 
     def drive(self, location: str) -> None:
         """Drive to the first room whose name is found in the request."""
-        room = resolve_room(self.rooms, location, self.rules.matching)
+        room = self.room_for(location)
         if self.rules.events == "as-requested":
             self.record("goto", location, destination=room)
         elif room is not None:
@@ -168,6 +168,10 @@ class SimulatedRobot:
         if room is None:
             raise no_room(location)
         self.room = room
+
+    def room_for(self, request: str) -> str | None:
+        """The first room whose name is found in a request; None if there is no such room."""
+        return resolve_room(self.rooms, request, self.rules.matching)
 
     def look(self, entity: str) -> bool:
         """Look for an object, else for a person; who was not there may come after looks in vain."""
@@ -299,6 +303,8 @@ class SimulatedRobot:
         is_tried = row.recording is not None and row.recording.when_tried
         if event is not None and is_tried:
             self.events.append(event)
+        if event is not None and row.is_drive and self.room_for(event.text) is None:
+            raise no_room(event.text)
         self._at_work = row
         result: Result = called(row, self, arguments)
         if event is not None:

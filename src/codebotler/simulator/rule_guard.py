@@ -32,6 +32,7 @@ class Rule:
         formula: the rule as a formula.
         when: `always`, of every prefix of a trace, or `finally`, when the mission ends.
         refuse: whether the program goes on without what it was refused; else the mission ends.
+        any_room: whether it may name rooms that a house lacks.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Rule:
     formula: Formula
     when: Literal["always", "finally"] = "always"
     refuse: bool = False
+    any_room: bool = False
 
 
 class RuleViolationError(RobotError):

@@ -269,11 +269,15 @@ class SampledRobot(SimulatedRobot):
 
     def drive(self, location: str) -> None:
         """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
-        room = self.room_map.room(location)
+        room = self.room_for(location)
         self.record("goto", location, destination=room)
         if room is None:
             raise no_room(location)
         self.room = room
+
+    def room_for(self, request: str) -> str | None:
+        """The room that a request finds, which may be one that nobody ever named."""
+        return self.room_map.room(request)
 
     def look(self, entity: str) -> bool:
         """Look for an object or for somebody; whether they are there is drawn at the first look."""

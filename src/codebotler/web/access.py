@@ -10,11 +10,12 @@ import secrets
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
 from codebotler.core.errors import UserError
+from codebotler.web.proxy import OuterAddress, by_host
 
 TRIES, WINDOW = 10, 60.0
 """How many wrong tokens may come from an address in so many seconds."""
@@ -54,11 +55,12 @@ class Access:
 
     @classmethod
     def asked_for(
-        cls, operator: str | None, face: str | None, *, open_to_all: bool, is_loopback: bool
+        cls, operator: str | None, face: str | None, *, open_to_all: bool, is_private: bool
     ) -> Access:
         """The tokens that a user chose, and new ones for None; UserError if they let in too many people."""
-        if open_to_all and (operator or face or not is_loopback):
-            raise UserError("--no-token works on this machine only; leave out --host and all tokens")
+        if open_to_all and (operator or face or not is_private):
+            others = "--host, --behind-proxy and all tokens"
+            raise UserError(f"--no-token works on this machine only; leave out {others}")
         if any(token is not None and len(token) < SHORTEST_TOKEN for token in (operator, face)):
             raise UserError(f"this token is too short; use {SHORTEST_TOKEN} characters or more, or none")
         if operator is not None and operator == face:
@@ -110,6 +112,7 @@ class GuardRules:
     hosts: frozenset[str] = LOOPBACK  # names of the page, without ports
     any_address: bool = False  # whether numeric addresses are accepted besides, as from other machines
     cookie: str = "codebotler"  # its name, another one for each port
+    proxies: Mapping[str, OuterAddress] = field(default_factory=dict)  # in front, by what `Host` says
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,7 @@ class Place:
     host: str = "127.0.0.1"
     port: int | None = None  # 0 takes any free one, None the first of `PORTS` that is free
     names: tuple[str, ...] = ()  # further names of the page
+    proxies: tuple[OuterAddress, ...] = ()  # where a reverse proxy offers it
 
     @property
     def is_loopback(self) -> bool:
@@ -127,6 +131,11 @@ class Place:
             return ipaddress.ip_address(self.host).is_loopback
         except ValueError:
             return self.host in LOOPBACK
+
+    @property
+    def is_private(self) -> bool:
+        """Whether no other machine can reach it, not even through a proxy."""
+        return self.is_loopback and not self.proxies
 
     def listening(self) -> socket.socket:
         """An open socket there."""
@@ -160,9 +169,10 @@ class Place:
 
     def rules(self, access: Access, port: int) -> GuardRules:
         """The guard's rules for this address."""
-        named = {name.lower() for name in (self.host, *self.names)}
+        named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
         hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
-        return GuardRules(access, frozenset(hosts), not self.is_loopback, f"codebotler-{port}")
+        cookie, proxies = f"codebotler-{port}", by_host(self.proxies)
+        return GuardRules(access, frozenset(hosts), not self.is_loopback, cookie, proxies)
 
 
 def _taken(ports: Sequence[int]) -> str:

@@ -61,7 +61,14 @@ class Approval(_Form):
 class Again(_Form):
     """A request for another program."""
 
-    repair: bool = Field(default=False, description="Whether to send the model the program and its problems.")
+    repair: bool = Field(
+        default=False,
+        description="Whether to send the model the program and its problems.",
+    )
+    max_tokens: Annotated[int, Field(ge=0)] = Field(
+        default=0,
+        description="Another limit for replies, such as `higher_limit` of `no_program`; 0 for none.",
+    )
 
 
 class AnyText(JSONResponse):
@@ -153,7 +160,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         """Have the model write another program, which is then checked."""
         session = _at_hand(console, mission)
         with _refusing():
-            session.ask_again(repair=again.repair)
+            session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")
@@ -203,8 +210,13 @@ def _add_rest(api: APIRouter, console: Console) -> None:
         once_over: Annotated[
             bool, Query(description="Wait for the end of the mission, at most 15 s.")
         ] = False,
+        once_begun: Annotated[
+            bool, Query(description="Wait for the beginning of a mission, at most 15 s.")
+        ] = False,
     ) -> dict[str, Any]:
         """The robot, its skills and its mission."""
+        if once_begun:
+            await console.view_begun()
         view = await console.view_over() if once_over else console.view
         return {
             "robot": console.robot.name,
@@ -248,9 +260,10 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "instruction": view.instruction,
         "model": view.model,
         "author": view.author,
-        "program": view.program,
+        "program": view.arriving.code if view.is_written else view.program,
         "digest": view.digest,
         "is_written": view.is_written,
+        "no_program": None if view.programless is None else asdict(view.programless),
         "problems": list(view.problems),
         "unknown_rooms": list(view.unknown_rooms),
         "remarks": list(view.remarks),

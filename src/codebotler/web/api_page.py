@@ -13,17 +13,18 @@ from fastapi import FastAPI, Request
 from fastapi.responses import HTMLResponse
 
 from codebotler.web.frame import BAR, HEAD, Frame
+from codebotler.web.proxy import prefix_of
 
 PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>API · {brand}</title>
-{head}<link rel="stylesheet" href="/static/api.css"></head><body>
-<header class="{bar}"><a class="brand" href="/">{brand}</a>
+{head}<link rel="stylesheet" href="{prefix}/static/api.css"></head><body>
+<header class="{bar}"><a class="brand" href="{prefix}/">{brand}</a>
 <nav class="pages" aria-label="Pages">{links}</nav></header>
 <main class="api"><h1>The API</h1>
 <p>The API does everything that the page does. Each request must send the token: set <code>TOKEN</code> to
 the text after <code>token=</code> in the link that was printed when the server started, and paste the
 commands below into a terminal. The machine-readable description is
-<a href="/api/openapi.json">openapi.json</a>.</p>
+<a href="{prefix}/api/openapi.json">openapi.json</a>.</p>
 {calls}</main>{stop}</body></html>"""
 
 EXAMPLES: dict[str, object] = {
@@ -44,11 +45,13 @@ def add(app: FastAPI, frame: Frame) -> None:
 
     @app.get("/api", include_in_schema=False)
     def page(request: Request) -> HTMLResponse:
-        links = "".join(f'<a href="{address}">{escape(name)}</a>' for name, address in frame.links)
+        prefix = prefix_of(request.scope)
+        links = "".join(f'<a href="{prefix}{address}">{escape(name)}</a>' for name, address in frame.links)
         calls = "".join(_calls(app.openapi(), str(request.base_url).rstrip("/")))
         bar, stop = ("bar", BAR) if frame.has_robot else ("bar no-stop", "")
-        shown = PAGE.format(brand=frame.brand, head=HEAD, bar=bar, links=links, calls=calls, stop=stop)
-        return HTMLResponse(shown)
+        head, stop = (part.format(prefix=prefix) for part in (HEAD, stop))
+        parts = {"brand": frame.brand, "head": head, "bar": bar, "links": links, "calls": calls, "stop": stop}
+        return HTMLResponse(PAGE.format(prefix=prefix, **parts))
 
 
 def _calls(about: dict[str, Any], site: str) -> Iterator[str]:

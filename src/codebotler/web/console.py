@@ -93,6 +93,11 @@ class Console:
         await self.notifier.until(lambda: self.view.is_over, QUIET)
         return self.view
 
+    async def view_begun(self) -> SessionView:
+        """What all viewers see once a mission goes on, or after some seconds."""
+        await self.notifier.until(lambda: not self.view.is_over, QUIET)
+        return self.view
+
     def begin(self, order: Order) -> MissionSession:
         """Begin a mission, by default with the first model.
 

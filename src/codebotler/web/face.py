@@ -27,7 +27,7 @@ POLICY = (
 """Stricter than that of other pages, since there is no NiceGUI: no script can turn a text into markup."""
 
 STOPS = "a person at the face"
-BACK = '<a id="back" href="/">Operate the robot</a>'
+BACK = '<a id="back" href="./">Operate the robot</a>'
 PLACE_OF_BACK = "<!-- back -->"  # for those who may operate
 MOST_TEXT, MOST_OPTION, MOST_OPTIONS = 2_000, 300, 50
 """Characters and options that people can read on a screen."""
@@ -53,11 +53,13 @@ def router(console: Console, face: Face) -> APIRouter:
         return HTMLResponse(shown, headers=headers)
 
     @here.get("/api/face")
-    async def show(*, once_over: bool = False) -> dict[str, Any]:
+    async def show(*, once_over: bool = False, once_begun: bool = False) -> dict[str, Any]:
         """What the face shows: what the robot does, says and asks; with `once_over` after the mission.
 
         `question` has the number to answer.
         """
+        if once_begun:
+            await console.view_begun()
         if once_over:
             await console.view_over()
         return face_data(console, face)

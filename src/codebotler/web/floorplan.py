@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from html import escape
 
 from codebotler.core.terminal import shortened
-from codebotler.core.words import room_name
 from codebotler.core.world import Point, Room, World, laid_out
 
 MARGIN = 0.6
@@ -45,10 +44,10 @@ class MapState:
         """The same in words."""
         where = "is between rooms" if self.at else ""
         if self.room:
-            where = f"{'is driving to' if self.is_driving else 'is in'} {room_name(self.room)}"
+            where = f"{'is driving to' if self.is_driving else 'is in'} {self.room}"
         holds = f" and is holding {self.held}" if self.held else ""
         parts = [f"The robot {where}{holds}." if where else "The robot's position is unknown."]
-        parts += [f"Found in {room_name(room)}: {', '.join(names)}." for room, names in self.finds.items()]
+        parts += [f"Found in {room}: {', '.join(names)}." for room, names in self.finds.items()]
         return " ".join(parts)
 
 
@@ -120,7 +119,7 @@ def _labels(
     top, bottom = min(y for _, y in corners), max(y for _, y in corners)
     left, right = min(x for x, _ in corners), max(x for x, _ in corners)
     middle, stands = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
-    lines = _broken(shortened(room_name(room.name), MOST_LETTERS))
+    lines = _broken(shortened(room.name, MOST_LETTERS))
     size = _size(lines, right - left, LARGEST)
     is_above = stands >= (top + bottom) / 2
     start = top + 1.2 * size if is_above else bottom - size * (1.15 * (len(lines) - 1) + 0.5)

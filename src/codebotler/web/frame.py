@@ -13,11 +13,14 @@ from nicegui import html, ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from codebotler.core.terminal import note, visible_lines
+from codebotler.web.proxy import prefix_of
 
-HEAD = '<link rel="stylesheet" href="/static/page.css">'
+HEAD = '<link rel="stylesheet" href="{prefix}/static/page.css">'
 BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
 <button id="stop" type="button" aria-keyshortcuts="Escape"><b>STOP</b><small>Esc</small></button></div>
-<script src="/static/stop.js"></script>"""
+<script src="{prefix}/static/stop.js"></script>"""
+"""Both name files below the prefix of a proxy, which is empty without one."""
+
 ROBOT = (("Robot", "/"), ("Missions", "/missions"))
 FACE = ("Face", "/face")
 GROUP = "codebotler.pages"
@@ -50,20 +53,39 @@ class Frame:
             parts: names and addresses within the page, for screens that show its panes one below another.
         """
         ui.page_title(f"{title} · {self.brand}")
-        ui.add_head_html(HEAD)
+        ui.add_head_html(HEAD.format(prefix=outside("")))
         if self.has_robot:
-            ui.add_body_html(BAR)
+            ui.add_body_html(BAR.format(prefix=outside("")))
         with ui.element("header").classes("bar" if self.has_robot else "bar no-stop"):
-            html.a(self.brand, href="/").classes("brand")
+            html.a(self.brand, href=outside("/")).classes("brand")
             if parts:
                 with ui.element("nav").classes("parts").props('aria-label="Parts of this page"'):
                     for name, address in parts:
                         html.a(name, href=address)
             with ui.element("nav").classes("pages").props('aria-label="Pages"'):
                 for name, address in self.links:
-                    link = html.a(name, href=address)
+                    link = html.a(name, href=outside(address))
                     if address == here:
                         link.props('aria-current="page"')
+
+
+def outside(address: str) -> str:
+    """An address of ours as the browser of this page knows it: behind a proxy, it may have a prefix.
+
+    Args:
+        address: a path from the root.
+    """
+    request = ui.context.client.request
+    return prefix_of(request.scope) + address
+
+
+def script(name: str) -> None:
+    """Add a script from our files to the page.
+
+    Args:
+        name: of the file.
+    """
+    ui.add_head_html(f'<script src="{outside("/static")}/{name}"></script>')
 
 
 # --- texts and buttons, shown as text and never as markup, with hidden characters written out

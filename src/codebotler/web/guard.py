@@ -16,7 +16,9 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
+from codebotler.core.terminal import note
 from codebotler.web.access import GuardRules, Role, TooManyTriesError
+from codebotler.web.proxy import OuterAddress, path_of, prefix_of
 
 MOST_BYTES = 2_000_000
 """The largest body of a request."""
@@ -54,6 +56,7 @@ NO_CONTROL = "there is no such page: addresses here have no control characters"
 NO_PAGE = "there is no such page"
 WRONG = "this token is wrong"
 OTHER_SITE = "this request came from another site, which is not allowed"
+HOST_LOST = "the proxy in front must pass on the header Host as the browser sent it"
 TOO_LARGE = f"at most {MOST_BYTES:,} bytes are accepted"
 
 REFUSAL = """<!doctype html><html lang="en"><meta charset="utf-8">
@@ -75,23 +78,27 @@ class Guard:
 
     def __init__(self, app: ASGIApp, rules: GuardRules, has_page: Callable[[str], bool]) -> None:
         self._app, self._rules, self._has_page = app, rules, has_page
+        self._has_noted = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request through, or refuse it."""
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
-        request = HTTPConnection(scope)
         is_http = scope["type"] == "http"
+        proxy = self._rules.proxies.get(_named_host(scope))
+        if proxy is not None:
+            scope = proxy.seen_from_outside(scope)
+        request = HTTPConnection(scope)
         try:
-            self._check_path(scope["path"])
+            self._check_path(path_of(scope))
             self._check_host(request)
-            _check_origin(request)
+            self._check_origin(request, proxy)
             if is_http and (token := _token_in_link(request)) is not None:
                 await self._let_in(token, request)(scope, receive, send)
                 return
             role = self._role(request)
-            _check_role(role, scope["path"])
+            _check_role(role, path_of(scope))
             _check_length(request)
         except RefusedError as error:
             closing = WebSocketClose(code=1008, reason=error.sentence[:100])
@@ -113,8 +120,42 @@ class Guard:
         if name not in self._rules.hosts and not (self._rules.any_address and _is_address(name)):
             raise RefusedError(
                 HTTPStatus.MISDIRECTED_REQUEST,
-                "this server does not use that host name; open the link that was printed at the start",
+                "this server does not use that host name; open the printed link, or add the name with --name "
+                "or --behind-proxy",
             )
+
+    def _check_origin(self, request: HTTPConnection, proxy: OuterAddress | None) -> None:
+        """Refuse foreign pages, which may neither change anything nor listen."""
+        headers, is_socket = request.headers, request.scope["type"] == "websocket"
+        origin = headers.get("origin")
+        host = headers.get("host", "") if proxy is None else proxy.host
+        if origin is not None and not _is_same(origin, host, request.scope):
+            raise RefusedError(HTTPStatus.FORBIDDEN, self._why_not(origin.lower(), request, proxy))
+        changes = is_socket or request.scope["method"] not in CHANGES_NOTHING
+        from_browser = "cookie" in headers or is_socket
+        if changes and origin is None and from_browser and "authorization" not in headers:
+            raise RefusedError(HTTPStatus.FORBIDDEN, "a browser must send the header Origin")
+        navigates = headers.get("sec-fetch-mode") == "navigate"
+        if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
+            raise RefusedError(HTTPStatus.FORBIDDEN, OTHER_SITE)
+
+    def _why_not(self, origin: str, request: HTTPConnection, proxy: OuterAddress | None) -> str:
+        """Say what to do about an origin that is not ours, if it is that of a proxy in front."""
+        outer = OuterAddress.found_in(origin)
+        is_our_page = request.headers.get("sec-fetch-site") == "same-origin"
+        if outer is None or not (is_our_page or outer.name == _host(request)):
+            return OTHER_SITE
+        if proxy is not None:
+            return f"open this page at {proxy.page}"
+        if outer.host in self._rules.proxies:
+            return HOST_LOST
+        sentence = (
+            f"if a proxy is in front, start with --behind-proxy {outer.origin}, followed by its path if any"
+        )
+        if not self._has_noted:  # once, since the browser shows a page that has lost its connection
+            self._has_noted = True
+            note(f"a request was refused: {sentence}")
+        return sentence
 
     def _role(self, request: HTTPConnection) -> Role | None:
         access = self._rules.access
@@ -140,19 +181,34 @@ class Guard:
         role = self._of_token(token, request)
         if role is None and self._rules.access.operator is not None:
             raise RefusedError(HTTPStatus.UNAUTHORIZED, WRONG)
-        path = "/" + request.scope["path"].strip("/")  # two slashes would begin the name of another host
+        path = "/" + path_of(request.scope).strip("/")  # two slashes would begin the name of another host
         if CONTROL.search(path):
             raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
         if normpath(path) != path or not self._has_page(path):  # browsers follow ".."
             raise RefusedError(HTTPStatus.NOT_FOUND, NO_PAGE)
         rest = [(name, value) for name, value in request.query_params.multi_items() if name != "token"]
-        where = quote(path) + (f"?{urlencode(rest)}" if rest else "")
+        prefix = prefix_of(request.scope)
+        where = prefix + quote(path) + (f"?{urlencode(rest)}" if rest else "")
         answer = RedirectResponse(where, HTTPStatus.SEE_OTHER, {**HEADERS, "cache-control": "no-store"})
         answer.headers["location"] = where
         if role is not None:
             value = self._rules.access.cookie(role)
-            answer.set_cookie(self._rules.cookie, value, httponly=True, samesite="strict")
+            is_secure = request.scope["scheme"] == "https"
+            answer.set_cookie(
+                self._rules.cookie,
+                value,
+                path=prefix or "/",
+                secure=is_secure,
+                httponly=True,
+                samesite="strict",
+            )
         return answer
+
+
+def _named_host(scope: Scope) -> str:
+    """What the only `Host` says; empty where there are none or more."""
+    named = [value for name, value in scope["headers"] if name == b"host"]
+    return named[0].decode("latin-1").lower() if len(named) == 1 else ""
 
 
 def _host(request: HTTPConnection) -> str:
@@ -172,21 +228,6 @@ def _is_address(name: str) -> bool:
     return True
 
 
-def _check_origin(request: HTTPConnection) -> None:
-    """Refuse foreign pages, which may neither change anything nor listen."""
-    headers, is_socket = request.headers, request.scope["type"] == "websocket"
-    origin = headers.get("origin")
-    if origin is not None and not _is_same(origin, headers.get("host", ""), request.scope):
-        raise RefusedError(HTTPStatus.FORBIDDEN, OTHER_SITE)
-    changes = is_socket or request.scope["method"] not in CHANGES_NOTHING
-    from_browser = "cookie" in headers or is_socket
-    if changes and origin is None and from_browser and "authorization" not in headers:
-        raise RefusedError(HTTPStatus.FORBIDDEN, "a browser must send the header Origin")
-    navigates = headers.get("sec-fetch-mode") == "navigate"
-    if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
-        raise RefusedError(HTTPStatus.FORBIDDEN, OTHER_SITE)
-
-
 def _is_same(origin: str, host: str, scope: Scope) -> bool:
     secure = scope["scheme"] in {"https", "wss"}
     return origin.lower() == f"http{'s' if secure else ''}://{host.lower()}"
@@ -194,7 +235,7 @@ def _is_same(origin: str, host: str, scope: Scope) -> bool:
 
 def _token_in_link(request: HTTPConnection) -> str | None:
     """The token in the link of a page."""
-    if request.scope["path"].startswith(("/api/", "/_nicegui")):
+    if path_of(request.scope).startswith(("/api/", "/_nicegui")):
         return None
     return request.query_params.get("token")
 

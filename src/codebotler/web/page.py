@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
-
-from nicegui import background_tasks, ui
+from nicegui import ui
 
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
 from codebotler.web.frame import PATIENCE, Frame, PlainText
-from codebotler.web.panes import past_missions
+from codebotler.web.live import follow
+from codebotler.web.panes import mission_list, past_mission
 from codebotler.web.panes.instruction import InstructionPane
 from codebotler.web.panes.program import ProgramPane
 from codebotler.web.panes.robot import RobotPane
 
 PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h-status"))
-PAUSE = 0.1
-"""Seconds between two updates of a page, however often something changes."""
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -36,22 +33,17 @@ def add(console: Console, frame: Frame) -> None:
             for pane in panes:
                 pane.show(view)
 
+        async def update() -> None:
+            with box:
+                show()
+            await instruction.follow(console.view)
+
         show()
-        client = ui.context.client
-        await client.connected()
-
-        async def follow() -> None:
-            async for _ in console.notifier.changes():
-                with box:
-                    show()
-                await instruction.follow(console.view)
-                await asyncio.sleep(PAUSE)
-
-        following = background_tasks.create(follow())
-        client.on_delete(following.cancel)
+        await follow(console.notifier, update)
         await instruction.load()
 
-    past_missions.add(console, frame)
+    mission_list.add(console, frame)
+    past_mission.add(console, frame)
 
 
 def _next(view: SessionView) -> str:

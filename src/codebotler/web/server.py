@@ -25,6 +25,7 @@ from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from codebotler import __version__
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
 from codebotler.core.words import listed
 from codebotler.missions.mission import SHUTTING_DOWN
@@ -33,6 +34,7 @@ from codebotler.web.access import Access, Place, Role
 from codebotler.web.console import Console
 from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
 from codebotler.web.guard import MOST_BYTES, NO_PAGE, Guard, refusal
+from codebotler.web.proxy import path_of
 
 STATIC = Path(__file__).with_name("static")
 LEAVING = "CodeBotler, since the last operator closed the page"
@@ -61,6 +63,7 @@ def serve(
     with place.listening() as bound, console or nullcontext():
         port = bound.getsockname()[1]
         pages = application(console, further, runs)
+        _check_prefixes(pages, place)
         app: ASGIApp = pages
         if console and alone_for is not None:
             app = Presence(app, alone_for, partial(console.stop_soon, LEAVING, only_moving=True))
@@ -81,23 +84,34 @@ def serve(
 
 def _links(place: Place, port: int, access: Access, console: Console | None) -> str:
     shown = "localhost" if place.is_loopback else socket.gethostname()
-    address = f"http://{shown}:{port}/"
+    addresses = [*(proxy.page for proxy in place.proxies), f"http://{shown}:{port}/"]
 
-    def query(token: str) -> str:
-        return "" if access.operator is None else f"?{urlencode({'token': token})}"
+    def links(page: str, token: str) -> list[str]:
+        query = "" if access.operator is None else f"?{urlencode({'token': token})}"
+        return [f"    {address}{page}{query}\n" for address in addresses]
 
     ends = "stops the robot and closes the page" if console else "closes the page"
-    lines = [
-        f"Open this link in a browser; Ctrl-C {ends}:\n",
-        f"    {address}{query(access.operator or '')}\n",
-    ]
+    which = "one of these links" if place.proxies else "this link"
+    lines = [f"Open {which} in a browser; Ctrl-C {ends}:\n", *links("", access.operator or "")]
     if not place.is_loopback:
         lines.append("Other machines can open this link, too. The connection is not encrypted.\n")
     if console and console.face is not None:
-        where = "here (--host lets other machines in)" if place.is_loopback else "on the robot's tablet"
+        where = "here (--host lets other machines in)" if place.is_private else "on the robot's tablet"
         lines.append(f"The robot's face cannot run anything. Open it {where}:\n")
-        lines.append(f"    {address}face{query(access.face)}\n")
+        lines += links("face", access.face)
     return "\n".join(lines)
+
+
+def _check_prefixes(app: FastAPI, place: Place) -> None:
+    """Refuse prefixes that begin like an address of ours, since proxies may or may not remove them."""
+    routes = (*app.routes, *nicegui.app.routes)
+    own = {path.split("/")[1] for route in routes if (path := getattr(route, "path", ""))}
+    for proxy in place.proxies:
+        first = proxy.prefix.split("/")[1] if proxy.prefix else ""
+        if first and first in own:
+            raise UserError(
+                f"--behind-proxy {proxy.page}: the page itself uses /{first}; choose another path"
+            )
 
 
 def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS) -> FastAPI:
@@ -143,7 +157,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
 def _not_found(app: FastAPI, brand: str, request: Request, _error: Exception) -> Response:
     """404, or 405 where NiceGUI took an address that the API has for another method."""
     status, sentence, headers = HTTPStatus.NOT_FOUND, NO_PAGE, {}
-    allowed = [method for method in METHODS if _is_taken(app.routes, method, request.scope["path"])]
+    allowed = [method for method in METHODS if _is_taken(app.routes, method, path_of(request.scope))]
     if allowed:
         status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address accepts only {listed(allowed)}"
         headers = {"allow": ", ".join(allowed)}
@@ -173,7 +187,7 @@ class Presence:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, and count the pages that are open."""
         is_operator = scope.get("state", {}).get("role") is Role.OPERATOR
-        if not is_operator or scope["type"] != "websocket" or not scope["path"].startswith(SOCKETS):
+        if not is_operator or scope["type"] != "websocket" or not path_of(scope).startswith(SOCKETS):
             await self._app(scope, receive, send)
             return
         self._pages += 1

@@ -13,7 +13,7 @@ from codebotler.checking.problems import Check, Sample
 from codebotler.checking.storyboard import cut, steps_of
 from codebotler.core.skills.declaration import verb_for
 from codebotler.core.terminal import shortened
-from codebotler.core.words import brief, listed, room_name
+from codebotler.core.words import brief, listed
 from codebotler.rtl.wording import done_with, is_spoken
 from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Lot, Whereabouts
 from codebotler.web.frame import PlainText
@@ -133,7 +133,7 @@ def draw_scene(
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
     with ui.element("li").classes(" ".join(kinds)):
-        _number(PlainText("b", room_name(scene.room), "room"), scene.step, anchor)
+        _number(PlainText("b", scene.room, "room"), scene.step, anchor)
         if is_reached:
             PlainText("span", "✓", "tick").props('role=img aria-label="reached"')
         if not scene.is_found:
@@ -255,7 +255,6 @@ def _rooms(known: Sequence[Whereabouts], *, is_there: bool) -> str:
 
 
 def _room(name: str) -> str:
-    name = room_name(name)
     return brief(name) if PLAIN.fullmatch(name) else _quoted(name)
 
 

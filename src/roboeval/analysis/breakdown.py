@@ -33,7 +33,7 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
         total = sum(count for (task, _), count in ends.items() if task in tasks)
         shares = {name: sum(ends.get((task, name), 0) for task in tasks) / (total or 1) for name in CLASSES}
         if tasks:
-            yield ability, len(tasks), by_formula([scores[name] for name in tasks]), shares
+            yield ability, len(tasks), by_formula([scores[name] for name in tasks], over="tasks"), shares
 
 
 def coming_back(results: Results) -> pl.DataFrame:

@@ -10,10 +10,9 @@ import polars as pl
 
 from codebotler.core.errors import VIOLATION
 from roboeval.analysis.counts import task_scores
-from roboeval.analysis.metrics import Estimate, by_formula, overall, pass_at_1
+from roboeval.analysis.metrics import DIFFERENCE, Estimate, over_tasks, overall, pass_at_1
 from roboeval.evaluation.runs.completions import KEY
 
-DIFFERENCE = (-1.0, 1.0)
 NAMED = r'^the rule "([^"]+)"'  # of messages
 
 
@@ -46,8 +45,8 @@ def broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None) -> Br
 
 def _cost(table: pl.DataFrame, without: pl.DataFrame) -> Estimate | None:
     now, before = (pass_at_1(task_scores(each)) for each in (table, without))
-    differences = [[now[key] - before[key]] for key in now if key in before]
-    return by_formula(differences, within=DIFFERENCE) if differences else None
+    differences = [(key[0], now[key] - before[key]) for key in now if key in before]
+    return over_tasks(differences, within=DIFFERENCE) if differences else None
 
 
 def broken_rules_data(found: BrokenRules) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
+from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import Key, name_of
 from roboeval.evaluation.runs.judged import RunEvaluation
 from roboeval.evaluation.runs.rows import RowData, key_of
@@ -45,7 +46,12 @@ class Cluster:
     representative: Key  # the first of those with the most frequent program
     program: str | None  # of the representative; None if it is gone
     told: Mapping[str, Any]  # why it fails, in which world and line
-    fix: Fix | None  # None where no program of the task passes
+    fix: Fix | None  # None where no program of the task passes, and where there was no program
+
+    @property
+    def has_no_program(self) -> bool:
+        """Whether these are replies without a program, which no robot ran."""
+        return str(self.failure["class"]) == NO_PROGRAM
 
     @property
     def why(self) -> str:
@@ -61,7 +67,10 @@ class Cluster:
 
 
 def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[RowData]]:
-    """Put failing completions together, the largest groups first; of one size, tasks take turns."""
+    """Put failing completions together, the largest groups first; of one size, tasks take turns.
+
+    Replies without a program are one group for each task and kind, whatever their text.
+    """
     grounds: defaultdict[Ground, list[RowData]] = defaultdict(list)
     for row in failed:
         why = row["failure"]
@@ -87,6 +96,7 @@ def clusters(groups: Iterable[Sequence[RowData]], results: RunEvaluation) -> Ite
         most = max(often.values())
         row = next(row for row in rows if often[programs.get(key_of(row))] == most)
         program = programs.get(key_of(row))
+        has_none = program is None or row["failure"]["class"] == NO_PROGRAM
         yield Cluster(
             task=row["task"],
             failure=row["failure"],
@@ -94,7 +104,7 @@ def clusters(groups: Iterable[Sequence[RowData]], results: RunEvaluation) -> Ite
             representative=key_of(row),
             program=program,
             told=reason(row, results.suite, ablated=results.is_ablated),
-            fix=None if program is None else shortest_fix(program, candidates.get(row["task"], [])),
+            fix=None if has_none else shortest_fix(str(program), candidates.get(row["task"], [])),
         )
 
 
@@ -111,6 +121,9 @@ def _grouped(
     rows: Sequence[RowData], programs: Mapping[Key, str], shape_of: Callable[[str], Lines]
 ) -> Iterator[list[RowData]]:
     """Rows of one ground, those of similar programs together."""
+    if rows[0]["failure"]["class"] == NO_PROGRAM:
+        yield sorted(rows, key=key_of)
+        return
     of_shape: defaultdict[Lines, list[RowData]] = defaultdict(list)
     for row in sorted(rows, key=key_of):
         of_shape[shape_of(programs.get(key_of(row), ""))].append(row)

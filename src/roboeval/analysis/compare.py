@@ -11,17 +11,19 @@ from typing import Any, TypeVar
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.metrics import Estimate, by_formula, mean_of
+from roboeval.analysis.counts import tally_of
+from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, mean_of
 from roboeval.analysis.statistics import (
-    DIFFERENCE,
     ROUNDING,
     Needed,
     by_bootstrap,
     needed,
     p_by_signs,
 )
+from roboeval.analysis.summary import cut_off, failures
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.scope import Coverage, CutOff
 
 LEVEL = 0.05  # a larger p may well be chance
 SMALLEST_P = 0.001  # that is shown with its digits
@@ -80,8 +82,8 @@ def compared(first: PromptScores, second: PromptScores) -> Comparison:
         prompts=len(pairs),
         left_out=len({*first, *second}) - len(keys),
         over_prompts=by_formula(prompts, within=DIFFERENCE),
-        over_tasks=by_formula(tasks, within=DIFFERENCE),
-        bootstrap=by_bootstrap(tasks, within=DIFFERENCE),
+        over_tasks=by_formula(tasks, within=DIFFERENCE, over="tasks"),
+        bootstrap=by_bootstrap(tasks, within=DIFFERENCE, over="tasks"),
         p_prompts=p_by_signs(prompts),
         p_tasks=p_by_signs(tasks),
         needed=needed(pairs),
@@ -170,6 +172,34 @@ WORDS = {
 
 def _said(value: object) -> str:
     return "none" if value is None else visible(str(value))[:12]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One of two runs that are compared."""
+
+    name: str
+    coverage: Coverage
+    cut_off: CutOff
+    classes: Mapping[str, float]  # of failures, in shares of all judged completions
+
+    @classmethod
+    def of(cls, name: str, results: Results) -> Compared:
+        """What a comparison says of a run besides pass@1."""
+        tally = tally_of(results.table)
+        found = failures(tally)
+        shares = {one.name: one.share for one in found}
+        scope = results.scope
+        return cls(name, scope.coverage(tally.judged.total()), cut_off(found, scope), shares)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """It as plain data, without its name."""
+        return {
+            **asdict(self.coverage),
+            "cut_off": self.cut_off.replies,
+            "failures": dict(self.classes),
+        }
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:

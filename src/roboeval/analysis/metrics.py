@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
 from operator import mul
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 # Values, those that resemble each other together: a prompt's, or those of all prompts of a task.
 Clusters: TypeAlias = Sequence[Sequence[float]]
 
-SHARE = (0.0, 1.0)
+Draws: TypeAlias = Literal["prompts", "tasks"]
+"""What an interval takes as drawn at random."""
+
+SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)  # what values may be
 LEVEL = 0.95  # how often intervals hold the true mean
 ROUNDING = 1e-9  # what sums of shares may lack of a threshold
 
@@ -46,22 +49,31 @@ class Estimate:
         mean: the mean of the values.
         low: the lower end of the interval, at least 0.
         high: its upper end, at most 1.
+        over: what the interval takes as drawn at random.
     """
 
     mean: float
     low: float
     high: float
+    over: Draws = "prompts"
 
     @property
     def is_known(self) -> bool:
-        """Whether the interval says anything: that of equal values has no width."""
-        return self.high - self.low > ROUNDING
+        """Whether the interval says anything; that of equal values has no width, that of one all of it."""
+        return self.high - self.low > ROUNDING and (self.low, self.high) not in (SHARE, DIFFERENCE)
 
     def ends(self, form: str = ".3f") -> str:
-        """The interval over prompts for people, in a number format."""
+        """The interval for people, in a number format."""
+        if self.high - self.low <= ROUNDING:
+            return f"unknown: all {self.over} are alike"
         if not self.is_known:
-            return "unknown: all prompts are alike"
+            return f"unknown: too few {self.over}"
         return f"{self.low:{form}} to {self.high:{form}}"
+
+    @property
+    def interval(self) -> str:
+        """The interval for people, with its name."""
+        return f"95% interval over {self.over} {self.ends()}"
 
 
 @dataclass(frozen=True)
@@ -102,12 +114,12 @@ class TaskScore:
     prompts: tuple[PromptScore, ...]
 
     def pass_at(self, k: int) -> Estimate:
-        """The mean pass@k over prompts, with its 95% interval.
+        """The mean pass@k over prompts, with its 95% interval over prompts of this task.
 
         Raises:
             ValueError: a prompt, which is named, has fewer than k completions.
         """
-        return overall([self], k)
+        return by_formula([[prompt.pass_at(k)] for prompt in self.prompts])
 
     def lowest(self, k: int) -> float:
         """The worst prompt's pass@k, the lower end of the paper's error bars; raises as `pass_at` does."""
@@ -139,12 +151,22 @@ def pass_at_1(tasks: Iterable[TaskScore]) -> dict[tuple[str, int], float]:
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
-    """The mean pass@k over all prompts of all tasks, with its 95% interval.
+    """The mean pass@k over all prompts of all tasks, with its 95% interval over tasks.
+
+    Terminal, card, report, pages and JSON all show this interval.
 
     Raises:
         ValueError: a prompt, which is named, has fewer than k completions.
     """
-    return by_formula([[prompt.pass_at(k)] for prompt in prompts_of(tasks)])
+    return over_tasks((prompt.task, prompt.pass_at(k)) for prompt in prompts_of(tasks))
+
+
+def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, float] = SHARE) -> Estimate:
+    """The mean of a value of each prompt, given with its task, and its 95% interval over tasks."""
+    by_task: dict[str, list[float]] = {}
+    for task, value in values:
+        by_task.setdefault(task, []).append(value)
+    return by_formula([*by_task.values()], within=within, over="tasks")
 
 
 def share_at_least(values: Sequence[float], threshold: float) -> float:
@@ -158,7 +180,9 @@ def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
 
-def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Estimate:
+def by_formula(
+    clusters: Clusters, *, within: tuple[float, float] = SHARE, over: Draws = "prompts"
+) -> Estimate:
     """The mean of all values, with an interval that takes clusters as drawn at random, clipped to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
@@ -167,12 +191,12 @@ def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Es
     """
     mean, count = mean_of(clusters), len(clusters)
     if count == 1:
-        return Estimate(mean, *within)
+        return Estimate(mean, *within, over)
     residuals = [math.fsum(value - mean for value in values) for values in clusters]
     size = sum(map(len, clusters))
     variance = count / (count - 1) * math.fsum(r * r for r in residuals) / size**2
     margin = t_quantile((1 + LEVEL) / 2, count - 1) * math.sqrt(variance)
-    return Estimate(mean, max(within[0], mean - margin), min(within[1], mean + margin))
+    return Estimate(mean, max(within[0], mean - margin), min(within[1], mean + margin), over)
 
 
 def mean_of(clusters: Clusters) -> float:

@@ -14,7 +14,7 @@ from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.metrics import Estimate, by_formula, mean_of, share_at_least
+from roboeval.analysis.metrics import Estimate, mean_of, over_tasks, share_at_least
 from roboeval.evaluation.runs.completions import KEY
 
 LIMITS = (0, 2, 4, 8, 100)
@@ -111,7 +111,7 @@ def resampled(prompts: Sequence[CheckedPrompt], retries: int) -> Limit:
     each = tuple(chances(prompt.trials, retries) for prompt in prompts)
     return Limit(
         retries=retries,
-        passed=by_formula([[one.passed] for one in each]),
+        passed=over_tasks((prompt.task, one.passed) for prompt, one in zip(prompts, each, strict=True)),
         accepted=mean_of([[one.accepted for one in each]]),
         ran=mean_of([[one.ran for one in each]]),
         prompts={t: share_at_least([one.passed for one in each], t) for t in THRESHOLDS},

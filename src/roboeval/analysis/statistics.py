@@ -9,9 +9,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from roboeval.analysis.metrics import LEVEL, SHARE, Clusters, Estimate, mean_of, t_quantile
+from roboeval.analysis.metrics import LEVEL, SHARE, Clusters, Draws, Estimate, mean_of, t_quantile
 
-DIFFERENCE = (-1.0, 1.0)
 SEED = 0
 POWER = 0.8
 FEW = 8  # clusters below which the bootstrap knows too few means, so that its interval is too narrow
@@ -24,6 +23,7 @@ def by_bootstrap(
     clusters: Clusters,
     *,
     within: tuple[float, float] = SHARE,
+    over: Draws = "prompts",
     seed: int = SEED,
     draws: int = 10_000,
 ) -> Estimate:
@@ -36,7 +36,7 @@ def by_bootstrap(
     """
     mean, count = mean_of(clusters), len(clusters)
     if count == 1:
-        return Estimate(mean, *within)
+        return Estimate(mean, *within, over)
     dice = np.random.default_rng(seed)
     sums = np.array([math.fsum(values) for values in clusters])
     sizes = np.array([len(values) for values in clusters])
@@ -47,7 +47,7 @@ def by_bootstrap(
     wider = math.sqrt(count / (count - 1)) * t_quantile((1 + LEVEL) / 2, count - 1)
     tail = NormalDist().cdf(-wider)
     low, high = np.quantile(np.concatenate(means), [tail, 1 - tail])
-    return Estimate(mean, max(within[0], float(low)), min(within[1], float(high)))
+    return Estimate(mean, max(within[0], float(low)), min(within[1], float(high)), over)
 
 
 def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) -> float:

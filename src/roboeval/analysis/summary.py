@@ -19,9 +19,9 @@ from roboeval.analysis.metrics import (
     prompts_of,
 )
 from roboeval.analysis.tally import Tally
-from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.failures import CLASSES, NO_PROGRAM
 from roboeval.evaluation.runs.completions import how_many
-from roboeval.evaluation.runs.scope import Scope
+from roboeval.evaluation.runs.scope import Coverage, CutOff, Scope
 from roboeval.suites.load import Suite
 
 
@@ -51,6 +51,23 @@ class Summary:
     def prompts(self) -> list[PromptScore]:
         """The scores of all prompts of all tasks."""
         return prompts_of(self.tasks)
+
+    @property
+    def coverage(self) -> Coverage:
+        """Of how many completions the numbers speak."""
+        return self.scope.coverage(judged_count(self.prompts))
+
+    @property
+    def cut_off(self) -> CutOff:
+        """The replies that were cut off."""
+        return cut_off(self.failures, self.scope)
+
+
+def cut_off(failures: Iterable[Failures], scope: Scope) -> CutOff:
+    """The replies of a run that were cut off, given how its completions fail."""
+    kinds = (kind for one in failures if one.name == NO_PROGRAM for kind in one.kinds)
+    without = sum(kind.count for kind in kinds if kind.name == "cut-off")
+    return CutOff(max(scope.cut_off, without), without, scope.total, scope.limit)
 
 
 @dataclass(frozen=True)
@@ -148,9 +165,12 @@ def summary_data(summary: Summary) -> dict[str, Any]:
         "models": sorted(model for model in summary.scope.models if model is not None),
         "judged": judged_count(summary.prompts),
         "to_judge": summary.scope.total,
+        "requested": summary.coverage.requested,
+        "cut_off": summary.cut_off.replies,
+        "max_tokens": summary.scope.limit,
         **_counts(summary.prompts),
         **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
-        "tasks": [_task_score_data(task, summary.k) for task in summary.tasks],
+        "tasks": [_task_score_data(task, summary) for task in summary.tasks],
         "failures": [
             {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}
             for each in summary.failures
@@ -159,7 +179,8 @@ def summary_data(summary: Summary) -> dict[str, Any]:
     }
 
 
-def _task_score_data(task: TaskScore, ks: Sequence[int]) -> dict[str, Any]:
+def _task_score_data(task: TaskScore, summary: Summary) -> dict[str, Any]:
+    ks = summary.k
     spreads = {
         f"pass@{k}": {"mean": task.pass_at(k).mean, "lowest": task.lowest(k), "highest": task.highest(k)}
         for k in ks
@@ -168,7 +189,9 @@ def _task_score_data(task: TaskScore, ks: Sequence[int]) -> dict[str, Any]:
         {"prompt": prompt.prompt, **_counts([prompt]), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
         for prompt in task.prompts
     ]
-    return {"task": task.task, **_counts(task.prompts), **spreads, "prompts": prompts}
+    counts = _counts(task.prompts)
+    requested = summary.scope.coverage(counts["completions"], task.task).requested
+    return {"task": task.task, **counts, "requested": requested, **spreads, "prompts": prompts}
 
 
 def _counts(prompts: Sequence[PromptScore]) -> dict[str, int]:

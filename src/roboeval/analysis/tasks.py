@@ -12,6 +12,7 @@ from roboeval.analysis.counts import completions_of, prompt_scores
 from roboeval.evaluation.explanation import reason, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, Completion, Key
 from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.scope import requested_of_prompts
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:
@@ -72,6 +73,7 @@ def _reason(results: Results, key: Key) -> dict[str, Any]:
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
+    requested = requested_of_prompts(results.about, results.suite)
     ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
     return {
         "prompt": prompt,
@@ -79,6 +81,7 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
         "suite_instruction": suite_instruction(results.suite, task, prompt),
         "models": _different(written, "model"),
         "completions": n,
+        "requested": None if requested is None else requested.get(task, 0),
         "gone": n - len(written),
         "passed": c,
         "pass@1": share,

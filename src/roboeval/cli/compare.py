@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -67,7 +68,7 @@ PAIR = 2
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print by how much the second of two runs is better."""
-    from roboeval.analysis.compare import compared, comparison_data, unlike
+    from roboeval.analysis.compare import Compared, compared, comparison_data, unlike
     from roboeval.analysis.counts import task_scores
     from roboeval.analysis.metrics import pass_at_1
     from roboeval.cli.views.comparison import comparison_view
@@ -78,11 +79,13 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     warnings = unlike(*(one.results for one in opened))
     for warning in warnings:
         note(f"warning: {warning}")
-    names = str(paths[0]), str(paths[1])
+    first, second = (Compared.of(str(path), one.results) for path, one in zip(paths, opened, strict=True))
     if as_json:
-        print_json({**comparison_data(result, names), "warnings": warnings})
+        data = comparison_data(result, (first.name, second.name))
+        both = {side: data[side] | run.data for side, run in (("first", first), ("second", second))}
+        print_json({**data, **both, "warnings": warnings})
     else:
-        print_rich(comparison_view(result, names))
+        print_rich(comparison_view(result, (first, second)))
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
@@ -138,12 +141,13 @@ def resample(
         results = open_current(run, suite, ablated=False, rules=rules).results
         checker = engine_for(len(results.places))
         prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
+    coverage = results.scope.coverage(len(results.places))
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
-        name = results.head["suite"]
-        print_json({"suite": name, "samples": samples, "seed": seed, **curve_data(prompts, limits)})
+        of = {"suite": results.head["suite"], "samples": samples, "seed": seed, **asdict(coverage)}
+        print_json({**of, **curve_data(prompts, limits)})
     else:
-        print_rich(resample_view(prompts, limits, title=str(run)))
+        print_rich(resample_view(prompts, limits, title=str(run), coverage=coverage))
 
 
 def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -10,6 +10,8 @@ import typer
 
 from codebotler.cli.ending import STOPPED
 from codebotler.cli.options import SkillsOption
+from codebotler.core.errors import installed
+from codebotler.core.words import counted
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -30,10 +32,11 @@ from roboeval.cli.options import (
     load,
     named,
 )
-from roboeval.cli.output import fail, note, watched
+from roboeval.cli.output import fail, metered, note, watched
 from roboeval.cli.show import house_of, print_summary
 
 if TYPE_CHECKING:
+    from roboeval.evaluation.batches import Imported
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
@@ -67,7 +70,7 @@ def evaluate(
         from roboeval.analysis.summary import summary
         from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
-        from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+        from roboeval.evaluation.runs.folder import Run, about_of, tasks_to_judge
         from roboeval.evaluation.runs.scope import Scope
 
         judged_by = load(suite, rules, skills)
@@ -81,7 +84,8 @@ def evaluate(
         try:
             opened = opened_source(source, judged_by)
             run = run or opened.run
-            scope = Scope.of(opened.completions, wanted)
+            about = {} if opened.run is None else about_of(opened.run)
+            scope = Scope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
                 fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
@@ -174,17 +178,73 @@ def _judged(
 
 
 def import_(
-    path: Annotated[str, typer.Argument(help="A .jsonl, or a folder or zip of .py completions.")],
-    out: Annotated[Path, typer.Option(help="The run folder to create.", parser=named("a run"))],
+    path: Annotated[
+        str, typer.Argument(help="A .jsonl, a folder or zip of .py completions, or answers of a batch.")
+    ],
+    out: Annotated[
+        Path, typer.Option(help="The run folder to create, or for answers theirs.", parser=named("a run"))
+    ],
     suite: SuiteOption = "paper",
 ) -> None:
-    """Make a run from completions written elsewhere."""
+    """Make a run from completions written elsewhere.
+
+    Answers to `generate --requests` are added to its run.
+    """
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.source import is_answers
 
+    if is_answers(Path(path)):
+        import_batch(Path(path), out, suite)
+        return
     completions = opened_source(path, load(suite)).completions
     Run(out).keep(completions)
     count = len(completions)
     again = command("evaluate", out, suite=suite)
     they = ("is", "it") if count == 1 else ("are", "them")
     note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
+
+
+def import_batch(path: Path, out: Path, suite: str) -> None:
+    """Add answers of a batch endpoint to their run; exit with status 1 if completions are missing."""
+    with installed():
+        from roboeval.evaluation.batches import import_answers
+    from roboeval.evaluation.runs.completions import how_many
+    from roboeval.evaluation.runs.folder import Run
+
+    with path.open("rb") as file:
+        count = sum(1 for _ in file)
+    with metered("reading", count) as tell:
+        found = import_answers(Run(out), load(suite), path, progress=lambda done: tell(done, ""))
+    missing = len(found.failed) + len(found.unanswered)
+    again = command("evaluate", out, suite=suite)
+    note(
+        f"{found.total - missing:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; "
+        f"`{again}` judges them"
+    )
+    for sentence in missing_sentences(found):
+        note(sentence)
+    if missing:
+        note(f"roboeval: {how_many(missing)} missing; `roboeval generate --requests` asks for them again")
+        raise SystemExit(1)
+
+
+def missing_sentences(found: Imported) -> Iterator[str]:
+    """For each error, how many requests ended with it, and which; then those without an answer."""
+    by_error: dict[str, list[Key]] = {}
+    for key, error in found.failed.items():
+        by_error.setdefault(error, []).append(key)
+    for error, keys in by_error.items():
+        yield f"{counted(len(keys), 'request')} failed: {error}: {_named(keys)}"
+    if found.unanswered:
+        yield f"{counted(len(found.unanswered), 'request')} without an answer: {_named(found.unanswered)}"
+
+
+SHOWN = 10  # names of requests in a sentence
+
+
+def _named(keys: Sequence[Key]) -> str:
+    from roboeval.evaluation.runs.completions import name_of
+
+    more = len(keys) - SHOWN
+    return ", ".join(map(name_of, keys[:SHOWN])) + (f" and {more:,} more" if more > 0 else "")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,18 +17,21 @@ from codebotler.cli.options import (
     BaseUrlOption,
     ModelOption,
 )
-from codebotler.core.errors import install_command
+from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
 from roboeval.cli.evaluate import evaluate
 from roboeval.cli.options import (
     BudgetOption,
     ConcurrencyOption,
+    FamiliesOption,
     IsolationOption,
     JsonOption,
     NumOption,
+    NumTasksOption,
     OutOption,
     ProcessOption,
     RateOption,
+    RequestsOption,
     SuiteOption,
     TasksOption,
     WorkersOption,
@@ -42,19 +45,43 @@ from roboeval.cli.rounds import further_rounds
 
 if TYPE_CHECKING:
     from codebotler.models.base import Model
+    from codebotler.models.batch import BatchModel
+    from codebotler.models.sampling import SamplingSettings
     from roboeval.evaluation.generate import Pace, Progress
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run
 
+MOST_REQUESTS = 50_000
 
-class Requested(NamedTuple):
-    """A run, with the completions that it should have, and the model that writes them."""
 
-    run: Run
+@dataclass(frozen=True)
+class Requested:
+    """What a command requests: of which model, and for which run."""
+
+    name: str  # of the model
+    settings: SamplingSettings
     plan: GenerationPlan
-    model: Model
     pace: Pace
-    open_again: Callable[[], Model]
+    suite: str  # as --suite takes it
+    out: Path | None
+
+    def run_of(self, model: Model | BatchModel) -> Run:
+        """The run that is named, or else that of the model."""
+        from roboeval.evaluation.runs.folder import Run
+
+        folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
+        fresh = self.plan.suite.families is not None
+        return Run(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
+
+    def open(self) -> Model:
+        """Open the model that is asked."""
+        from codebotler.models.open import open_model
+        from codebotler.models.recorded import is_recorded
+        from roboeval.evaluation.runs.source import recorded_model_for
+
+        if is_recorded(self.name) and self.settings.base_url is None:
+            return recorded_model_for(self.name, self.plan.suite)
+        return open_model(self.name, self.settings)
 
 
 @with_options_of(model_settings)
@@ -63,6 +90,8 @@ def requested(
     out: OutOption = None,
     num_completions: NumOption = 50,
     suite: SuiteOption = "paper",
+    families: FamiliesOption = None,
+    num_tasks: NumTasksOption = None,
     tasks: TasksOption = None,
     concurrency: ConcurrencyOption = 8,
     requests_per_minute: RateOption = None,
@@ -70,37 +99,40 @@ def requested(
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> Requested:
-    """The run that options name, with the completions that it should have, and the model that writes them."""
+    """What options request."""
     from codebotler.models.chosen import chosen_model
-    from codebotler.models.open import open_model
-    from codebotler.models.recorded import is_recorded, recorded_model
     from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+    from roboeval.evaluation.runs.folder import tasks_to_judge
 
+    if families is not None or num_tasks is not None:
+        suite = suite_of_families(suite, families, num_tasks, sampling["seed"])
+        sampling["seed"] = None
     chosen = chosen_model(model, base_url)
     settings = chosen.with_its_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    own = None if known.folder is None else known.folder / "solutions"  # which recorded models know as well
-    knows_more = is_recorded(chosen.name) and chosen.base_url is None
-
-    def open_chosen() -> Model:
-        return recorded_model(chosen.name, own) if knows_more else open_model(chosen.name, settings)
-
-    opened = open_chosen()
-    note_unsent(settings, opened)
-    run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", opened.name).strip("-.")))
-    return Requested(run, plan, opened, pace, open_chosen)
+    return Requested(chosen.name, settings, plan, pace, suite, out)
 
 
-def complete(requested: Requested) -> Path:
+def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
+    """The name of the suite that families make of a seed, which stands in the place of --suite."""
+    from roboeval.suites.families.suite import FamilyTasks
+    from roboeval.suites.families.tasks import family_names
+
+    if families is None:
+        fail("--num-tasks needs --families; add it")
+    if suite != "paper":
+        fail("--families makes a suite of its own; leave out --suite")
+    return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
+
+
+def complete(run: Run, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
     from codebotler.models.recorded import NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
-    run, plan, model, pace, _ = requested
     meter = Meter()
     try:
         with meter:
@@ -117,19 +149,47 @@ def complete(requested: Requested) -> Path:
 
 
 @with_options_of(requested)
-def generate(*, suite: SuiteOption = "paper", **options: Any) -> None:  # noqa: ANN401 - of several kinds
+def generate(
+    *,
+    requests: RequestsOption = None,
+    **options: Any,  # noqa: ANN401 - of several kinds
+) -> None:
     """Have a model write programs for a suite.
 
     After an interruption, the same command continues.
     """
-    path = complete(requested(suite=suite, **options))
-    note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
+    what = requested(**options)
+    if requests is not None:
+        write_batch(what, requests)
+        return
+    model = what.open()
+    note_unsent(what.settings, model)
+    path = complete(what.run_of(model), what.plan, model, what.pace)
+    note(f"the completions are in {path}; `{command('evaluate', path, suite=what.suite)}` judges them")
+
+
+def write_batch(what: Requested, path: Path) -> None:
+    """Write the requests of a run to a file, and note how to go on."""
+    with installed():
+        from codebotler.models.batch import BatchModel
+    from roboeval.evaluation.batches import write_requests
+
+    with closing(BatchModel(what.name, what.settings)) as model:
+        note_unsent(what.settings, model)
+        run = what.run_of(model)
+        with metered("writing", len(what.plan.keys())) as tell:
+            count = write_requests(run, what.plan, model, path, progress=lambda done: tell(done, ""))
+    again = command("import", "ANSWERS.jsonl", "--out", run.path, suite=what.suite)
+    note(
+        f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` takes the answers"
+    )
+    if count > MOST_REQUESTS:
+        note(f"OpenAI takes at most {MOST_REQUESTS:,} requests in a file; split it")
 
 
 @with_options_of(requested)
 def run(
     *,
-    suite: SuiteOption = "paper",
     tasks: TasksOption = None,
     workers: WorkersOption = None,
     require_isolation: IsolationOption = False,
@@ -159,9 +219,12 @@ def run(
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
 
-    what = requested(suite=suite, tasks=tasks, **options)
-    expect_same_judge(what.run, what.plan.suite)  # before anything is paid for
-    path = complete(what)
+    what = requested(tasks=tasks, **options)
+    suite, plan, model = what.suite, what.plan, what.open()
+    note_unsent(what.settings, model)
+    first = what.run_of(model)
+    expect_same_judge(first, plan.suite)  # before anything is paid for
+    path = complete(first, plan, model, what.pace)
     evaluate(
         str(path),
         suite=suite,
@@ -175,14 +238,12 @@ def run(
     if repair or retries:
         with engine_named("local", workers, require_isolation=require_isolation) as engine_for:
             paths += further_rounds(
-                what.run,
-                what.plan,
+                first,
+                plan,
                 repair or retries,
                 repairs=bool(repair),
                 engine=lambda: engine_for(0),
-                complete=lambda run, plan: complete(
-                    what._replace(run=run, plan=plan, model=what.open_again())
-                ),
+                complete=lambda run, plan: complete(run, plan, what.open(), what.pace),
             )
     if not with_report:
         return

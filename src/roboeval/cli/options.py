@@ -54,6 +54,13 @@ def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
 
 
+def split_names(incomplete: str) -> list[str]:
+    """The splits of families."""
+    from roboeval.suites.families.suite import SPLITS
+
+    return [name for name in SPLITS if name.startswith(incomplete)]
+
+
 def engine_names(incomplete: str) -> list[str]:
     """The engines."""
     return [name for name in ("local", "ray") if name.startswith(incomplete)]
@@ -132,6 +139,26 @@ WorldsOption = Annotated[
 SeedOption = Annotated[
     int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
 ]
+RequestsOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Ask no model, but write the requests to this file, for a batch endpoint.",
+        parser=named("a file"),
+    ),
+]
+FamiliesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SPLIT",
+        help="Fresh tasks of families, from train, validation or test; --seed chooses them.",
+        autocompletion=split_names,
+    ),
+]
+NumTasksOption = Annotated[
+    int | None,
+    typer.Option(min=1, max=100, help="With --families: how many tasks; by default one of each family."),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
     Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=named("a run"))
@@ -159,7 +186,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS
     from roboeval.suites.house import HouseRules
-    from roboeval.suites.load import load_suite
+    from roboeval.suites.load import load_suite, rooms_in
 
     read = load_suite(suite, skills=skills_from(*(skills or ())))
     if rules is not None and read.house is not None:
@@ -168,10 +195,9 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
         )
     if rules is None:
         return read
-    house = HouseRules.read(rules, read.skills)
-    worlds = [scenario.world for task in read.tasks.values() for scenario in task.scenarios]
-    rooms = dict.fromkeys(room.name for world in worlds for room in world.rooms)
-    for sentence in evasions(house.rules, [*rooms], SKILLS):  # in simulation, rules see inside own skills
+    rooms = rooms_in(read.tasks.values())
+    house = HouseRules.read(rules, read.skills, rooms)
+    for sentence in evasions(house.rules, rooms, SKILLS):  # in simulation, rules see inside own skills
         note(sentence)
     return read.with_house_rules(house)
 

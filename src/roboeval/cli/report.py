@@ -37,6 +37,10 @@ def report(
         list[str] | None,
         typer.Option(help="MODEL=INPUT/OUTPUT, the prices of a million tokens; may be given several times."),
     ] = None,
+    label: Annotated[
+        list[str] | None,
+        typer.Option(help="RUN=TEXT, how tables and figures name a run; may be given several times."),
+    ] = None,
     beside: Annotated[
         str | None, typer.Option(help="Another suite that judged the runs, to compare verdicts.")
     ] = None,
@@ -59,18 +63,19 @@ def report(
     from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines import Local
     from roboeval.report.cost import expect_known, read_prices
-    from roboeval.report.runs import named_apart
+    from roboeval.report.runs import named_apart, read_labels
     from roboeval.report.writing import expect_no_others, headline, pieces, sections, write_report
 
     expect_no_others(out)
-    prices = read_prices(price or ())
+    prices, labels = read_prices(price or ()), read_labels(label or (), runs)
     if beside == suite:
         fail(f'--beside needs another suite than "{suite}", which the report itself uses')
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened)
     engine = Local(workers or cores()) if check else None
     read = named_apart(
-        [judged_run(one.results, suite, beside=beside, rules=rules, engine=engine) for one in opened]
+        [judged_run(one.results, suite, beside=beside, rules=rules, engine=engine) for one in opened],
+        labels,
     )
     expect_known(prices, read)
     options: list[object] = ["--out", out, *["--published"] * published]
@@ -78,6 +83,7 @@ def report(
     options += [] if rules is None else ["--rules", rules]
     options += ["--no-check"] * (not check)
     options += [word for text in price or () for word in ("--price", text)]
+    options += [word for text in label or () for word in ("--label", text)]
     again = command("report", *runs, *options, suite=suite)
     with busy("putting together"):
         parts = sections(read, with_published=published, prices=prices, command=again)

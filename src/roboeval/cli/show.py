@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.cli.options import HostOption, NameOption, NoTokenOption, PortOption, TokenOption
+from codebotler.cli.options import (
+    BehindProxyOption,
+    HostOption,
+    NameOption,
+    NoTokenOption,
+    PortOption,
+    TokenOption,
+)
 from roboeval.cli.options import (
     AblationOption,
     JsonOption,
@@ -54,6 +61,9 @@ def show(
     in_full: Annotated[
         bool, typer.Option("--all", help="Of a completion, show satisfied worlds in full, too.")
     ] = False,
+    with_reply: Annotated[
+        bool, typer.Option("--reply", help="Of a completion, show the reasoning and the reply as they came.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
@@ -66,11 +76,11 @@ def show(
     is_one = what is not None and names_completion(what)
     if what and is_one:
         judged, again = open_completion(run, what, suite, ablated=ablation, rules=rules)
-        show_completion(
-            judged, parse_selection(what, judged.known_suite), suite, in_full=in_full, as_json=json
-        )
-    elif in_full:
-        fail("--all applies to one completion; name it as TASK/PROMPT/INDEX, or leave out --all")
+        selection = parse_selection(what, judged.known_suite)
+        show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
+    elif in_full or with_reply:
+        option = "--all" if in_full else "--reply"
+        fail(f"{option} applies to one completion; name it as TASK/PROMPT/INDEX, or leave out {option}")
     else:
         judged, again = open_run(run, suite, ablated=ablation, rules=rules)
         selection = parse_selection(what, judged.known_suite)
@@ -150,13 +160,20 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 
 
 def show_completion(
-    judged: RunEvaluation, selection: Selection, suite: str, *, in_full: bool, as_json: bool
+    judged: RunEvaluation,
+    selection: Selection,
+    suite: str,
+    *,
+    in_full: bool,
+    with_reply: bool,
+    as_json: bool,
 ) -> None:
     """Print a completion, and the command that shows the program nearest to one that fails."""
     from codebotler.core.words import counted
     from roboeval.analysis.cluster import nearest_fix
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.explanation import completion_data
+    from roboeval.evaluation.failures import NO_PROGRAM
 
     selection.expect_judged(judged)
     key = selection.key
@@ -165,8 +182,10 @@ def show_completion(
     if as_json:
         print_json({**data, "ablation": judged.is_ablated})
     else:
-        print_rich(completion_view(data, in_full=in_full))
-    if not data["passed"] and (fix := nearest_fix(judged, key)) is not None:
+        print_rich(completion_view(data, in_full=in_full, with_reply=with_reply))
+    if data["passed"] or data["failure"]["class"] == NO_PROGRAM:
+        return
+    if (fix := nearest_fix(judged, key)) is not None:
         again = command("show", judged.run.path, fix.name, suite=suite, ablated=judged.is_ablated)
         note(f"the nearest program that passes differs in {counted(fix.changed, 'line')}: `{again}`")
 
@@ -207,6 +226,7 @@ def serve(
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
     name: NameOption = None,
+    behind_proxy: BehindProxyOption = None,
     token: TokenOption = None,
     no_token: NoTokenOption = False,
     suite: Annotated[
@@ -221,11 +241,12 @@ def serve(
     from codebotler.core.errors import UserError
     from codebotler.web import server
     from codebotler.web.access import Access, Place
+    from codebotler.web.proxy import proxies_in_front
     from roboeval.web.pages import pages
     from roboeval.web.run_store import RunStore
 
-    place = Place(host, port, tuple(name or ()))
-    access = Access.asked_for(token, None, open_to_all=no_token, is_loopback=place.is_loopback)
+    place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
+    access = Access.asked_for(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
         raise UserError("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
     suites = [load(each) for each in suite or ()]

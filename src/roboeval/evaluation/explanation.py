@@ -15,8 +15,10 @@ from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import counted
 from codebotler.rtl import explain
+from roboeval.evaluation.failures import no_program_sentence
 from roboeval.evaluation.remarks import remarks_on
 from roboeval.evaluation.runs.completions import KEY, Completion
+from roboeval.evaluation.runs.replies import reply_data
 from roboeval.evaluation.runs.traces import can_judge, has_circumstances, trace_of
 from roboeval.suites.load import Scenario, Suite
 
@@ -41,7 +43,8 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
     verdict = row["verdicts"][why["world"]]
     told = {key: verdict[key] for key in ("world", "error", "line")}
     if why["check"] is None:
-        return {"passed": False, "failure": why, **told, "explanation": None, "step": None}
+        explanation = no_program_sentence(why)
+        return {"passed": False, "failure": why, **told, "explanation": explanation, "step": None}
     scenario = _scenario(suite, row, why["world"], ablated=ablated)
     explained = _explained(why["check"], scenario, verdict, trace_of(verdict), Patience())
     return {"passed": False, "failure": why, **told, **explained}
@@ -56,6 +59,7 @@ def completion_data(
         **{key: row[key] for key in (*KEY, "passed", "failure")},
         **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
         "suite_instruction": suite_instruction(suite, row["task"], row["prompt"]),
+        "reply": reply_data(completion),
         "lowered": suite is not None and suite.rules.literals == "lowercase",
         "worlds": [
             _world_data(verdict, _scenario(suite, row, number, ablated=ablated), patience, suite)

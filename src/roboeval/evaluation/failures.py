@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import Any, get_args
 
 from codebotler.core.trace import Outcome, Status
-from codebotler.models.no_program import NO_PROGRAM_KINDS
+from codebotler.models.no_program import IN_WORDS, NO_PROGRAM_KINDS
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
@@ -24,12 +24,21 @@ class FailureClass:
     label: str  # for people
     plural: str
     kinds: tuple[str, ...]  # those that tables always show; others appear as they come
+    ending: str = ""  # how a program ends by it, for people; by default "in a" with the label
+    is_always_shown: bool = True  # to people; of the others, only those that happened
 
 
 CLASSES: Mapping[str, FailureClass] = {
     one.name: one
     for one in (
-        FailureClass(NO_PROGRAM, "no program", "without a program", NO_PROGRAM_KINDS),
+        FailureClass(
+            NO_PROGRAM,
+            "no program",
+            "without a program",
+            NO_PROGRAM_KINDS,
+            ending="without a program",
+            is_always_shown=False,
+        ),
         FailureClass(
             PYTHON,
             "Python error",
@@ -74,6 +83,26 @@ def label_of(name: str) -> str:
 def plural_of(name: str) -> str:
     """The plural label of a class; of an unknown one its name."""
     return CLASSES[name].plural if name in CLASSES else name
+
+
+def ending_of(name: str) -> str:
+    """How programs end that fail by a class, such as `in a Python error`."""
+    return (CLASSES[name].ending if name in CLASSES else "") or f"in a {label_of(name)}"
+
+
+def shown_classes(happened: Collection[str]) -> list[str]:
+    """The classes that people are shown, given those by which something failed.
+
+    The paper's three are always shown, so that runs can be compared; `NoProgram` only where it happened.
+    """
+    return [name for name, one in CLASSES.items() if one.is_always_shown or name in happened]
+
+
+def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
+    """Why a reply held no program, in a sentence, from the failure of a row; None if it fails otherwise."""
+    if failure["class"] != NO_PROGRAM:
+        return None
+    return next((words for kind, words in IN_WORDS.items() if kind == failure["kind"]), "")
 
 
 @dataclass(frozen=True)

@@ -123,6 +123,11 @@ def generate_run(
     return progress
 
 
+def reply_of_refusal(error: ModelError) -> Reply:
+    """The reply that stands for a request that the server refused for good."""
+    return reply_from(error.sentence, Usage(), None, None, said="refusal", has_answer=False)
+
+
 _KEY: ContextVar[Key] = ContextVar("_KEY")
 
 
@@ -224,8 +229,7 @@ class _Generation:
     def _keep_refused(self) -> None:
         """Keep requests that the server refused for good, now that it has taken another one."""
         for key, error in self._refused.items():
-            reply = reply_from(error.sentence, Usage(), None, None, said="refusal", has_answer=False)
-            self.file.append(self._line(key, reply))
+            self.file.append(self._line(key, reply_of_refusal(error)))
             del self.progress.failures[key]
             self.progress.done += 1
         self._refused.clear()

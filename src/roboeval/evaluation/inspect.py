@@ -94,8 +94,10 @@ def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = 
     """The verdict of `roboeval evaluate` on the program in a reply, in a thread beside the event loop."""
 
     def judged(state: TaskState) -> Score:
-        by, program = _suite(suite, worlds, seed), program_of(state.output.completion).source
-        completion = Completion(**state.metadata, index=0, program=program)
+        by, reply = _suite(suite, worlds, seed), state.output.completion
+        reasons = [choice.stop_reason for choice in state.output.choices]
+        said = {"raw_reply": reply, "finish_reason": reasons[0] if reasons else None}
+        completion = Completion(**state.metadata, index=0, program=program_of(reply).source, more=said)
         (row,) = evaluate([completion], by, engine=Local(shared_pool()))
         text = json.dumps(completion_data(row, completion, by), ensure_ascii=False)
         data = json.loads(text.encode(errors="replace"))  # a log cannot hold half of a surrogate pair

@@ -30,7 +30,7 @@ from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.rules import PAPER
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
-from roboeval.evaluation.failures import NO_PROGRAM, PYTHON, Verdict, failure
+from roboeval.evaluation.failures import NO_PROGRAM, Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown
 from roboeval.evaluation.runs.rows import Row, bounded
 from roboeval.evaluation.runs.traces import circumstances
@@ -39,7 +39,7 @@ from roboeval.suites.load import Requirement, Scenario, Suite
 LOG = logging.getLogger("roboeval.evaluation.judge")
 Value = TypeVar("Value")
 
-FAILED_BY_PYTHON = b'{"passed": false, "failure": {"class": "%b", ' % PYTHON.encode()  # as `judgement` writes
+FAILED = b'{"passed": false, '  # as `judgement` writes it
 BUDGET = 60  # seconds of processor time that judging one program may take, in all its worlds
 MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 128  # results, and events of all runs of one
 
@@ -168,9 +168,9 @@ def judgements(
 def _of_reply(completion: Completion, told: bytes) -> bytes:
     """The judgement on a program, given as JSON, with what is wrong with its reply if that held no program.
 
-    Text that is no program ends in some Python error, which is not the cause.
+    Text that is no program ends in some error, and half a program fails some check: neither is the cause.
     """
-    if not told.startswith(FAILED_BY_PYTHON) or (kind := completion.no_program) is None:
+    if not told.startswith(FAILED) or (kind := completion.no_program) is None:
         return told
     judgement = json.loads(told)
     cause = {**judgement["failure"], "class": NO_PROGRAM, "kind": kind}

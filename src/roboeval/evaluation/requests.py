@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
@@ -21,6 +21,9 @@ from codebotler.prompts import Prompt, prompt_for, template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
+
+if TYPE_CHECKING:
+    from codebotler.models.batch import BatchModel  # which imports large libraries
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies
 LATER = ("reasoning_effort", "extra_body")  # settings that runs of earlier versions do not name
@@ -63,7 +66,7 @@ class GenerationPlan:
 
     def completed(self, run: Run) -> Iterator[Completion]:
         """The completions that a run has; raises UserError if one's instruction is no longer the suite's."""
-        if not run.completions.stat().st_size:
+        if not run.completions.is_file() or not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
             if completion.instruction != self.instruction(completion.key):
@@ -86,7 +89,7 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 # --- run.json
 
 
-def run_metadata(run: Run, plan: GenerationPlan, model: Model) -> dict[str, Any]:
+def run_metadata(run: Run, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
     """The content of run.json; raises UserError where completions are there that were generated otherwise."""
     fixed = {
         "model": model.name,
@@ -105,6 +108,7 @@ def run_metadata(run: Run, plan: GenerationPlan, model: Model) -> dict[str, Any]
         raise UserError(f"{why}; name another folder", file=run.about)
     return {
         **fixed,
+        **_families(plan.suite),
         "batches": batches(earlier),
         "usage": no_usage(),
         "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
@@ -151,6 +155,13 @@ def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
         if "num_completions" in metadata
         else []
     )
+
+
+def _families(suite: Suite) -> dict[str, Any]:
+    """From which families the tasks were made, and what a later version must make of them."""
+    if suite.families is None:
+        return {}
+    return {"families": {**asdict(suite.families), "version": suite.version, "digest": suite.digest}}
 
 
 def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> None:

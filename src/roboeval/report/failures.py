@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 from roboeval.analysis.cluster import Cluster, clusters, groups
 from roboeval.analysis.counts import tally_of
-from roboeval.analysis.summary import ALL, Causes, causes
+from roboeval.analysis.summary import ALL, Causes, causes, cut_off
+from roboeval.analysis.summary import failures as counted_failures
 from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
-from roboeval.report.runs import JudgedRun
+from roboeval.report.runs import JudgedRun, coverage_of
 from roboeval.report.sheets import Cell, Groups, Picture, Prose, Section, Sheet, note, section, sheet
 from roboeval.suites.task import check_label
 
@@ -25,7 +26,7 @@ MOST_REVERSALS = 100  # groups of each run
 def why(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
     """How completions end (paper, section V.B)."""
     found = all_causes(runs, with_published=with_published)
-    picture = Picture("causes", lambda: figures.causes(found))
+    picture = Picture("causes", lambda: figures.causes(found), coverage_of(runs))
     notes = Prose(beside_notes(runs) if with_published else [])
     return section("causes", picture, notes, causes_sheet(found))
 
@@ -47,6 +48,12 @@ def most_frequent(run: JudgedRun) -> str:
         return ""
     (of, kind), count = max(counts.items(), key=lambda one: one[1])
     return f"{kind} ({plural_of(of)}), {count / run.completions.height:.0%} of all completions"
+
+
+def warnings(run: JudgedRun) -> list[str]:
+    """What a reader of the run's numbers must know: many replies that were cut off."""
+    warning = cut_off(counted_failures(tally_of(run.table)), run.results.scope).warning
+    return [] if warning is None else [f"{warning}."]
 
 
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
@@ -122,7 +129,7 @@ def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
     rows: list[list[Cell]] = []
     for one in found:
         before, after = one.pass_at_1
-        over = one.comparison.over_prompts
+        over = one.comparison.over_tasks
         places = place(one.name, here), place(one.name, there)
         rows.append([one.name, before, after, after - before, over.low, over.high, *places])
     return sheet("beside", rows)

@@ -1,22 +1,24 @@
-"""The figures of sections V and VI of the paper: bars by task, curves over prompts, causes of failures."""
+"""The figures of a report: pass@1 of each run, and those of sections V and VI of the paper."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import chain, cycle
+from itertools import cycle
 from typing import Any, TypeAlias
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.markers import TICKDOWN
 from matplotlib.patches import Patch
 
-from roboeval.analysis.metrics import TaskScore, threshold_curve
+from roboeval.analysis.metrics import Estimate, TaskScore, overall, threshold_curve
 from roboeval.analysis.resample import LIMITS
 from roboeval.analysis.summary import ALL, PASSED, Causes, kinds_in_order
-from roboeval.evaluation.failures import CLASSES, plural_of
+from roboeval.evaluation.failures import CLASSES, NO_PROGRAM, plural_of, shown_classes
 from roboeval.report.drawing import (
     COLOURS,
     DASHES,
@@ -53,6 +55,7 @@ A_ROW = 8  # tasks beside each other
 FEWEST = 4  # tasks to leave room for, lest a single bar fill a page
 SHORT_NAME = 16  # letters up to which two names fit beside each other below a narrow figure
 BAR = 0.82  # of the room that a task has
+MOST_PANELS = 3  # of kinds of failures beside each other, with the names of the kinds between them
 MOST_NUMBERS = 14  # rows or columns up to which each cell of a table has its number
 DARK_FROM = 0.75  # the share from which white is read better than black
 
@@ -60,11 +63,38 @@ Points: TypeAlias = Sequence[tuple[float, float]]
 Cells: TypeAlias = Sequence[Sequence[float | None]]
 
 
-# --- pass@1 by task
+# --- pass@1 by run, and by task
+
+
+def overall_scores(runs: Sequence[JudgedRun]) -> Figure:
+    """pass@1 of each run over all prompts, with its interval over tasks."""
+    figure = new_figure(WIDE, 0.62 + 0.21 * len(runs))
+    axes = figure.add_subplot()
+    for at, run in enumerate(runs):
+        passed = overall(run.scores, 1)
+        axes.barh(at, passed.mean, 0.6, color=COLOURS[0], linewidth=0)
+        if passed.is_known:
+            ends = [[passed.mean - passed.low], [passed.high - passed.mean]]
+            axes.errorbar(passed.mean, at, xerr=ends, **_whisker(2.5))
+        told = f"{passed.mean:.3f}  ({passed.ends()})"
+        beside = (1.02, at), axes.get_yaxis_transform()
+        axes.text(*beside[0], told, transform=beside[1], va="center", fontsize=7)
+    axes.set_yticks(range(len(runs)), [short_name(run.name, 34) for run in runs])
+    axes.set_ylim(len(runs) - 0.5, -0.5)
+    axes.tick_params(axis="y", left=False, length=0)
+    axes.set_xlim(0, 1)
+    axes.set_xticks([0, 0.25, 0.5, 0.75, 1])
+    axes.grid(visible=True, axis="x")
+    axes.set_xlabel("pass@1 over all prompts, with its 95% interval over tasks")
+    return figure
+
+
+def _whisker(cap: float) -> dict[str, Any]:
+    return {"fmt": "none", "elinewidth": 0.7, "capsize": cap, "capthick": 0.7, "ecolor": INK}
 
 
 def bars(runs: Sequence[JudgedRun]) -> Figure:
-    """pass@1 by task and model, with the range over prompts, and the ablated tasks beside it."""
+    """pass@1 by task and model, with intervals over prompts, and the ablated tasks beside it."""
     tasks = tasks_of(runs)
     there = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in there]
@@ -86,11 +116,13 @@ def bars(runs: Sequence[JudgedRun]) -> Figure:
             axes.set_ylabel("" if column else "pass@1")
             axes.set_title(title if ablated and not row else "", loc="left")
     names = [short_name(run.name) for run in runs]
-    handles = [
+    handles: list[Artist] = [
         Patch(facecolor=colour, hatch=hatch, edgecolor=PAPER, label=name)
         for colour, hatch, name in zip(COLOURS, HATCHES, names, strict=False)
     ]
-    columns = min(len(runs), 5 if max(map(len, names)) <= SHORT_NAME else 3)
+    if any(len(score.prompts) > 1 for run in runs for score in (*run.scores, *run.ablated_scores)):
+        handles.append(Line2D([], [], label=WORST_AND_BEST, **_mark(2.6)))
+    columns = min(len(handles), 5 if max(map(len, names)) <= SHORT_NAME else 3)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, handlelength=1.0)
     return figure
 
@@ -102,15 +134,26 @@ def _in_lines(tasks: Sequence[str], lines: int) -> list[Sequence[str]]:
 
 def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[str], room: int) -> None:
     width = BAR / len(scores)
-    line = {"elinewidth": 0.7, "capsize": min(2.5, 14 * width), "capthick": 0.7, "ecolor": INK}
     for number, those in enumerate(scores):
         there = [(tasks.index(score.task), score) for score in those if score.task in tasks]
         places = [at + (number + 0.5) * width - BAR / 2 for at, _ in there]
-        means = [score.pass_at(1).mean for _, score in there]
-        below = [max(0.0, mean - score.lowest(1)) for mean, (_, score) in zip(means, there, strict=True)]
-        above = [max(0.0, score.highest(1) - mean) for mean, (_, score) in zip(means, there, strict=True)]
+        passed = [score.pass_at(1) for _, score in there]
+        means = [one.mean for one in passed]
+        known = [one if one.is_known else Estimate(one.mean, one.mean, one.mean) for one in passed]
+        ends = [[one.mean - one.low for one in known], [one.high - one.mean for one in known]]
         look: dict[str, Any] = {"color": COLOURS[number], "hatch": HATCHES[number], "edgecolor": PAPER}
-        axes.bar(places, means, width * 0.92, linewidth=0, yerr=[below, above], error_kw=line, **look)
+        axes.bar(places, means, width * 0.92, linewidth=0, **look)
+        shown = [at for at, one in enumerate(passed) if one.is_known]
+        if shown:
+            whiskers = [[of[at] for at in shown] for of in ends]
+            where = [places[at] for at in shown], [means[at] for at in shown]
+            axes.errorbar(*where, yerr=whiskers, **_whisker(min(2.5, 14 * width)))
+        several = [
+            (place, one) for place, (_, one) in zip(places, there, strict=True) if len(one.prompts) > 1
+        ]
+        marks = [(place, end) for place, one in several for end in {one.lowest(1), one.highest(1)}]
+        if marks:
+            axes.plot(*zip(*marks, strict=True), **_mark(min(2.6, 20 * width)))
         zeros = [place for place, mean in zip(places, means, strict=True) if mean == 0]
         if zeros:
             axes.plot(zeros, [0] * len(zeros), "o", color=COLOURS[number], markersize=2.2, clip_on=False)
@@ -121,6 +164,15 @@ def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[
     axes.grid(visible=True, axis="y")
     axes.set_xticks(range(len(tasks)), [_two_lines(task) for task in tasks])
     axes.tick_params(axis="x", bottom=False, length=0, labelsize=6.5 if room > 6 else 7)  # noqa: PLR2004 - many labels
+
+
+WORST_AND_BEST = "worst and best prompt"
+
+
+def _mark(size: float) -> dict[str, Any]:
+    """How a prompt of a task is marked."""
+    edge = {"markerfacecolor": PAPER, "markeredgecolor": INK, "markeredgewidth": 0.5}
+    return {"linestyle": "none", "marker": "D", "markersize": size, "clip_on": False, "zorder": 4, **edge}
 
 
 def _two_lines(task: str) -> str:
@@ -301,32 +353,39 @@ def _percent(share: float) -> str:
 
 def causes(found: Sequence[tuple[str, Causes]]) -> Figure:
     """How completions end, by class, and by the kinds of each class."""
-    kinds = {name: kinds_in_order([one for _, one in found], name) for name in CLASSES}
+    happened = {name for _, one in found for name, share in one.classes.items() if share}
+    shown = shown_classes(happened)
+    kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}
     tallest = max(3, *map(len, kinds.values()))
     many = len(found) > MOST_NUMBERS
     longest = 0 if many else max(len(short_name(name, 18)) for name, _ in found)
     # Names of models stand aslant below the panels.
     below = 0.95 + (0.13 * len(found) if many else 0.155 * tallest) + 0.04 * max(0, longest - 8)
-    heights = [1.05 + 0.2 * len(found), below]
+    columns = len(shown) if many or len(shown) <= MOST_PANELS else 2
+    lines = math.ceil(len(shown) / columns)
+    heights = [1.05 + 0.2 * len(found), below * lines]
     figure = new_figure(WIDE, sum(heights))
     upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
     axes = upper.add_subplot()
-    _classes(axes, found)
-    upper.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, handlelength=1.4)
-    panels = lower.subplots(1, len(CLASSES), squeeze=False, sharey=many)[0]
-    for axes, letter, (name, one) in zip(panels, "bcdefgh", CLASSES.items(), strict=False):
-        axes.set_title(f"({letter}) {one.plural}", loc="left")
+    _classes(axes, found, shown)
+    legend = {"ncols": max(4, 1 + len(shown)), "handlelength": 1.4}
+    upper.legend(*axes.get_legend_handles_labels(), loc="outside lower center", **legend)
+    panels = lower.subplots(lines, columns, squeeze=False, sharey=many).flat
+    for axes in panels[len(shown) :]:
+        axes.set_visible(False)
+    for axes, letter, name in zip(panels, "bcdefgh", shown, strict=False):
+        axes.set_title(f"({letter}) {plural_of(name)}", loc="left")
         _kinds(axes, found, name, kinds[name], many=many)
     return figure
 
 
-def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
+def _classes(axes: Axes, found: Sequence[tuple[str, Causes]], shown: Sequence[str]) -> None:
     axes.set_title("(a) how completions end", loc="left")
     left = np.zeros(len(found))
     places = range(len(found))
-    colours = chain([FAINT], cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5)))
-    hatches = cycle(("", "", "////", "\\\\\\\\", "...."))
-    for name, colour, hatch in zip((PASSED, *CLASSES), colours, hatches, strict=False):
+    looks = _looks()
+    for name in (PASSED, *shown):
+        colour, hatch = looks[name]
         shares = np.array([one.classes.get(name, 0.0) for _, one in found])
         style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.4}
         label = name if name == PASSED else plural_of(name)
@@ -336,6 +395,16 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
     axes.set_ylim(len(found) - 0.5, -0.5)
     axes.tick_params(axis="y", left=False, length=0)
     share_axis(axes, along="x")
+
+
+def _looks() -> dict[str, tuple[str, str]]:
+    """The colour and the hatch of each end; the paper's classes keep theirs whatever else there is."""
+    others = [name for name in CLASSES if name != NO_PROGRAM]
+    colours = cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5))
+    hatches = cycle(("", "////", "\\\\\\\\", "....", ""))
+    of_others = {one: look for one, *look in zip(others, colours, hatches, strict=False)}
+    looks = {name: (colour, hatch) for name, (colour, hatch) in of_others.items()}
+    return {PASSED: (FAINT, ""), NO_PROGRAM: (QUIET, ""), **looks}
 
 
 def _with_count(name: str, count: int | None) -> str:

@@ -110,13 +110,16 @@ def _card(card: Card) -> str:
     estimate = card.passed
     low, high = (100 * end for end in (estimate.low, estimate.high))
     bar = f'<i style="width: {100 * estimate.mean:.1f}%"></i>'
-    bar += f'<u style="left: {low:.1f}%; width: {high - low:.1f}%"></u>'
+    if estimate.is_known:
+        bar += f'<u style="left: {low:.1f}%; width: {high - low:.1f}%"></u>'
     failure = f"Most frequent failure: {_text(card.failure)}." if card.failure else "Every program passes."
-    cost = f"<p>{_text(card.cost)}</p>" if card.cost else ""
+    more = [f"<p>{_prose(words)}</p>" for words in (card.cost,) if words]
+    more += [f'<p class="warning">{_prose(words)}</p>' for words in card.warnings]
     return (
         f'<article class="card"><h3>{_text(card.name)}</h3><p><b>{estimate.mean:.3f}</b> pass@1</p>'
         f'<div class="bar" aria-hidden="true">{bar}</div>'
-        f"<p>95% interval {_text(estimate.ends())}</p><p>{failure}</p>{cost}</article>"
+        f"<p>{_text(estimate.interval)}</p><p>{_text(card.coverage)}</p>"
+        f"<p>{failure}</p>{''.join(more)}</article>"
     )
 
 
@@ -128,7 +131,8 @@ def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
         return ""
     links = (base64.b64encode(svg).decode() for svg in drawn[picture.name])
     light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
-    caption, name = _text(described("figures", picture.name)), _text(picture.name)
+    caption = _text(" ".join([described("figures", picture.name), *picture.about]))
+    name = _text(picture.name)
     return (
         f'<figure id="figure-{name}">'
         f'<div class="wide" tabindex="0" role="region" aria-label="Figure: {name}"><picture>'
@@ -206,13 +210,15 @@ def _inside(cluster: Cluster) -> str:
     prompts = f"Prompt{'s' * (len(cluster.prompts) > 1)} {', '.join(map(str, cluster.prompts))}"
     world = _text(str(cluster.told["world"]))
     name = _text(name_of(cluster.representative))
-    head = f"<p>{prompts}. Such as {name}, in \u201c{world}\u201d.</p>"
+    where = "" if cluster.has_no_program else f", in \u201c{world}\u201d"
+    head = f"<p>{prompts}. Such as {name}{where}.</p>"
     if cluster.program is None:
         return f"{head}<p>The program that was judged is gone.</p>"
     program = f"<pre>{_text(_cut(cluster.program, CHARACTERS))}</pre>"
     fix = cluster.fix
     if fix is None:
-        return f"{head}{program}<p>No program of this task passes.</p>"
+        nothing = "" if cluster.has_no_program else "<p>No program of this task passes.</p>"
+        return f"{head}{program}{nothing}"
     lines = "".join(_changed(sign, line) for sign, line in fix.changes[:LINES])
     more = f"... {len(fix.changes) - LINES} more lines" if len(fix.changes) > LINES else ""
     count = f"{fix.changed} line{'s' * (fix.changed != 1)}"

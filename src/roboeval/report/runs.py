@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import polars as pl
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.errors import UserError
+from codebotler.core.words import counted
 from roboeval.analysis.counts import completions_of, task_scores
 from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.scope import Coverage
 from roboeval.report.drawing import short_name
 from roboeval.suites.load import Suite
 
@@ -71,6 +75,17 @@ class JudgedRun:
         return pass_at_1(self.scores)
 
     @property
+    def coverage(self) -> Coverage:
+        """Of how many completions its numbers speak."""
+        return self.results.scope.coverage(self.completions.height)
+
+    @property
+    def coverage_sentence(self) -> str:
+        """The same in words, with the tasks."""
+        prompts = counted(len(self.by_prompt), "prompt")
+        return f"{self.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
+
+    @property
     def mean(self) -> float:
         """The mean pass@1 over prompts."""
         return overall(self.scores, 1).mean
@@ -93,9 +108,41 @@ def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
     return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(there)]) if task in there]
 
 
-def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
-    """The same runs, each named by its model and, where that is not unique, by its folder, too."""
-    plain = [short_name(run.model or run.folder, LONGEST_NAME) for run in runs]
+def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
+    """Of how many completions and tasks each run has results, in sentences for captions; equal ones once."""
+    said: dict[str, list[str]] = {}
+    for run in runs:
+        said.setdefault(run.coverage_sentence, []).append(run.name)
+    if len(said) == 1:
+        each = "Each run: " if len(runs) > 1 else ""
+        return [f"{each}{next(iter(said))}."]
+    return [f"{', '.join(names)}: {words}." for words, names in said.items()]
+
+
+def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
+    """Read `RUN=TEXT`, by the number of the run; a run is named by its folder, as it was given or by name."""
+    labels: dict[int, str] = {}
+    names = [{str(path), path.resolve().name} for path in paths]
+    for text in texts:
+        run, _, label = text.partition("=")
+        if not run or not label.strip():
+            raise UserError(f'"{text}" is not a label; write --label RUN=TEXT')
+        found = [at for at, known in enumerate(names) if run.rstrip("/") in known]
+        if len(found) != 1:
+            which = "more than one run has that name" if found else "no such run is in the report"
+            raise UserError(f'--label names "{run}", but {which}; name one of {", ".join(map(str, paths))}')
+        if found[0] in labels:
+            raise UserError(f'--label names "{run}" twice; give one label')
+        if label.strip() in labels.values():
+            raise UserError(f'two runs have the label "{label.strip()}"; give each its own')
+        labels[found[0]] = label.strip()
+    return labels
+
+
+def named_apart(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
+    """The same runs, each named by its label, or by its model and, where that is not unique, its folder."""
+    told = {at: short_name(label, LONGEST_NAME) for at, label in labels.items()}
+    plain = [told.get(at) or short_name(run.model or run.folder, LONGEST_NAME) for at, run in enumerate(runs)]
     names = _apart(plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)])
     while len({*names}) < len(names):
         names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])

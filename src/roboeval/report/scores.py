@@ -8,6 +8,7 @@ from itertools import chain
 from codebotler.core.errors import UserError
 from roboeval.analysis.compare import MOST_PAIRS, compared, pairs_to_compare, unlike, verdict
 from roboeval.analysis.metrics import (
+    TaskScore,
     by_formula,
     judged_count,
     overall,
@@ -17,16 +18,16 @@ from roboeval.analysis.metrics import (
 )
 from roboeval.analysis.statistics import FEW, by_bootstrap
 from roboeval.report import figures, paper
-from roboeval.report.runs import JudgedRun, tasks_of
+from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
 from roboeval.report.sheets import Cell, Picture, Prose, Section, Sheet, note, section, sheet
-
-NO_SPREAD = "all prompts differ equally, so the interval over prompts is unknown"
 
 
 def results(runs: Sequence[JudgedRun]) -> Section:
     """pass@1 of each run and task."""
-    picture = Picture("tasks", lambda: figures.bars(runs))
-    return section("results", overall_sheet(runs), picture, task_sheet(runs))
+    coverage = coverage_of(runs)
+    overall_picture = Picture("overall", lambda: figures.overall_scores(runs), coverage)
+    picture = Picture("tasks", lambda: figures.bars(runs), coverage)
+    return section("results", overall_picture, overall_sheet(runs), picture, task_sheet(runs))
 
 
 def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -34,18 +35,19 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows: list[list[Cell]] = []
     for run in runs:
         tasks = [[prompt.pass_at(1) for prompt in score.prompts] for score in run.scores]
-        found = [overall(run.scores, 1), by_formula(tasks), by_bootstrap(tasks)]
+        over_prompts = by_formula([[prompt.pass_at(1)] for prompt in prompts_of(run.scores)])
+        found = [overall(run.scores, 1), over_prompts, by_bootstrap(tasks, over="tasks")]
         ends = [end for estimate in found for end in (estimate.low, estimate.high)]
-        prompts = prompts_of(run.scores)
-        counts = judged_count(prompts), len(prompts), len(tasks)
+        coverage = run.coverage
+        counts = coverage.judged, coverage.total, len(run.by_prompt), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
-    return sheet("overall", rows, notes=[*_alike(runs), *_few_tasks(runs), *_unfinished(runs)])
+    return sheet("overall", rows, notes=[*_unknown(runs), *_few_tasks(runs), *_unfinished(runs)])
 
 
-def _alike(runs: Sequence[JudgedRun]) -> list[str]:
+def _unknown(runs: Sequence[JudgedRun]) -> list[str]:
     found = ((run.name, overall(run.scores, 1)) for run in runs)
     return [
-        f"{name}: the interval over prompts is {passed.ends()}."
+        f"{name}: the interval over tasks is {passed.ends()}."
         for name, passed in found
         if not passed.is_known
     ]
@@ -61,18 +63,17 @@ def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
-    counts = [(run.name, judged_count(prompts_of(run.scores)), run.results.scope.total) for run in runs]
     return [
-        f"{name}: only {count:,} of {total:,} completions are judged, and only these count."
-        for name, count, total in counts
-        if count < total
+        f"{run.name}: {run.coverage}; only the judged ones count."
+        for run in runs
+        if not run.coverage.is_whole
     ]
 
 
 def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """pass@1 by task."""
     rows: list[list[Cell]] = [
-        [score.task, run.name, what, score.pass_at(1).mean, score.lowest(1), score.highest(1)]
+        _task_row(run, score, what)
         for what, is_ablated in (("all", False), ("common sense only", True))
         for task in tasks_of(runs)
         for run in runs
@@ -83,6 +84,13 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     some = "No run" if len(without) == len(runs) else f"Not {', '.join(without)}:"
     note = f"{some} was judged with --ablation, which requires common sense only."
     return sheet("tasks", rows, notes=[note] if without else [])
+
+
+def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
+    passed, coverage = score.pass_at(1), run.results.scope.coverage(judged_count(score.prompts), score.task)
+    ends = (passed.low, passed.high) if passed.is_known else (None, None)
+    counts = coverage.judged, coverage.total
+    return [score.task, run.name, what, *counts, passed.mean, *ends, score.lowest(1), score.highest(1)]
 
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
@@ -110,10 +118,11 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
             continue
         if len(said) < MOST_PAIRS:
             said.append(verdict(found, (first.name, second.name)))
-            if not found.over_prompts.is_known:
-                notes.append(f"{first.name} and {second.name}: {NO_SPREAD}.")
+            pair, over_prompts = f"{first.name} and {second.name}", found.over_prompts
+            if not over_prompts.is_known:
+                notes.append(f"{pair}: the interval over prompts is {over_prompts.ends()}.")
             if apart := unlike(first.results, second.results):
-                notes.append(f"{first.name} and {second.name}: {'; '.join(apart)}.")
+                notes.append(f"{pair}: {'; '.join(apart)}.")
         over = found.over_prompts, found.over_tasks
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]
         ps, much = (found.p_prompts, found.p_tasks), (found.needed.completions, found.needed.prompts)

@@ -70,6 +70,7 @@ class Picture(NamedTuple):
 
     name: str  # in page.yaml, and of its files
     draw: Callable[[], Figure]
+    about: Sequence[str] = ()  # sentences of the caption that are about these runs
 
 
 class Prose(NamedTuple):
@@ -95,8 +96,10 @@ class Card(NamedTuple):
 
     name: str
     passed: Estimate  # pass@1
+    coverage: str  # of how many completions and tasks it speaks
     failure: str  # the most frequent one, in words; empty where none failed
     cost: str  # in words; empty where it is not known
+    warnings: Sequence[str] = ()
 
 
 class Cards(NamedTuple):

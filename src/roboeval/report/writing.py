@@ -10,7 +10,7 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.analysis.metrics import overall
-from roboeval.evaluation.runs.completions import how_many
+from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
 from roboeval.report import breakdown, cost, failures, house, scores
 from roboeval.report.drawing import darkened, styled, written
@@ -40,7 +40,10 @@ HEAD = 4_000  # characters at the beginning of a page, among which is its genera
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     """The title of a page, and the paragraphs below it."""
     title = runs[0].name if len(runs) == 1 else f"{len(runs)} models"
-    count = how_many(sum(run.completions.height for run in runs))
+    each = [run.coverage for run in runs]
+    count = Coverage(
+        *(sum(counts) for counts in zip(*((c.judged, c.there, c.total) for c in each), strict=True))
+    )
     by_hand = [run.name for run in runs if (run.model or "").startswith("recorded:")]
     suite = runs[0].suite
     lead = [f"{count}, judged by the suite \u201c{suite.name}\u201d: {suite.about}."]
@@ -79,7 +82,14 @@ def sections(
 def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
     """Each run in a few lines, who is ahead, and how sure that is."""
     cards = [
-        Card(run.name, overall(run.scores, 1), failures.most_frequent(run), cost.in_words(run, prices))
+        Card(
+            name=run.name,
+            passed=overall(run.scores, 1),
+            coverage=run.coverage_sentence,
+            failure=failures.most_frequent(run),
+            cost=cost.in_words(run, prices),
+            warnings=failures.warnings(run),
+        )
         for run in runs
     ]
     return section("glance", Cards(cards), Prose(scores.leader(runs)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,14 +31,14 @@ class HouseRules:
     digest: str
 
     @classmethod
-    def of_suite(cls, path: Path, skills: SkillTable = SKILLS) -> HouseRules:
-        """Read the rules that a suite brings."""
-        return cls("", read_rules(path, skills), hashlib.sha256(path.read_bytes()).hexdigest())
+    def of_suite(cls, path: Path, skills: SkillTable, rooms: Sequence[str]) -> HouseRules:
+        """Read the rules that a suite with these rooms brings."""
+        return cls("", read_rules(path, skills, rooms), hashlib.sha256(path.read_bytes()).hexdigest())
 
     @classmethod
-    def read(cls, path: Path, skills: SkillTable = SKILLS) -> HouseRules:
-        """Read a file of rules; a UserError if it cannot be used."""
-        rules = read_rules(path, skills)
+    def read(cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = ()) -> HouseRules:
+        """Read a file of rules, for these rooms if they are known; a UserError if it cannot be used."""
+        rules = read_rules(path, skills, rooms)
         if not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(
                 "its name is used for files; write it in small letters, digits and dashes", file=path

@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
@@ -23,6 +24,10 @@ from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MOST_WORLDS, Accepted, Fact, SuiteFile
 from roboeval.suites.task import Check, Requirement, Scenario, Task
 from roboeval.suites.taskfile import read_task
+
+if TYPE_CHECKING:
+    from codebotler.models.recorded import InstructionSolutions
+    from roboeval.suites.families.suite import FamilyTasks
 
 __all__ = [
     "ABLATED",
@@ -59,6 +64,8 @@ class Suite:
         worlds: how many worlds a task has at least, where they are drawn; None if they are written by hand.
         seed: from which they are drawn.
         skills: what can stand in its formulas.
+        families: which tasks of families it holds, if it is made of them.
+        recorded: what the recorded models write for it, if that stands in no file.
     """
 
     name: str
@@ -72,6 +79,8 @@ class Suite:
     seed: int | None = None
     skills: SkillTable = SKILLS
     house: HouseRules | None = None  # what stops a program besides
+    families: FamilyTasks | None = None
+    recorded: tuple[InstructionSolutions, ...] = field(default=(), repr=False)
 
     def __hash__(self) -> int:
         return hash(self.digest)  # tasks lie in a dictionary, which has no hash
@@ -96,10 +105,11 @@ class Suite:
             seed: from which to draw them; the same as now by default.
 
         Raises:
-            UserError: its worlds are written by hand, or the number of worlds is out of its range.
+            UserError: its worlds are written by hand or follow from its name, or there are too many.
         """
         if self.worlds is None or self.folder is None:
-            raise UserError(f'the worlds of the suite "{self.name}" are written by hand; it draws none')
+            why = "are written by hand" if self.families is None else "follow from its name"
+            raise UserError(f'the worlds of the suite "{self.name}" {why}; it draws no others')
         if count is not None and not 1 <= count <= MOST_WORLDS:
             raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MOST_WORLDS:,}")
         return _read_suite(
@@ -128,19 +138,35 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     """Read a suite.
 
     Args:
-        name: of a suite that ships with RoboEval, or that an installed package brings, or its folder.
+        name: of a suite that ships with RoboEval, or that an installed package brings, or its folder; or
+            `families-SPLIT-SEED`, such as `families-test-7`: a fresh task of each family, and with `-N` at
+            the end N tasks.
         skills: what can stand in formulas, besides those of files that the suite names.
 
     Raises:
         UserError: there is no such suite, or one of its files is wrong.
     """
     name = str(name)
+    if (which := _family_tasks(name)) is not None:
+        return which.suite(skills)
     folder = suite_folder(name)
     suite = _read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():
         sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"; use the same name'
         raise YamlFile.read(folder / "suite.yaml").wrong(sentence, "name")
     return suite
+
+
+def has_suite(name: str) -> bool:
+    """Whether a suite ships, is installed, or is made of families; no folder is looked for."""
+    known = {*shipped_suites(), *(suite.name for suite in installed_suites())}
+    return name in known or _family_tasks(name) is not None
+
+
+def _family_tasks(name: str) -> FamilyTasks | None:
+    from roboeval.suites.families.suite import family_tasks_named  # noqa: PLC0415 - it imports Suite
+
+    return family_tasks_named(name)
 
 
 def shipped_suites() -> tuple[str, ...]:
@@ -198,12 +224,14 @@ def _suite_of(
     words = head.rules.words_for_people
     own = [folder / name for name in head.skills]
     skills = skills.with_skills(skills_from(*own)) if own else skills
-    house = None if head.house_rules is None else HouseRules.of_suite(folder / head.house_rules, skills)
     lenders = [_lender(file, head.instructions, path) if head.instructions else None for path in paths]
     tasks = [
         read_task(document, path, skills, lender=lender, count=count, seed=seed, words=words)
         for document, path, lender in zip(documents, paths, lenders, strict=True)
     ]
+    house = None
+    if head.house_rules is not None:
+        house = HouseRules.of_suite(folder / head.house_rules, skills, rooms_in(tasks))
     drawn = any(task.drawn for task in tasks)
     return Suite(
         name=head.name,
@@ -220,6 +248,12 @@ def _suite_of(
         seed=seed if drawn else None,
         skills=skills,
     )
+
+
+def rooms_in(tasks: Iterable[Task]) -> list[str]:
+    """The names of all rooms in the worlds of tasks."""
+    worlds = (scenario.world for task in tasks for scenario in task.scenarios)
+    return list(dict.fromkeys(room.name for world in worlds for room in world.rooms))
 
 
 def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:

@@ -13,7 +13,7 @@ from codebotler.core.program import parse_expression
 from codebotler.core.regex_flags import scope_flags
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.words import listed, room_name
+from codebotler.core.words import listed
 from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
 from codebotler.rtl.regex_words import first_choice
@@ -246,7 +246,7 @@ class _Reader:
             )
         given = {**self.phrases, START: start, **dict(zip(check.parameters, arguments, strict=True))}
         rtl = _filled(check.rtl, given)
-        spoken = {START: room_name(start), **{p: first_choice(given[p]) for p in check.parameters}}
+        spoken = {START: start, **{p: first_choice(given[p]) for p in check.parameters}}
         means = {kind: _filled(meaning, spoken) for kind, meaning in check.means.items()}
         try:
             formula = parse(f"not ({rtl})" if bare != text.strip() else rtl, skills=self.skills, means=means)

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import count as counting
-from itertools import islice
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
 from codebotler.core.errors import UserError, expect_list
-from codebotler.core.words import listed
 from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import prompt_for
-from roboeval.training.families import family_file, family_names, trained_task
-
-SIZE = 1_000_000_000
-SPLITS = {"train": 0, "validation": SIZE, "test": 2 * SIZE}
-"""The first seed of each split, which has so many."""
+from roboeval.suites.families.suite import first_seed
+from roboeval.suites.families.tasks import family_file, family_names, trained_prompts, trained_task
 
 Form: TypeAlias = Literal["chat", "text"]
 Completion: TypeAlias = str | Sequence[Mapping[str, Any]]
@@ -29,6 +23,7 @@ def load_prompts(
     seed: int = 0,
     only: Sequence[str] = (),
     form: Form = "chat",
+    progress: Callable[[int], object] | None = None,
 ) -> list[dict[str, Any]]:
     """Prompts for programs, the same on every machine; as many as are wanted.
 
@@ -38,6 +33,7 @@ def load_prompts(
         seed: for others: with the next number, all tasks are new.
         only: the families to draw from, also files of your own; all that are here by default.
         form: `chat` for messages, `text` for one text that base models go on from.
+        progress: called with the number of prompts that are made, each time that it has grown.
 
     Returns:
         rows with `prompt` (messages with `role` and `content`, or a text), `family`, `seed` and
@@ -47,27 +43,26 @@ def load_prompts(
     Raises:
         UserError: there is no such split or family, or the count or the seed is out of range.
     """
-    if split not in SPLITS:
-        raise UserError(f'there is no split "{split}"; there is {listed(list(SPLITS))}')
+    first = first_seed(split, seed, count, "prompt")
     expect_list(only, "the families")
     for name in only:
         family_file(name)
-    if count < 1:
-        raise UserError(f"the number of prompts is {count}, but it must be at least 1")
-    if not 0 <= seed * count <= SIZE - count:
-        raise UserError(
-            f"the seed is {seed}, but with {count:,} prompts it must be from 0 to {SIZE // count - 1:,}"
-        )
     names = tuple(only) or family_names()
-    first = SPLITS[split] + seed * count
-    return [_row(names, number, form) for number in islice(counting(first), count)]
+    rows: list[dict[str, Any]] = []
+    for number in range(first, first + count):
+        if len(rows) < len(names):  # once for each family, whose file may be wrong
+            trained_task(names[number % len(names)], number)
+        rows.append(_row(names, number, form))
+        if progress is not None:
+            progress(len(rows))
+    return rows
 
 
 def _row(families: Sequence[str], seed: int, form: Form) -> dict[str, Any]:
     """The row of a seed: in turn of each family, and of each of its phrasings."""
     turn, number = divmod(seed, len(families))
     family = families[number]
-    prompts = trained_task(family, seed).prompts
+    prompts = trained_prompts(family, seed)
     index = turn % len(prompts)
     asked = prompt_for(prompts[index])
     chat = [{"role": message.role, "content": message.text} for message in asked.messages]
@@ -91,7 +86,9 @@ def program_in(completion: Completion, opening: str = "") -> str:
         UserError: there is no message, or one without content.
     """
     text = completion if isinstance(completion, str) else _said(completion)
-    return prompt_for("go on").program_from(text) if opening else program_of(text).source
+    if not opening:
+        return program_of(text).source
+    return program_of(prompt_for("go on").program_from(text), continues=True).source
 
 
 def _said(messages: Sequence[Mapping[str, Any]]) -> str:

@@ -17,9 +17,9 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import AHEAD, shared_pool
 from roboeval.evaluation.judge import are_met, may_satisfy, robot_in
 from roboeval.evaluation.rewards import Remembered, Share, asked_in, total
+from roboeval.suites.families.tasks import WORLDS, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.suites.task import Scenario
-from roboeval.training.families import WORLDS, trained_task
 
 TOGETHER = 16  # programs for the same task that are run together
 

@@ -10,7 +10,7 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import PlainText
+from codebotler.web.frame import PlainText, outside
 from roboeval.web.difference import PAIR, Difference, differences_of, draw_differences
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
@@ -28,7 +28,7 @@ async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
     PlainText("h1", "Runs side by side")
     if not names:
         PlainText("p", "Tick runs in the list, then show them side by side.", "quiet")
-        html.a("All runs", href="/runs")
+        html.a("All runs", href=outside("/runs"))
         return
     if len(names) > MOST:
         PlainText("p", f"These are the first {MOST} of {len(names):,} runs.", "quiet")
@@ -112,7 +112,7 @@ def _head(run: Snapshot) -> dict[str, Any]:
 def _draw_run(run: Snapshot) -> None:
     data = run_data(run)
     with ui.element("li"):
-        html.a(shortened(run.name, MOST_NAME), href=address(run.name)).props("dir=auto")
+        html.a(shortened(run.name, MOST_NAME), href=outside(address(run.name))).props("dir=auto")
         show_state(data, PlainText("small"))
         PlainText("b", score_text(data))
         PlainText("span", f"{completions_text(data)}, {models_of(run)}", "quiet")

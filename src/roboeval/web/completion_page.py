@@ -11,11 +11,11 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.checking.storyboard import step_text
-from codebotler.core.terminal import shortened
+from codebotler.core.terminal import shortened, visible_lines
 from codebotler.core.words import counted
 from codebotler.core.world import World
 from codebotler.web.floorplan import MapState, floorplan
-from codebotler.web.frame import PlainText
+from codebotler.web.frame import PlainText, outside
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.cluster import Fix, nearest_fix
 from roboeval.evaluation.explanation import (
@@ -26,8 +26,9 @@ from roboeval.evaluation.explanation import (
     failing_first,
     instruction_shown,
 )
-from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import Key, by_hand, name_of
+from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_person, world_title
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import MissingError, RunStore
@@ -35,7 +36,7 @@ from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import Filter, Snapshot
 from roboeval.web.widgets import ProgramView
 
-MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION = 80, 2_000, 5_000
+MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION, MOST_REPLY = 80, 2_000, 5_000, 50_000
 RED = "Red: the step at which a check failed."
 NEIGHBOURS = ("Previous completion", "Next completion")
 CHANGED = "The program was changed or removed after it was judged; the verdicts are about the earlier one."
@@ -48,7 +49,9 @@ async def draw_completion(
     snapshot, data, fix = await asyncio.to_thread(_read, store, run, name, evaluation)
     _draw_head(snapshot, data, fix, chosen, chosen.query(evaluation))
     with ui.element("div").classes("one-program"):
-        _draw_program(data)
+        with ui.element("div").classes("program-and-reply"):
+            _draw_program(data)
+            _draw_reply(data["reply"])
         _draw_worlds(data, _worlds(snapshot, data["task"]))
 
 
@@ -62,7 +65,8 @@ def _read(
         raise MissingError(f'this run has no completion "{shortened(name, MOST_NAME)}"')
     data = completion_details(snapshot, row)
     key: Key = data["task"], data["prompt"], data["index"]
-    fix = nearest_fix(snapshot.results, key) if data["passed"] is False else None
+    has_failed = data["passed"] is False and _sentence(data) is None
+    fix = nearest_fix(snapshot.results, key) if has_failed else None
     return snapshot, data, fix
 
 
@@ -77,14 +81,14 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
 def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: Filter, query: str) -> None:
     key: Key = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
-        html.a(shortened(run.name, MOST_NAME), href=f"{address(run.name)}{query}#completions").props(
+        html.a(shortened(run.name, MOST_NAME), href=outside(f"{address(run.name)}{query}#completions")).props(
             "dir=auto"
         )
         for text, other in zip(NEIGHBOURS, run.neighbours(key, chosen), strict=True):
             if other is not None:
                 task, prompt, index = other
                 href = f"{address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
-                html.a(text, href=href).classes("beside")
+                html.a(text, href=outside(href)).classes("beside")
     PlainText("h1", shortened(name_of(key), MOST_NAME))
     with ui.element("p").classes("facts"):
         why, state = data["failure"], {None: "waits", True: "done", False: "failed"}[data["passed"]]
@@ -96,7 +100,7 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: 
             PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
         if fix is not None:
             text = f"Nearest program that passes: {counted(fix.changed, 'line')} changed"
-            html.a(text, href=f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}")
+            html.a(text, href=outside(f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
     if data["stale"]:
         PlainText("p", CHANGED, "trouble")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
@@ -108,19 +112,47 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: 
 
 def _draw_program(data: Mapping[str, Any]) -> None:
     with ui.element("section").classes("pane").props("aria-labelledby=h-program"):
-        PlainText("h2", "Program").props("id=h-program")
+        title = "Program" if _sentence(data) is None else "Taken from the reply"
+        PlainText("h2", title).props("id=h-program")
         if data["program"] is None:
             PlainText("p", "It is no longer in this run.", "quiet")
             return
-        lines = (world["line"] for world in data["worlds"] if not world["satisfied"])
+        ran = data["worlds"] if _sentence(data) is None else ()
+        lines = (world["line"] for world in ran if not world["satisfied"])
         view = ProgramView(data["program"], (line for line in lines if line is not None))
         if view.left_out:
             PlainText("p", f"{view.left_out:,} more lines; all are in completions.jsonl.", "quiet")
 
 
+def _sentence(data: Mapping[str, Any]) -> str | None:
+    """Why its reply held no program; None if it held one."""
+    return None if data["failure"] is None else no_program_sentence(data["failure"])
+
+
+def _draw_reply(reply: Mapping[str, Any] | None) -> None:
+    """Draw how the reply ended, and folded, what the model thought and the reply as it came."""
+    if reply is None:
+        return
+    with ui.element("section").classes("pane reply").props("aria-labelledby=h-reply"):
+        PlainText("h2", "Reply").props("id=h-reply")
+        PlainText("p", "; ".join(reply_facts(reply)), "quiet")
+        for name, text in (("Reasoning", reply["reasoning"]), ("Reply as it came", reply["raw_reply"])):
+            if text:
+                title = f"{name}, {counted(len(text), 'character')}"
+                _draw_folded(partial(PlainText, "span", title), partial(_draw_text, text, name))
+
+
+def _draw_text(text: str, name: str) -> None:
+    pre = PlainText("pre", shortened(text, MOST_REPLY, visible_lines), "source").props("tabindex=0")
+    pre.props["aria-label"] = name
+
+
 def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> None:
     judged = completion["worlds"]
     with ui.element("div").classes("worlds-of"):
+        if (sentence := _sentence(completion)) is not None:  # no robot did anything
+            PlainText("p", sentence, "trouble")
+            return
         if completion["lowered"]:
             judged = as_written(judged, completion["program"])
         if judged != completion["worlds"]:

@@ -11,10 +11,9 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import PlainText
+from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.compare import compared, pairs_to_compare, verdict
-from roboeval.analysis.metrics import Estimate, by_formula, pass_at_1
-from roboeval.analysis.statistics import DIFFERENCE
+from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
 from roboeval.evaluation.runs.completions import KEY, Key, name_of
 from roboeval.web.heat_map import address
 from roboeval.web.snapshot import Snapshot
@@ -23,8 +22,8 @@ from roboeval.web.widgets import interval_text
 MOST_NAME, MOST_TASKS, MOST_KEYS = 60, 100, 30
 PAIR = 2
 HEADS = ("95% interval", "Different verdicts")
-ABOUT = "Intervals take prompts as drawn at random."
-UNKNOWN = " Where all prompts of a task differ equally, the interval is unknown."
+ABOUT = "The interval of all tasks is over tasks, that of a task over its prompts."
+UNKNOWN = " Where all differ equally, or one is alone, it is unknown."
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class TaskRow:
 
     task: str
     shares: tuple[float, float]  # of completions that pass, mean over the prompts that both have
-    difference: Estimate  # the second minus the first, with prompts drawn at random
+    difference: Estimate  # the second minus the first; over prompts, of all tasks over tasks
     differing: tuple[tuple[Key, bool], ...]  # where one run's passes, and whether it is the second's
 
 
@@ -93,7 +92,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
     told = verdict(found, names)
     if not by_task:
         return Difference((first, second), told)
-    overall = TaskRow("All tasks", (found.first, found.second), found.over_prompts, ())
+    overall = TaskRow("All tasks", (found.first, found.second), found.over_tasks, ())
     return Difference((first, second), told, overall, tuple(task_rows(first, second)[:MOST_TASKS]))
 
 
@@ -107,7 +106,7 @@ def draw_differences(found: Sequence[Difference]) -> None:
             with ui.element("li"):
                 PlainText("span", one.told)
                 query = urlencode([("run", run.name) for run in one.runs], errors="replace")
-                html.a("Task by task", href=f"/side-by-side?{query}")
+                html.a("Task by task", href=outside(f"/side-by-side?{query}"))
 
 
 def _draw_difference(difference: Difference) -> None:
@@ -150,7 +149,7 @@ def _draw_differing(row: TaskRow, runs: Sequence[Snapshot]) -> None:
                     PlainText("span", f"{name_of(key)}: ")
                     for run, text in zip(runs, _verdicts(is_second), strict=True):
                         link = html.a(f"{shortened(run.name, MOST_NAME)} {text}")
-                        link.props["href"] = f"{address(run.name)}/{name_of(key)}"
+                        link.props["href"] = outside(f"{address(run.name)}/{name_of(key)}")
             if (left := len(row.differing) - MOST_KEYS) > 0:
                 PlainText("li", f"and {left:,} more")
 

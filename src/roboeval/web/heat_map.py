@@ -10,7 +10,7 @@ from urllib.parse import quote
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import mean_of
 from roboeval.analysis.summary import Failures
-from roboeval.evaluation.failures import label_of, plural_of
+from roboeval.evaluation.failures import NO_PROGRAM, ending_of, plural_of
 from roboeval.evaluation.runs.completions import by_hand
 from roboeval.web.snapshot import Filter, Snapshot
 
@@ -48,12 +48,13 @@ def models_of(run: Snapshot) -> str:
 
 
 def failure_text(chosen: Filter) -> str | None:
-    """The kind or class of failures that a filter means, as text; None if it means others, too."""
-    if chosen.failure_kind is not None:
-        return shortened(chosen.failure_kind, MOST_NAME)
-    if chosen.failure_class is not None:
-        return f"a {shortened(label_of(chosen.failure_class), MOST_NAME)}"
-    return None
+    """How programs end by the kind or class that a filter means, such as `in NameError`; else None."""
+    kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MOST_NAME)
+    if chosen.failure_class == NO_PROGRAM:
+        return ending_of(NO_PROGRAM) + ("" if kind is None else f" ({kind})")
+    if kind is not None:
+        return f"in {kind}"
+    return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MOST_NAME)
 
 
 class TaskCells:
@@ -64,7 +65,7 @@ class TaskCells:
         counted = Filter(passed=True) if chosen.verdict == Filter() else chosen
         self._bad = not counted.passed
         by = failure_text(counted)
-        self._verb = "passed" if counted.passed else "failed" if by is None else f"ended in {by}"
+        self._verb = "passed" if counted.passed else "failed" if by is None else f"ended {by}"
         self.tasks: dict[str, dict[int, dict[str, Any]]] = {}
         for prompt in run.prompts(counted):
             self.tasks.setdefault(prompt["task"], {})[prompt["prompt"]] = prompt
@@ -147,6 +148,6 @@ def _failure_cell(run: Snapshot, chosen: Filter, kind: Failures | None) -> dict[
     return {
         "text": text,
         "shade": shade(share, bad=True),
-        "title": f"{shortened(run.name, MOST_NAME)}: {text} % ended in {failure_text(chosen)}, {count:,}",
+        "title": f"{shortened(run.name, MOST_NAME)}: {text}% ended {failure_text(chosen)}, {count:,}",
         "href": f"{address(run.name)}{chosen.query(None)}#completions" if count else None,
     }

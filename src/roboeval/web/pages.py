@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import Query
+from fastapi import Query, Request
 from fastapi.responses import RedirectResponse
 from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from codebotler.web.frame import PATIENCE, Pages, Site
+from codebotler.web.proxy import prefix_of
 from roboeval.suites.load import Suite
 from roboeval.web.api import Chosen, Evaluation, router
 from roboeval.web.comparison_page import draw_comparison
@@ -34,7 +35,7 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
         site.app.include_router(router(store, all_runs))
         site.app.mount("/static/benchmark", StaticFiles(directory=STATIC))
         if not site.frame.has_robot:
-            site.app.get("/", include_in_schema=False)(lambda: RedirectResponse("/runs"))
+            site.app.get("/", include_in_schema=False)(_to_runs)
 
         @ui.page("/runs", response_timeout=PATIENCE)
         async def show_runs() -> None:
@@ -57,6 +58,10 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
                 await draw_comparison(store, list(dict.fromkeys(run or ())))
 
     return Pages("Benchmark", "RoboEval", "/runs", add)
+
+
+def _to_runs(request: Request) -> RedirectResponse:
+    return RedirectResponse(f"{prefix_of(request.scope)}/runs")
 
 
 PAGES = pages()

@@ -10,13 +10,22 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import Button, PlainText
+from codebotler.web.frame import Button, PlainText, outside
 from roboeval.evaluation.failures import plural_of
 from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models_of, percent
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import Filter, Snapshot
-from roboeval.web.widgets import EVERY, CompletionList, HeatMap, completions_text, score_text, show_state
+from roboeval.web.widgets import (
+    EVERY,
+    CompletionList,
+    HeatMap,
+    completions_text,
+    date_text,
+    score_text,
+    show_state,
+    tasks_text,
+)
 
 MOST_NAME = 80
 SCROLL = "document.getElementById('completions').scrollIntoView()"
@@ -80,7 +89,7 @@ class _RunPage:
 
     def _choose(self, chosen: Filter) -> None:
         self._chosen = chosen
-        ui.navigate.history.replace(address(self._run.name) + chosen.query(self._evaluation))
+        ui.navigate.history.replace(outside(address(self._run.name)) + chosen.query(self._evaluation))
         self._show_chosen()
 
     def _show(self) -> None:
@@ -99,7 +108,8 @@ class _RunPage:
         self._all.set_visibility(chosen != Filter())
         source = f"/api/runs/{quote(run.name, safe='')}/completions{chosen.query(run.results.key) or '?'}"
         query = chosen.query(self._evaluation)
-        self._list.show(source=source, base=address(run.name), query=query, version=self._changes)
+        base = outside(address(run.name))
+        self._list.show(source=outside(source), base=base, query=query, version=self._changes)
         self._show_kinds()
 
     def _show_kinds(self) -> None:
@@ -144,7 +154,11 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
         state = PlainText("small")
         PlainText("span", models_of(run) + (f", judged by {shortened(key, MOST_NAME)}" if key else ""))
         PlainText("b", score_text(data))
-        PlainText("span", completions_text(data))
+        PlainText("span", f"{completions_text(data)}, {tasks_text(data)} tasks")
+        if data["date"] is not None:
+            PlainText("span", f"started {date_text(data)} UTC", "quiet")
+        if data["settings"]:
+            PlainText("span", shortened(data["settings"], 200), "quiet")
     bar = html.progress(max="1").classes("long")
     show_state(data, state, bar)
     with ui.element("ul").classes("notes"):
@@ -152,16 +166,18 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
             PlainText("li", sentence, "unsure")
     with ui.element("p").classes("facts"):
         if has_report:
-            html.a("The report of this run", href=f"/api/runs/{quote(run.name, safe='')}/report")
+            html.a("The report of this run", href=outside(f"/api/runs/{quote(run.name, safe='')}/report"))
         for other in run.evaluations if len(run.evaluations) > 1 else ():
-            link = html.a(shortened(other, MOST_NAME), href=address(run.name) + Filter().query(other))
+            link = html.a(
+                shortened(other, MOST_NAME), href=outside(address(run.name) + Filter().query(other))
+            )
             if other == key:
                 link.props('aria-current="true"')
 
 
 def _verb(chosen: Filter, *, past: bool = False) -> str:
     if (by := failure_text(chosen)) is not None:
-        return f"{'ended' if past else 'end'} in {by}"
+        return f"{'ended' if past else 'end'} {by}"
     verb = "fail" if chosen.passed is False else "pass"
     return f"{verb}ed" if past else verb
 

@@ -15,8 +15,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
-from roboeval.suites.installed import installed_suites
-from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
+from roboeval.suites.load import ABLATED, Suite, has_suite, load_suite
 from roboeval.web.snapshot import Snapshot
 
 MOST_HELD = 16  # evaluations that stay in memory
@@ -74,9 +73,8 @@ class RunStore:
     def suite(self, name: str) -> Suite | None:
         """A suite that ships, is installed or was named; None if it is not at hand."""
         if name not in self._suites:
-            known = {*shipped_suites(), *(brought.name for brought in installed_suites())}
             try:
-                self._suites[name] = load_suite(name) if name in known else None
+                self._suites[name] = load_suite(name) if has_suite(name) else None
             except UserError as error:
                 note(f"a suite is left out: {error}")
                 self._suites[name] = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -11,11 +12,11 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import Button, PlainText
+from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList
-from roboeval.web.widgets import EVERY, count_text, interval_text, show_state
+from roboeval.web.widgets import EVERY, count_text, date_text, interval_text, show_state, tasks_text
 
 READ_FOR = 0.5  # seconds after which runs are shown that were not read yet
 
@@ -23,12 +24,21 @@ Order: TypeAlias = Callable[[Mapping[str, Any]], tuple[float, str]]
 ORDERS: Mapping[str, tuple[str, Order]] = {
     "Run": ("ascending", lambda run: (0, run["run"].lower())),
     "pass@1": ("descending", lambda run: (-(run.get("pass@1") or {"mean": -1})["mean"], run["run"])),
+    "Started": ("descending", lambda run: (-_moment(run.get("date")), run["run"])),
     "Completions": ("descending", lambda run: (-run.get("completions", 0), run["run"])),
 }
-COLUMNS = ("Run", "Suite", "State", "Completions", "pass@1")
+COLUMNS = ("Run", "Suite", "Tasks", "State", "Completions", "pass@1", "Started")
+ABOUT = "pass@1 is shown with its 95% interval over tasks; times are UTC."
 NOTHING = "There are no runs yet. This makes the first one, without a key or a network:"
 FIRST = "run --model recorded:hasty --num-completions 3"
 MOST_NAME = 80
+
+
+def _moment(date: str | None) -> float:
+    try:
+        return 0.0 if date is None else datetime.fromisoformat(date).timestamp()
+    except ValueError:
+        return 0.0
 
 
 async def draw_runs(folder: Path, runs: RunList) -> None:
@@ -54,7 +64,7 @@ class _Table:
         with self._empty:
             PlainText("p", NOTHING, "quiet")
             PlainText("pre", f"roboeval {FIRST}", "source").props("tabindex=0")
-        self._form = ui.element("form").props("action=/side-by-side method=get")
+        self._form = ui.element("form").props(f"action={outside('/side-by-side')} method=get")
         with self._form:
             region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Runs"')
             with region, html.table().classes("runs"):
@@ -64,6 +74,7 @@ class _Table:
                     for name in COLUMNS:
                         self._draw_head(name)
                 self._body = html.tbody()
+            PlainText("p", ABOUT, "quiet")
             html.button("Show side by side", type="submit").classes("plain")
 
     def _draw_head(self, name: str) -> None:
@@ -109,12 +120,15 @@ class _Row:
                 box.props["value"] = name
                 box.props["aria-label"] = f"Show {shortened(name, MOST_NAME)} side by side with others"
             with html.th().props("scope=row"):
-                with html.a(href=address(name)):
+                with html.a(href=outside(address(name))):
                     PlainText("b", shortened(name, MOST_NAME))
                 self._models = PlainText("span", "", "quiet")
+                self._settings = PlainText("span", "", "quiet note")
                 self._notes = PlainText("span", "", "bad note")
             with html.td():
                 self._suite = PlainText("span")
+            with html.td().classes("tasks"):
+                self._tasks = PlainText("span")
             with html.td():
                 self._state = PlainText("small")
                 self._bar = html.progress(max="1")
@@ -124,11 +138,16 @@ class _Row:
                 self._score = PlainText("b")
                 self._interval = PlainText("span", "", "quiet")
                 self._meter = ui.element("span").classes("meter").props("aria-hidden=true")
+            with html.td().classes("date"):
+                self._date = PlainText("span")
 
     def show(self, run: Mapping[str, Any]) -> None:
         """Show its numbers, as `run_data` gives them."""
         by_hand = ", programs written by hand" if run.get("by_hand") else ""
         self._models.say(shortened(", ".join(run.get("models", ())), 160) + by_hand)
+        self._settings.say(shortened(run.get("settings") or "", 160))
+        self._tasks.say(tasks_text(run))
+        self._date.say(date_text(run))
         self._notes.say(" ".join(run["notes"][:1]))
         self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or NONE), MOST_NAME))
         show_state(run, self._state, self._bar)

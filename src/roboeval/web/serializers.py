@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
-from collections import Counter
 from collections.abc import Hashable, Mapping
 from dataclasses import asdict
 from enum import StrEnum
@@ -17,6 +17,7 @@ from roboeval.analysis.metrics import pass_at_1
 from roboeval.evaluation.explanation import GONE, completion_data, suite_instruction
 from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, name_of
+from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import Filter, Snapshot
@@ -38,10 +39,10 @@ class State(StrEnum):
     UNREADABLE = "not read"
 
 
-def state_of(run: Snapshot, wanted: int | None) -> State:
-    """Progress towards the expected number of completions; None if that was not recorded."""
-    written = len(run.results.completions)
-    lacks = wanted is not None and written < wanted
+def state_of(run: Snapshot) -> State:
+    """How far a run has come."""
+    written, coverage = len(run.results.completions), run.coverage
+    lacks = coverage.there < coverage.total
     unjudged = run.judged < run.results.scope.total
     stages = (
         (State.GENERATING, run.is_written and (lacks or not written)),
@@ -56,8 +57,7 @@ def state_of(run: Snapshot, wanted: int | None) -> State:
 
 def run_data(run: Snapshot) -> dict[str, Any]:
     """A run in short."""
-    results, mean = run.results, run.pass_at_1
-    wanted = _wanted(results.about, run.suite)
+    results, mean, coverage = run.results, run.pass_at_1, run.coverage
     return {
         "run": run.name,
         "models": run.models,
@@ -65,30 +65,38 @@ def run_data(run: Snapshot) -> dict[str, Any]:
         "suite": (results.head if results.key else results.about).get("suite"),
         "evaluation": results.key,
         "evaluations": list(run.evaluations),
-        "state": state_of(run, wanted),
+        "state": state_of(run),
         "read": 1.0,
         "completions": len(results.completions),
-        "wanted": wanted,
+        "requested": coverage.requested,
         "judged": run.judged,
-        "to_judge": results.scope.total,
+        "to_judge": coverage.there,
+        "cut_off": run.cut_off.replies,
+        "tasks_there": len({task for task, _, _ in results.completions}),
+        "tasks_of_suite": None if run.suite is None else len(run.suite.tasks),
+        "date": date_of(results.about),
+        "settings": settings_text(results.about),
         "passed": run.passed,
         "pass@1": None if mean is None else asdict(mean),
         "notes": notes(run),
     }
 
 
-def _wanted(about: Mapping[str, Any], suite: Suite | None) -> int | None:
-    """How many completions a run shall have, as its run.json says; None where nobody recorded that."""
-    found = batches(about)
-    if not found or suite is None:
-        return None
-    each: Counter[str] = Counter()
-    for batch in found:
-        tasks, count = batch.get("tasks"), batch.get("num_completions")
-        if not isinstance(count, int):
-            return None
-        each |= dict.fromkeys(tasks if isinstance(tasks, list) else suite.tasks, count)
-    return sum(count * len(suite.tasks[name].prompts) for name, count in each.items() if name in suite.tasks)
+def settings_text(about: Mapping[str, Any]) -> str:
+    """The settings that a run.json records, for people; those that were not sent are left out."""
+    settings = about.get("settings")
+    named = settings.items() if isinstance(settings, dict) else ()
+    return ", ".join(f"{name.replace('_', '-')} {_said(value)}" for name, value in named if value is not None)
+
+
+def _said(value: object) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def date_of(about: Mapping[str, Any]) -> str | None:
+    """When the first completions of a run were requested, as ISO 8601; None where nobody recorded that."""
+    began = [one.get("started") for one in batches(about)]
+    return min((text for text in began if isinstance(text, str)), default=None)
 
 
 def notes(run: Snapshot) -> list[str]:
@@ -100,6 +108,8 @@ def notes(run: Snapshot) -> list[str]:
         found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
     if faults:
         found.append("The other rows are shown.")
+    if (warning := run.cut_off.warning) is not None:
+        found.append(f"{warning}.")
     if stale:
         found.append(f"{how_many(stale)} changed since the verdict; `roboeval evaluate --redo` judges again.")
     if run.judged and run.suite is None:
@@ -189,7 +199,10 @@ def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     completion = results.completions.get(key)
     more = {"evaluation": results.key, "stale": row["stale"], "note": GONE if row["stale"] else None}
     if row["passed"] is None:
-        known = {name: getattr(completion, name, None) for name in ("model", "instruction", "program")}
+        known: dict[str, Any] = {
+            name: getattr(completion, name, None) for name in ("model", "instruction", "program")
+        }
+        known["reply"] = reply_data(completion)
         known["suite_instruction"] = suite_instruction(run.suite, row["task"], row["prompt"])
         return {**entry_data(row), **known, **more, "worlds": []}
     judged = results.row(key)

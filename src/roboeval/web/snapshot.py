@@ -11,16 +11,20 @@ import polars as pl
 from fastapi import Query
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.models.no_program import IN_WORDS
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
-from roboeval.analysis.summary import Failures, failures
+from roboeval.analysis.summary import Failures, cut_off, failures
 from roboeval.analysis.tasks import prompt_counts
+from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.scope import Coverage, CutOff, Scope
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
 
+HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM)
 # How a program did in a world: + satisfied, - not, ! ended by an error.
 SIGN = (
     pl.when("satisfied")
@@ -32,7 +36,9 @@ SIGN = (
 # What decided: the failed check, the limit that stopped the program, or its error.
 ERROR = pl.col("error_message")
 WHY = (
-    pl.when(pl.col("failure_check").is_not_null())
+    pl.when(HAS_NO_PROGRAM)
+    .then(pl.col("failure_kind").replace(dict(IN_WORDS)))
+    .when(pl.col("failure_check").is_not_null())
     .then(pl.col("failure_check").map_elements(check_label, return_dtype=pl.String))
     .when((pl.col("status") == "timeout") & ERROR.str.contains(r"^\d"))
     .then(pl.format("stopped after {} (limit)", ERROR))
@@ -101,12 +107,13 @@ class Snapshot:
     def completions(self) -> pl.DataFrame:
         """A row for each completion in the suite's order, also where only the verdict is there.
 
-        `passed` is null where nothing was judged, `worlds` has a sign for each world, `why` is the check or
+        `passed` is null where nothing was judged, `worlds` has a sign for each world in which a program
+        ran, `why` is the check or
         the error that decided, and `written` whether the completion stands in the run now.
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
-            SIGN.str.join("").alias("worlds"),
+            pl.when(HAS_NO_PROGRAM.first()).then(pl.lit("")).otherwise(SIGN.str.join("")).alias("worlds"),
             WHY.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
         )
         keys = [(storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
@@ -149,13 +156,28 @@ class Snapshot:
         return passed_count(prompts_of(self.scores))
 
     @cached_property
+    def scope(self) -> Scope:
+        """What there is to judge."""
+        return self.results.scope
+
+    @property
+    def coverage(self) -> Coverage:
+        """Of how many completions its numbers speak."""
+        return self.scope.coverage(self.judged)
+
+    @property
+    def cut_off(self) -> CutOff:
+        """The replies that were cut off."""
+        return cut_off(self.failures, self.scope)
+
+    @cached_property
     def scores(self) -> tuple[TaskScore, ...]:
         """How often completions passed, by task and prompt."""
         return task_scores(self.results.table)
 
     @cached_property
     def pass_at_1(self) -> Estimate | None:
-        """pass@1 over all prompts; None where nothing was judged."""
+        """pass@1 over all prompts, with its interval over tasks; None where nothing was judged."""
         return overall(self.scores, 1) if self.scores else None
 
     @cached_property

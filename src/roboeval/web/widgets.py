@@ -14,14 +14,15 @@ from nicegui.element import Element
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import all_names
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import Frame, PlainText
+from codebotler.web.frame import Frame, PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.evaluation.explanation import shown_lines
+from roboeval.evaluation.runs.scope import Coverage
 from roboeval.web.heat_map import NONE
 from roboeval.web.run_store import MissingError
 from roboeval.web.serializers import State
 
-STYLE = '<link rel="stylesheet" href="/static/benchmark/benchmark.css">'
+STYLE = '<link rel="stylesheet" href="{prefix}/static/benchmark/benchmark.css">'
 EVERY = 1.0  # seconds after which a page looks whether something has changed
 MOST_TITLE = 80
 
@@ -30,7 +31,7 @@ MOST_TITLE = 80
 def page_of(frame: Frame, title: str) -> Iterator[None]:
     """A page of the benchmark; of an error that a user can cause, only its sentence is shown."""
     frame(shortened(title, MOST_TITLE), "/runs")
-    ui.add_head_html(STYLE)
+    ui.add_head_html(STYLE.format(prefix=outside("")))
     with ui.element("div").classes("benchmark"):
         try:
             yield
@@ -38,7 +39,7 @@ def page_of(frame: Frame, title: str) -> Iterator[None]:
             if isinstance(error, MissingError):
                 ui.context.client.status_code = HTTPStatus.NOT_FOUND
             PlainText("p", error.sentence, "trouble").props("role=alert")
-            html.a("All runs", href="/runs")
+            html.a("All runs", href=outside("/runs"))
 
 
 class _DataElement(Element):
@@ -60,7 +61,8 @@ class HeatMap(_DataElement, component="static/heat.js"):
         self, label: str, corner: str, chosen: Callable[[str, int | None], None] | None = None
     ) -> None:
         super().__init__()
-        self._props.update(label=label, corner=corner, groups=[], rows=[], chooses=chosen is not None)
+        props = {"prefix": outside(""), "label": label, "corner": corner, "chooses": chosen is not None}
+        self._props.update(props, groups=[], rows=[])
         if chosen is not None:
             self.on("choose", lambda event: chosen(*event.args))
 
@@ -91,28 +93,41 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
     label.say(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
     if bar is not None:
-        names = ("completions", "wanted") if state == State.GENERATING else ("judged", "to_judge")
+        names = ("completions", "requested") if state == State.GENERATING else ("judged", "to_judge")
         done, of = (data.get(name) or 0 for name in names)
         bar.set_visibility(state in {State.GENERATING, State.JUDGING})
         bar.props(f"value={done / of if of else 0:.3f}").props["aria-label"] = f"{done:,} of {of:,}"
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """How many completions a run has, and of how many, where some are missing."""
+    """Of how many completions a run's numbers speak, where there is little room."""
     if "completions" not in data:
         return NONE
-    written, wanted, judged = data["completions"], data["wanted"], data["judged"]
-    if wanted is not None and written < wanted:
-        return f"{written:,} of {wanted:,} written"
-    if judged < data["to_judge"]:
-        return f"{judged:,} of {data['to_judge']:,} judged"
-    return f"{judged or written:,}"
+    coverage = _coverage(data)
+    done, what = (coverage.judged, "judged") if coverage.judged else (coverage.there, "written")
+    return f"{done:,} of {coverage.total:,} {what}"
 
 
 def completions_text(data: Mapping[str, Any]) -> str:
-    """How many completions a run has, with the noun."""
-    count = count_text(data)
-    return f"{count} completion{'s' * (count != '1')}"
+    """Of how many completions a run's numbers speak."""
+    return str(_coverage(data)) if "completions" in data else NONE
+
+
+def _coverage(data: Mapping[str, Any]) -> Coverage:
+    return Coverage(data["judged"], data["to_judge"], data["requested"])
+
+
+def tasks_text(data: Mapping[str, Any]) -> str:
+    """How many tasks a run has completions of, and how many its suite has."""
+    if "tasks_there" not in data:
+        return NONE
+    of = data["tasks_of_suite"]
+    return f"{data['tasks_there']:,}" + ("" if of is None else f" of {of:,}")
+
+
+def date_text(data: Mapping[str, Any]) -> str:
+    """The day and the time at which a run began, in UTC."""
+    return (data.get("date") or NONE)[:16].replace("T", " ")
 
 
 def interval_text(estimate: Estimate, form: str = ".2f") -> str:
@@ -125,4 +140,5 @@ def score_text(data: Mapping[str, Any]) -> str:
     mean = data.get("pass@1")
     if mean is None:
         return ""
-    return f"pass@1 {mean['mean']:.3f} (95% interval {Estimate(**mean).ends('.2f')})"
+    estimate = Estimate(**mean)
+    return f"pass@1 {estimate.mean:.3f} ({estimate.interval})"

@@ -202,3 +202,53 @@ def test_worlds_are_looked_for_that_lead_into_every_branch(tmp_path: Path) -> No
         *RETURNS,
     )
     assert problem.startswith("line 4: RuleViolation")
+
+
+BOB = """rules:
+  - name: bob
+    says: Leave Bob alone.
+    always: >-
+      not tr.Exists(goto("bobs office"))
+"""
+HOUSE = ["hall", "bob's office", "server room|vault"]
+
+
+def test_a_misspelt_room_is_refused_with_its_line_and_the_closest_name(tmp_path: Path) -> None:
+    path = rules_in(tmp_path, BOB)
+    with pytest.raises(UserError) as caught:
+        read_rules(path, rooms=HOUSE)
+    assert (caught.value.file, caught.value.line) == (path, 4)
+    for named in ('"bobs office"', '"bob\'s office"', '"any: true"'):
+        assert named in caught.value.sentence
+    assert len(read_rules(path)) == 1, "where no room is known, none is misspelt"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("bobs office", "bob's office"),
+        ("bobs office", "office"),
+        ("bobs office", "vault"),
+        ("bobs office", ".*"),
+        ("says:", "any: true\n    says:"),
+    ],
+)
+def test_a_rule_may_name_what_a_house_has_and_any_room_where_it_says_so(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    (rule,) = read_rules(rules_in(tmp_path, BOB.replace(old, new)), rooms=HOUSE)
+    assert rule.any_room is ("any" in new)
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        'not tr.Exists(at("bobs office", say(".*")))',
+        'not tr.Exists(goto(without("bobs office")))',
+        'not tr.Exists(goto("hall|halls")) or tr.Exists(goto("bobs office"))',
+    ],
+)
+def test_a_misspelt_room_is_found_anywhere_in_a_rule(tmp_path: Path, formula: str) -> None:
+    text = BOB.replace('not tr.Exists(goto("bobs office"))', formula)
+    with pytest.raises(UserError, match="bobs office"):
+        read_rules(rules_in(tmp_path, text), rooms=HOUSE)

@@ -75,7 +75,7 @@ def test_an_accepted_program(files: Path) -> None:
     assert rest[:3] == ["", 'rooms: "start_loc", "kitchen"', ""]
     assert rest[3].endswith('"mug" is in "kitchen"')
     assert [line.split() for line in rest[4:6]] == [
-        ["1", "start", "→", "kitchen"],
+        ["1", "start_loc", "→", "kitchen"],
         ["2", "looked", "for", '"mug":', "found"],
     ]
     assert '5      put down "mug"' in rest

@@ -210,3 +210,46 @@ def test_a_record_that_does_not_fit_keeps_only_whole_lines(tmp_path: Path, paper
     assert ended.out.startswith("def task_program():\n")
     assert ended.err.startswith("codebotler: attempts.jsonl: File too large")
     assert record.stat().st_size == LIMIT - 100
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (Fault.EMPTY, "The reply is empty."),
+        (Fault.WITHOUT_CODE, "The reply holds no code."),
+        (Fault.TOOL_CALL, "The model called a tool"),
+        (Fault.REFUSAL, "The model refused: I can't help with weapons."),
+        (Fault.FILTERED, "A content filter blocked"),
+    ],
+    ids=lambda value: value.name if isinstance(value, Fault) else "",
+)
+def test_a_reply_without_a_program_is_said_and_nothing_is_printed(
+    fault: Fault, words: str, tmp_path: Path
+) -> None:
+    with Server(fault=lambda _: fault) as server:
+        ended = written(server, cwd=tmp_path)
+    assert (ended.status, ended.out) == (1, "")
+    assert ended.err.startswith(words)
+    assert "SyntaxError" not in ended.err
+
+
+def test_a_reply_that_was_cut_off_names_the_option_that_helps(tmp_path: Path) -> None:
+    with Server(answer=lambda _: FINE, limits=True) as server:
+        ended = written(server, "--max-tokens", "8", cwd=tmp_path)
+        mended = written(server, "--max-tokens", "32", cwd=tmp_path)
+    assert (ended.status, ended.out) == (1, "")
+    assert ended.err.startswith("The reply was cut off at 8 tokens. --max-tokens 32 ")
+    assert (mended.status, mended.err) == (0, "")
+
+
+@pytest.mark.parametrize("repair", [False, True])
+def test_a_reply_without_a_program_is_asked_for_again(*, repair: bool, tmp_path: Path) -> None:
+    with Server(answer=lambda _: FINE) as server:
+        server.faults.append(Fault.WITHOUT_CODE)
+        ended = written(server, "--retries", "1", *["--repair"] * repair, cwd=tmp_path)
+    assert (ended.status, len(server.requests)) == (0, 2)
+    assert ended.out == "def task_program():\n    go_to('kitchen')\n"
+    assert ended.err.splitlines()[0] == "attempt 1 of 2: The reply holds no code."
+    first, second = (request.body["messages"] for request in server.requests)
+    assert len(first) == len(second)
+    assert ("holds no code" in second[-1]["content"]) is repair

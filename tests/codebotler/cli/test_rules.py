@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -66,15 +67,16 @@ def test_a_program_that_breaks_a_rule_is_rejected_and_not_run(files: Path, named
         assert told in " ".join(ended.out.split())
 
 
-@pytest.mark.parametrize("command", [["check"], ["run", "--yes", "--speed", "0"]])
-def test_a_room_that_a_rule_names_and_the_world_lacks_is_told(files: Path, command: list[str]) -> None:
-    (files / "typo.yaml").write_text(
-        (files / "rules.yaml").read_text().replace('goto("vault")', 'goto("valut")')
-    )
-    ended = codebotler(
-        files, command[0], "sly.py", *command[1:], "--world", "world.yaml", "--rules", "typo.yaml"
-    )
-    assert 'the rule "vault" names the room "valut", which is not there' in ended.err
+@pytest.mark.parametrize(
+    "arguments",
+    [["check", "sly.py"], ["run", "sly.py", "--yes"], ["generate", "Say hello"], ["serve", "--port", "0"]],
+)
+def test_a_room_that_a_rule_names_and_the_world_lacks_is_refused(files: Path, arguments: list[str]) -> None:
+    typo = (files / "rules.yaml").read_text().replace('goto("vault")', 'goto("valut")')
+    (files / "typo.yaml").write_text(typo)
+    ended = codebotler(files, *arguments, "--world", "world.yaml", "--rules", "typo.yaml")
+    assert (ended.status, ended.out) == (2, "")
+    assert re.search(r'typo.yaml, line 5: the rule "vault" names the room "valut".*"vault"', ended.err)
 
 
 def test_a_rule_ends_a_program_that_runs_all_the_same(files: Path) -> None:

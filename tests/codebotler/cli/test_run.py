@@ -24,6 +24,7 @@ from command_line import Ended, command
 from forked import Forked
 from processes import are_gone, children_of
 from roboeval.suites.load import Suite
+from server import Fault, Server
 
 GOOD = """def task_program():
     go_to("kitchen")
@@ -502,3 +503,16 @@ def test_robots_are_judged_by_the_python_that_is_named(folder: Path) -> None:
     for name, package in (("ros1", "rospy"), ("ros2", "rclpy")):
         assert sys.executable in missing[name]
         assert package in missing[name]
+
+
+def test_an_instruction_for_which_a_model_writes_no_program(folder: Path) -> None:
+    with Server(fault=lambda _: Fault.REFUSAL) as server:
+        model = ("--model", "openai-chat:tiny", "--base-url", server.url)
+        refused = run(folder, "Go to the kitchen.", *model, "--yes")
+    assert (refused.status, refused.out) == (1, "")
+    assert refused.err.splitlines()[0] == "The model refused: I can't help with weapons."
+    (mission,) = json.loads(ended(folder, "missions", "--json").out)
+    assert (mission["state"], mission["reason"]) == (
+        "failed",
+        "The model refused: I can't help with weapons.",
+    )

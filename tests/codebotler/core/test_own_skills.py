@@ -494,3 +494,43 @@ def test_verbs_have_their_forms(
 def test_what_a_verb_is_done_to_may_stand_anywhere() -> None:
     verb = verb_of("pour {ml} ml of {liquid} into {target}", ["liquid", "ml", "target"], ("no", "yes"))
     assert verb.with_object(verb.past, ["water", "20", "the cup"]) == "poured 20 ml of water into the cup"
+
+
+GLIDES = (
+    HEAD
+    + """
+@skill(names="room", text="room")
+def glide(sim: Simulation, speed: int, room: str) -> None: "Glide to a room at some speed."
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        ("glide(2, 'bobs office')", 2),
+        ("glide(2, room='bobs office')", 2),
+        ("glide(2, 'bobs ' + 'office')", 2),
+        ('glide(2, "bob\'s office")', None),
+        ("try: glide(2, 'bobs office')\n    except Exception: pass", None),
+    ],
+)
+def test_a_room_that_an_own_skill_is_sent_to_is_checked_like_that_of_go_to(
+    tmp_path: Path, call: str, line: int | None
+) -> None:
+    (tmp_path / "own.py").write_text(GLIDES)
+    skills = skills_from(tmp_path / "own.py")
+    program = f"def task_program():\n    {call}\n"
+    found = check(program, rooms=["hall", "bob's office"], skills=skills).problems
+    driving = program.replace("glide(2, ", "go_to(").replace("room=", "location=")
+    expected = check(driving, rooms=["hall", "bob's office"], skills=skills).problems
+    assert [one.line for one in found] == ([] if line is None else [line])
+    assert [(one.kind, one.message) for one in found] == [(one.kind, one.message) for one in expected]
+    assert all('"bob\'s office"' in one.message for one in found) or "+" in call
+
+
+def test_rooms_that_are_guessed_include_those_of_own_skills(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(GLIDES)
+    skills = skills_from(tmp_path / "own.py")
+    found = check("def task_program():\n    glide(2, 'lab')\n", skills=skills)
+    assert (found.problems, "lab" in found.rooms) == ((), True)

@@ -17,7 +17,7 @@ import rich.progress  # noqa: F401 - by now, since an interrupt in the middle of
 from codebotler.checking.check import check
 from codebotler.cli.run import Request
 from codebotler.cli.run import run as run_mission
-from codebotler.core.errors import RobotError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
@@ -29,6 +29,8 @@ from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, NotReadyError, Result
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
+from codebotler.rtl import parse
+from codebotler.simulator.rule_guard import Rule
 from doubles import Answering, raising
 
 
@@ -149,6 +151,35 @@ def test_a_model_is_told_the_robots_own_words(
     assert f"hall, {LAB}" in model.asked[0].text
     assert f"hall, {LAB}" in model.asked[0].messages[-1].text
     assert ('"cellar"' in capsys.readouterr().out) is bool(status)
+
+
+def test_a_model_is_offered_no_skill_that_the_robot_lacks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = Writing('def task_program():\n    go_to("hall")\n    pick("mug")\n')
+    robot = Answering(knowing(["hall"], "hall"))
+    robot.missing = {"pick": "no server listens"}
+    assert run_mission(robot, Request("bring the mug", yes=True), tmp_path, lambda _: model) == 1
+    asked = "\n".join(message.text for message in model.asked[0].messages)
+    assert "def place(" in asked
+    assert "pick(" not in asked
+    assert "line 3: this robot has no `pick` skill: no server listens" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("any_room", [False, True])
+def test_a_rule_with_a_misspelt_room_lets_no_mission_begin(tmp_path: Path, *, any_room: bool) -> None:
+    (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
+    bob = Rule("bob", "Leave Bob alone.", parse('not tr.Exists(goto("bobs office"))'), any_room=any_room)
+    request = Request(str(tmp_path / "go.py"), yes=True, rules=(bob,))
+    robot = Answering(knowing(["hall", "bob's office"], "hall"))
+    if any_room:
+        assert run_mission(robot, request, tmp_path, nobody) == 0
+    else:
+        with pytest.raises(UserError, match=r"bobs office.*bob's office"):
+            run_mission(robot, request, tmp_path, nobody)
+        (mission,) = missions(tmp_path)
+        assert (mission.state, robot.connections) == (State.FAILED, 0)
+        assert robot.done == ["get_all_rooms", "get_current_location"], "it has not moved"
 
 
 def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:

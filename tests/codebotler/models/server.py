@@ -51,6 +51,9 @@ class Fault(Enum):
     COMPRESSED = auto()
     COMPRESSED_ERROR = auto()
     ENDLESS = auto()
+    TOOL_CALL = auto()
+    REFUSAL = auto()
+    FILTERED = auto()
 
 
 REFUSALS: dict[Fault | None, tuple[int, str, str | None]] = {
@@ -60,8 +63,11 @@ REFUSALS: dict[Fault | None, tuple[int, str, str | None]] = {
     Fault.SERVER_ERROR: (500, "Something went wrong.", None),
     Fault.UNAUTHORIZED: (401, "Incorrect API key provided: {key}.", "invalid_api_key"),
     Fault.NOT_FOUND: (404, "The model does not exist.", "model_not_found"),
+    Fault.FILTERED: (400, "The prompt triggered the content policy.", "content_filter"),
     Fault.TOO_LONG: (400, "The maximum context length is 2048 tokens.", "context_length_exceeded"),
 }
+CALL = {"name": "go_to", "arguments": '{"location": "kitchen"}'}
+REFUSAL = "I can't help with weapons."
 BODIES: dict[Fault | None, tuple[bytes, str]] = {
     Fault.NOTHING: (b"", "text/event-stream"),
     Fault.WRONG_TYPE: (PAGE.encode(), "text/html"),
@@ -112,6 +118,7 @@ class Server:
         delay: how many seconds it is slow.
         pause: how many seconds it takes for any reply.
         counts: whether it says how many tokens it used.
+        limits: whether it cuts off replies at the limit of a request.
         sends: what it sends instead of its own answer: status, headers and body; None for its own.
     """
 
@@ -121,6 +128,7 @@ class Server:
     delay: float = 30.0
     pause: float = 0.0
     counts: bool = True
+    limits: bool = False
     sends: Callable[[Request], tuple[int, dict[str, str], bytes] | None] = lambda _request: None
     faults: deque[Fault | None] = field(default_factory=deque)
     """How it misbehaves at the next requests."""
@@ -221,18 +229,32 @@ class _Answer:
         await asyncio.sleep(self.server.delay if self.fault is Fault.SLOW else self.server.pause)
         if self.request.body.get("stream"):
             return await self._streamed()
-        whole = json.dumps(self._object(self._text(), "stop") | {"usage": self._usage()}).encode()
+        whole = json.dumps(self._object(self._text(), self._reason()) | {"usage": self._usage()}).encode()
         return self._body(200, whole[:40] if self.fault is Fault.INVALID_JSON else whole, "application/json")
 
     def _text(self) -> str:
         match self.fault:
-            case Fault.EMPTY:
+            case Fault.EMPTY | Fault.TOOL_CALL | Fault.REFUSAL:
                 return ""
             case Fault.WITHOUT_CODE:
                 return "I am afraid that I cannot help with that."
             case Fault.HUGE:
                 return ("    say('again')\n" * HUGE)[:HUGE]
-        return self.server.answer(self.request)
+        return self.server.answer(self.request)[: self._limit()]
+
+    def _limit(self) -> int | None:
+        """The characters that a reply may have."""
+        body = self.request.body
+        tokens = body.get("max_completion_tokens") or body.get("max_tokens")
+        return 4 * tokens if self.server.limits and tokens else None
+
+    def _reason(self) -> str:
+        """Why the reply ends."""
+        if self.fault is Fault.TOOL_CALL:
+            return "tool_calls"
+        limit = self._limit()
+        is_cut_off = limit is not None and len(self.server.answer(self.request)) > limit
+        return "length" if is_cut_off else "stop"
 
     def _refused(self, status: int, message: str, code: str | None) -> bool:
         key = self.request.headers.get("authorization", "")
@@ -281,7 +303,7 @@ class _Answer:
                             yield json.dumps(self._object(piece, None))
                             await asyncio.sleep(DRIP)
             yield json.dumps(self._object(piece, None))
-        yield json.dumps(self._object("", "stop"))
+        yield json.dumps(self._object("", self._reason()))
         if self.server.counts and self.request.body.get("stream_options", {}).get("include_usage"):
             yield json.dumps(self._object("", None) | {"choices": [], "usage": self._usage()})
         yield "[DONE]"
@@ -297,12 +319,21 @@ class _Answer:
         choice: dict[str, Any] = {"index": 0, "finish_reason": finish_reason, "logprobs": None}
         if self.request.is_chat:
             kind = "chat.completion.chunk" if streamed else "chat.completion"
-            choice["delta" if streamed else "message"] = {"role": "assistant", "content": text}
+            choice["delta" if streamed else "message"] = {"role": "assistant", "content": text} | self._more()
         else:
             kind = "text_completion"
             choice["text"] = text
         model = self.request.body.get("model", "")
         return {"id": "1", "object": kind, "created": 1_700_000_000, "model": model, "choices": [choice]}
+
+    def _more(self) -> dict[str, Any]:
+        """What a message holds besides text."""
+        match self.fault:
+            case Fault.TOOL_CALL:
+                return {"tool_calls": [{"index": 0, "id": "1", "type": "function", "function": CALL}]}
+            case Fault.REFUSAL:
+                return {"refusal": REFUSAL}
+        return {}
 
     def _usage(self) -> dict[str, int]:
         asked, said = len(json.dumps(self.request.body)) // 4, len(self._text()) // 4

@@ -235,10 +235,13 @@ def test_reply_without_a_program_says_why(
     assert (reply.no_program, reply.text) == (kind, text)
 
 
-def test_cut_off_reply_with_a_whole_program_holds_it(server: Server) -> None:
-    streams(server, whole(CHAT), chunk(CHAT, None, "length"), DONE)
+@pytest.mark.parametrize(("after", "why"), [("```\nIt goes to", None), ("", "cut-off")])
+def test_cut_off_reply_holds_a_program_if_it_goes_on_behind_it(
+    server: Server, after: str, why: str | None
+) -> None:
+    streams(server, chunk(CHAT, f"```python\n{TASK}{BODY}{after}"), chunk(CHAT, None, "length"), DONE)
     reply = ask(CHAT, server)
-    assert (reply.program, reply.no_program, reply.is_cut_off) == (TASK + BODY, None, True)
+    assert (reply.program, reply.no_program, reply.is_cut_off) == (TASK + BODY, why, True)
 
 
 @both

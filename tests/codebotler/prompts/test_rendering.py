@@ -122,6 +122,13 @@ def test_skill_that_is_not_in_the_table_is_in_no_prompt() -> None:
     assert not any("wave" in text for text in texts(PROMPT))
 
 
+def test_a_skill_that_is_left_out_is_in_no_prompt_nor_an_example() -> None:
+    for text in texts(prompt_for("Go to the lab.", skills=SKILLS.without({"pick", "is_in_room"}))):
+        assert not re.search(r"pick|is_in_room", text)
+        assert "def place(" in text
+        assert "Omar" in text, "an example without them"
+
+
 def test_chat_begins_with_the_rules_shows_the_examples_and_ends_with_the_instruction() -> None:
     first, *shown, last = PROMPT.messages
     assert first.role == "system"

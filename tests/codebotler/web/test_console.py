@@ -22,6 +22,7 @@ from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.open import open_model
 from codebotler.models.recorded import recorded_model
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
@@ -32,6 +33,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.panes.instruction import examples
 from doubles import Answering
+from server import Server
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 BAD = "def task_program():\n    go_to('cellar')\n"
@@ -40,7 +42,10 @@ WORLD = World((Room("hall"), Room("kitchen")), "hall")
 
 
 class Author:
-    """A model that says what a test wants, piece by piece, and then waits to be let go on."""
+    """A model that says what a test wants, piece by piece, and then waits to be let go on.
+
+    A text that defines no function is a reply without a program.
+    """
 
     name = "author"
     settings = SamplingSettings()
@@ -59,7 +64,9 @@ class Author:
         if self.waits:
             await asyncio.sleep(60)
         heard(program[10:])
-        return Reply(program, program, Usage(), 0.0, "stop")
+        return Reply(
+            program, program, Usage(), 0.0, "stop", no_program=None if "def" in program else "no-code"
+        )
 
     async def close(self) -> None:
         self.is_closed = True
@@ -153,12 +160,89 @@ def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Pa
     author = Author(HELLO, waits=True)
     with desk_of(tmp_path, author=author) as console:
         session = console.begin(Order("say hello", "author"))
-        view = until(console, lambda view: bool(view.program))
-        assert (view.program, view.is_written, view.may_be_edited) == (HELLO[:10], True, False)
+        view = until(console, lambda view: bool(view.reply))
+        assert (view.arriving.code, view.is_written, view.may_be_edited) == (HELLO[:10], True, False)
         console.stop("a test")
         session.join(5)
         assert console.view.is_over
         assert (console.view.state, author.is_closed) == (State.STOPPED, True)
+
+
+PROSE = "I cannot do that."
+
+
+def test_a_reply_without_a_program_waits_for_a_person_who_asks_again(tmp_path: Path) -> None:
+    author = Author(PROSE, PROSE, HELLO)
+    with desk_of(tmp_path, author=author) as console:
+        session = console.begin(Order("say hello", "author"))
+        for repair in (False, True):
+            view = until(console, lambda view: view.waits_for_program)
+            assert view.programless is not None
+            assert (view.programless.text, view.phase, view.problems) == (PROSE, "no-program", ())
+            assert (view.may_be_approved, view.may_be_edited, view.may_be_asked_again) == (False, True, True)
+            with pytest.raises(MissionError):
+                session.approve(view.digest)
+            session.ask_again(repair=repair)
+        view = until(console, lambda view: view.may_be_approved)
+        assert (view.program, view.programless, view.author) == (HELLO, None, "author")
+        first, again, repaired = (prompt.messages[-1].text for prompt in author.asked)
+        assert first == again != repaired
+        assert [line["text"] for line in session.events() if line["event"] == "log"] == [
+            "The reply holds no code."
+        ] * 2
+
+
+def test_a_program_stays_where_the_next_reply_holds_none(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author(HELLO, PROSE)) as console:
+        session = console.begin(Order("say hello", "author"))
+        before = until(console, lambda view: view.may_be_approved)
+        session.ask_again(repair=False)
+        view = until(console, lambda view: view.may_be_approved and view.programless is not None)
+        assert (view.program, view.check) == (before.program, before.check)
+        session.approve(view.digest)
+        assert until(console, lambda view: view.is_over).state is State.DONE
+
+
+def test_a_program_can_be_typed_where_the_model_wrote_none(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author(PROSE)) as console:
+        console.begin(Order("say hello", "author"))
+        until(console, lambda view: view.waits_for_program)
+        console.edit(HELLO)
+        view = until(console, lambda view: view.may_be_approved)
+        assert (view.program, view.author, view.programless) == (HELLO, "", None)
+
+
+def test_a_mission_without_a_program_can_be_stopped(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author(PROSE)) as console:
+        session = console.begin(Order("say hello", "author"))
+        until(console, lambda view: view.waits_for_program)
+        console.stop("a test")
+        session.join(5)
+        assert (console.view.is_over, console.view.state) == (True, State.STOPPED)
+
+
+def test_a_higher_limit_counts_from_then_on(tmp_path: Path) -> None:
+    program = f"```python\n{HELLO}```"
+
+    def model(name: str) -> Model:
+        return open_model(name, SamplingSettings(base_url=server.url, max_tokens=8, temperature=0.5))
+
+    robot = Simulated(WORLD, speed=None)
+    with (
+        Server(answer=lambda _: program, limits=True) as server,
+        Console(robot, tmp_path, model, models=("openai-chat:m",), world=WORLD) as console,
+    ):
+        session = console.begin(Order("say hello"))
+        view = until(console, lambda view: view.waits_for_program)
+        assert view.programless is not None
+        assert (view.programless.kind, view.programless.higher_limit) == ("cut-off", 32)
+        session.ask_again(repair=False, max_tokens=view.programless.higher_limit)
+        assert until(console, lambda view: view.may_be_approved).program == HELLO
+        session.ask_again(repair=False)
+        until(console, lambda view: view.may_be_approved)
+        bodies = [request.body for request in server.requests]
+        assert [body["max_tokens"] for body in bodies] == [8, 32, 32]
+        assert [body["temperature"] for body in bodies] == [0.5] * 3
 
 
 def test_a_blank_program_is_none_where_there_is_an_instruction(tmp_path: Path) -> None:
@@ -313,7 +397,7 @@ def test_a_program_is_there_again_when_the_asking_is_stopped(tmp_path: Path) -> 
         until(console, lambda view: view.may_be_approved)
         author.waits = True
         session.ask_again(repair=False)
-        view = until(console, lambda view: view.program == BAD[:10])
+        view = until(console, lambda view: view.reply == BAD[:10])
         assert (view.state, view.phase) == (State.CHECKED, "writing")
         console.stop("a test")
         assert until(console, lambda view: view.is_over).program == HELLO

@@ -17,7 +17,7 @@ from codebotler.missions.wording import title
 from codebotler.robots.simulated import OFFICE
 from codebotler.simulator.sampled_robot import Fact, GivenAnswer, RoomMap, Whereabouts
 from codebotler.web.floorplan import HALO, MOST_ROOMS, MapState, floorplan
-from codebotler.web.panes.past_missions import timeline
+from codebotler.web.panes.past_mission import timeline
 from codebotler.web.panes.robot import map_state
 from codebotler.web.storyboard import (
     LEFT_OUT,
@@ -239,13 +239,13 @@ def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
     for stands, side in (((1.0, 3.5), max), ((1.0, 0.5), min)):
         room = Room("start_loc", footprint=((0, 0), (4, 0), (4, 4), (0, 4)), stand_at=stands)
         drawn = floorplan(World((room,), "start_loc"), MapState(stands, "start_loc", trail=((0, 0), stands)))
-        (name,) = re.findall(r'<text class="name"[^>]* y="([\d.]+)"[^>]*>start<', drawn)
+        (name,) = re.findall(r'<text class="name"[^>]* y="([\d.]+)"[^>]*>start_loc<', drawn)
         (robot,) = re.findall(r'class="body"[^>]* cy="([\d.]+)"', drawn)
         assert side(float(name), float(robot)) == float(name)
         assert abs(float(name) - float(robot)) > 0.62 + 0.34
         assert drawn.index("<text") > max(drawn.index("polyline"), drawn.index('class="body"'))
     state = MapState(room="start_loc", finds={"start_loc": ["ann"]}, held="mug")
-    told = "The robot is in start and is holding mug. Found in start: ann."
+    told = "The robot is in start_loc and is holding mug. Found in start_loc: ann."
     assert told in floorplan(World((Room("start_loc"),), "start_loc"), state)
 
 

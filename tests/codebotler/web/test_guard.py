@@ -17,6 +17,7 @@ from websockets.sync.client import connect
 from codebotler.core.errors import UserError
 from codebotler.web.access import LOOPBACK, TRIES, WINDOW, Access, GuardRules, Place, Role, TooManyTriesError
 from codebotler.web.guard import MOST_BYTES, Guard, _is_same
+from codebotler.web.proxy import OuterAddress, proxies_in_front
 from command_line import ENVIRONMENT
 from forked import Forked
 from pageserver import PageServer
@@ -157,7 +158,7 @@ def test_tries_are_counted_by_address_and_for_a_while() -> None:
 
 
 def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
-    access = Access.asked_for(None, "the tablet's own", open_to_all=False, is_loopback=True)
+    access = Access.asked_for(None, "the tablet's own", open_to_all=False, is_private=True)
     for _ in range(TRIES):
         access.of_token("wrong", "here")
     assert access.of_token(access.operator or "", "here") is Role.OPERATOR
@@ -189,6 +190,10 @@ def test_a_token_is_made_for_each_start() -> None:
         (["--no-token", "--host", "127.example"], "this machine only"),
         (["--no-token", "--host", ""], "this machine only"),
         (["--no-token", "--token", "x" * 20], "this machine only"),
+        (["--no-token", "--behind-proxy", "https://robot.example"], "this machine only"),
+        (["--behind-proxy", "https://robot.example/missions"], "the page itself uses /missions"),
+        (["--behind-proxy", "https://robot.example/_nicegui/x"], "the page itself uses /_nicegui"),
+        (["--behind-proxy", "robot.example"], "https://HOST"),
         (["--token", "short"], "too short"),
         (["--host", "999.1.1.1"], "cannot listen"),
     ],
@@ -486,3 +491,159 @@ def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
             assert found.getsockname()[1] == free
         with pytest.raises(UserError, match=f"port {taken} is already in use"):
             Place(port=taken).listening()
+
+
+# --- behind a proxy
+
+BEHIND = "https://robot.example/robot"
+
+
+@pytest.fixture(scope="module")
+def proxied(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    options = ("--behind-proxy", BEHIND, "--behind-proxy", "https://lab.example:8443")
+    with PageServer(tmp_path_factory.mktemp("proxied"), *options) as server:
+        yield server
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "status"),
+    [
+        ("robot.example", "https://robot.example", 202),
+        ("robot.example:443", "https://robot.example", 202),
+        ("lab.example:8443", "https://lab.example:8443", 202),
+        ("robot.example", "http://robot.example", 403),
+        ("robot.example", "https://evil.example", 403),
+        ("robot.example", "https://lab.example:8443", 403),
+        ("robot.example", "null", 403),
+        ("lab.example", "https://lab.example:8443", 403),
+        ("lab.example:8443", "https://lab.example", 403),
+        ("localhost", "https://robot.example", 403),
+        ("localhost", "http://localhost", 202),
+        ("evil.example", "https://evil.example", 421),
+    ],
+)
+def test_only_the_origins_of_the_proxies_count(
+    proxied: PageServer, host: str, origin: str, status: int
+) -> None:
+    for path in ("/api/stop", "/robot/api/stop") if host.startswith("robot") else ("/api/stop",):
+        answer = proxied.ask("POST", path, host=host, origin=origin, cookie=proxied.cookie)
+        assert answer.status == status, path
+    refused = 401 if status == 202 else status
+    assert proxied.ask("POST", "/api/stop", host=host, origin=origin).status == refused
+
+
+def test_a_proxy_opens_nothing_without_the_token(proxied: PageServer) -> None:
+    for path in ("/robot/", "/robot/api/robot", "/robot/static/page.css", "/"):
+        assert proxied.ask("GET", path, host="robot.example").status == 401, path
+    assert socket(proxied, host="robot.example", origin="https://robot.example") == 403
+
+
+@pytest.mark.parametrize(
+    ("host", "given", "leads", "path"),
+    [
+        ("robot.example", "/robot/missions", "/robot/missions", "/robot"),
+        ("robot.example", "/missions", "/robot/missions", "/robot"),
+        ("robot.example", "/robot", "/robot/", "/robot"),
+        ("lab.example:8443", "/missions", "/missions", "/"),
+        ("localhost", "/missions", "/missions", "/"),
+    ],
+)
+def test_the_link_leads_to_the_path_behind_the_proxy(
+    proxied: PageServer, host: str, given: str, leads: str, path: str
+) -> None:
+    answer = proxied.ask("GET", f"{given}?token={proxied.token}", host=host)
+    assert (answer.status, answer.headers["location"]) == (303, leads)
+    parts = {part.strip().lower() for part in answer.headers["set-cookie"].split(";")}
+    assert f"path={path}" in parts
+    assert ("secure" in parts) == (host != "localhost")
+
+
+@pytest.mark.parametrize("prefix", ["//evil.example", "/elsewhere"])
+def test_no_header_chooses_the_path(proxied: PageServer, prefix: str) -> None:
+    token = f"Bearer {proxied.token}"
+    page = proxied.ask("GET", "/robot/", host="robot.example", authorization=token, x_forwarded_prefix=prefix)
+    assert page.status == 200
+    assert prefix not in page.text
+
+
+@pytest.mark.parametrize(
+    ("headers", "names"),
+    [
+        ({"host": "localhost", "origin": "https://localhost"}, "--behind-proxy https://localhost,"),
+        ({"host": "localhost", "origin": "https://localhost:8443"}, "--behind-proxy https://localhost:8443,"),
+        (
+            {"host": "127.0.0.1", "origin": "https://new.example", "sec_fetch_site": "same-origin"},
+            "--behind-proxy https://new.example,",
+        ),
+        ({"host": "robot.example", "origin": "http://robot.example"}, f"open this page at {BEHIND}/"),
+        ({"host": "lab.example", "origin": "https://lab.example:8443"}, "Host"),
+    ],
+)
+def test_an_origin_of_a_proxy_is_refused_with_what_to_do(
+    proxied: PageServer, headers: dict[str, str], names: str
+) -> None:
+    answer = proxied.ask("POST", "/api/stop", cookie=proxied.cookie, **headers)
+    assert (answer.status, names in answer.data["detail"]) == (403, True), answer.text
+
+
+@pytest.mark.parametrize("origin", ["https://evil.example", "null", "https://localhost.evil.example"])
+def test_a_foreign_origin_is_never_proposed(proxied: PageServer, origin: str) -> None:
+    answer = proxied.ask("POST", "/api/stop", origin=origin, host="localhost", cookie=proxied.cookie)
+    assert (answer.status, "--behind-proxy" in answer.text) == (403, False)
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("https://host", OuterAddress("https", "host")),
+        ("HTTPS://Host:443/", OuterAddress("https", "host")),
+        ("https://host:8443/a/B/", OuterAddress("https", "host:8443", "/a/B")),
+        ("http://[::1]:80", OuterAddress("http", "[::1]")),
+        ("http://10.0.0.1:443", OuterAddress("http", "10.0.0.1:443")),
+    ],
+)
+def test_addresses_of_proxies_are_read(text: str, address: OuterAddress) -> None:
+    assert OuterAddress.parse(text) == address
+    assert OuterAddress.parse(address.page) == address
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            "host",
+            "ftp://host",
+            "https://",
+            "https://a b",
+            "https://host/?a",
+            "https://host/#a",
+            "https://u@host",
+        ),
+        *("https://host//a", "https://host/../a", "https://host/.", "https://host/a%2fb", "https://host:0"),
+        *("https://hôst", "https://host:123456", "https://host/ä", "https://host\n"),
+    ],
+)
+def test_what_is_no_address_of_a_proxy_is_refused(text: str) -> None:
+    with pytest.raises(UserError, match="write https://HOST"):
+        OuterAddress.parse(text)
+
+
+def test_a_host_has_one_address() -> None:
+    with pytest.raises(UserError, match="twice"):
+        proxies_in_front(["https://host/a", "https://host/b"])
+    assert len(proxies_in_front(["https://host/a", "https://host:443/a/"])) == 1
+
+
+def test_config_names_proxies_unless_the_command_line_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CODEBOTLER_HOME", str(tmp_path))
+    assert proxies_in_front(None) == ()
+    config = tmp_path / "config.yaml"
+    config.write_text("behind_proxy: [https://a.example, https://b.example/robot]\n")
+    assert [one.page for one in proxies_in_front(None)] == ["https://a.example/", "https://b.example/robot/"]
+    assert [one.page for one in proxies_in_front(["https://c.example"])] == ["https://c.example/"]
+    config.write_text("model: recorded:hasty\nbehind_proxy:\n- nowhere\n")
+    with pytest.raises(UserError) as caught:
+        proxies_in_front(None)
+    assert (caught.value.file, caught.value.line) == (config, 2)

@@ -3,6 +3,7 @@
 import json
 from typing import Any
 
+from codebotler.models.no_program import IN_WORDS
 from made_results import results_of
 from roboeval.analysis.cluster import cluster_data, clusters, groups, nearest_fix
 from roboeval.cli.views.groups import cluster_view
@@ -63,6 +64,22 @@ def test_same_task_same_check_similar_program() -> None:
         [("Visit", 0, 2)],
         [("Visit", 0, 3)],
     ]
+
+
+def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
+    rows = [row(0, index, ("NoProgram", kind)) for index, kind in enumerate(("refusal", "refusal", "empty"))]
+    ran = {"world": "w", "satisfied": False, "status": "python-error", "line": None}
+    ran |= {"error": {"kind": "SyntaxError", "message": "invalid syntax"}, "failed_checks": [], "trace": []}
+    rows = [{**one, "verdicts": [ran]} for one in rows] + [row(1, 0)]
+    programs: dict[Key, str] = {("Visit", 0, 0): "No.", ("Visit", 0, 1): "I must not do that,\nsince ..."}
+    programs |= {("Visit", 0, 2): "", ("Visit", 1, 0): RIGHT}
+    results = results_of(rows, SUITE, programs)
+    refused, empty = clusters(groups(rows[:3], programs), results)
+    assert [len(one.members) for one in (refused, empty)] == [2, 1]
+    assert (refused.fix, refused.why) == (None, IN_WORDS["refusal"])
+    text = printed(cluster_view(refused))
+    assert IN_WORDS["refusal"] in text
+    assert 'in "' not in text, "no robot was in a world"
 
 
 def test_groups_of_one_size_take_turns_by_task() -> None:

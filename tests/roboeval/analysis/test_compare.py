@@ -12,12 +12,20 @@ import pytest
 from codebotler.core.errors import UserError
 from command_line import refused, roboeval
 from made_results import results_of
-from roboeval.analysis.compare import compared, comparison_data, pairs_to_compare, to_tell, unlike, verdict
+from roboeval.analysis.compare import (
+    Compared,
+    compared,
+    comparison_data,
+    pairs_to_compare,
+    to_tell,
+    unlike,
+    verdict,
+)
 from roboeval.cli.options import Opened, expect_same_suite
 from roboeval.cli.views.comparison import comparison_view
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results
-from small_run import HOSTILE, SHOWN, SUITE, printed
+from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 FIRST = {("A", 0): 0.5, ("A", 1): 0.5, ("B", 0): 0.2, ("C", 0): 1.0}
 SECOND = {("A", 0): 0.7, ("A", 1): 0.9, ("B", 0): 0.2, ("D", 0): 1.0}
@@ -82,10 +90,28 @@ def test_how_much_it_takes_is_said() -> None:
     assert re.search(r"\b8\b", told[1])
 
 
+def sides(*names: str, failures: str = "PythonError") -> tuple[Compared, Compared]:
+    rows = [row(0, 0), row(0, 1, (failures, "cut-off"))]
+    programs = {("Visit", 0, index): "" for index in range(2)}
+    first, second = (Compared.of(name, results_of(rows, SUITE, programs)) for name in names or ("a", "b"))
+    return first, second
+
+
+def test_both_runs_say_of_how_many_completions_and_how_they_fail() -> None:
+    found = compared(FIRST, SECOND)
+    text = printed(comparison_view(found, sides(failures="NoProgram")), width=120)
+    assert re.search(r"\npass@1 of a +\d\.\d{3}  2 of 2 completions *\n", text)
+    assert re.search(r"\nwithout a program +50\.0% +50\.0%\n", text)
+    assert "without a program" not in printed(comparison_view(found, sides()), width=120)
+    data = sides()[0].data
+    assert (data["judged"], data["there"], data["requested"], data["cut_off"]) == (2, 2, None, 0)
+    assert data["failures"]["PythonError"] == 0.5
+
+
 def test_names_are_text() -> None:
     found = compared(FIRST, SECOND)
     assert SHOWN.split("\\n", maxsplit=1)[0][:10] in printed(
-        comparison_view(found, (HOSTILE, "b")), width=200
+        comparison_view(found, sides(HOSTILE, "b")), width=200
     )
     assert json.loads(json.dumps(comparison_data(found, (HOSTILE, "b"))))["prompts"] == 3
 
@@ -133,22 +159,22 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
     def shown(tasks: int) -> str:
         a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
         found = compared(a, {key: value / 2 for key, value in a.items()})
-        return printed(comparison_view(found, ("a", "b")), width=120)
+        return printed(comparison_view(found, sides()), width=120)
 
     assert re.search(r"bootstrap.* too narrow", shown(7))
     assert "too narrow" not in shown(8)
     assert "too narrow" not in shown(1)
-    assert "one task says nothing about others" in shown(1)
+    assert re.search(r"over tasks +unknown: too few tasks", shown(1))
 
 
 def test_equal_differences_have_no_interval() -> None:
-    shown = printed(comparison_view(compared(FIRST, FIRST), ("a", "b")), width=120)
-    assert re.search(r"prompts drawn at random +unknown +all prompts are alike", shown)
+    shown = printed(comparison_view(compared(FIRST, FIRST), sides()), width=120)
+    assert re.search(r"interval over prompts +unknown: all prompts are alike", shown)
     assert "+0.000 to" not in shown
 
 
 def test_one_prompt_is_not_many() -> None:
-    assert "over 1 prompt " in printed(comparison_view(compared({("A", 0): 1}, {("A", 0): 0}), ("a", "b")))
+    assert "over 1 prompt " in printed(comparison_view(compared({("A", 0): 1}, {("A", 0): 0}), sides()))
 
 
 @pytest.fixture(scope="module")

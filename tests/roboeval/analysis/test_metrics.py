@@ -1,6 +1,7 @@
 import itertools
 import math
 import random
+import re
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -185,7 +186,17 @@ def test_prompts_count_the_same_however_many_completions_they_have() -> None:
     assert b.pass_at(1) == over_prompts([1, 1 / 3])
     assert b.pass_at(2).mean == pytest.approx((1 + 2 / 3) / 2)
     assert (b.lowest(1), b.highest(1)) == (1 / 3, 1)
-    assert overall([b, a], 1) == over_prompts([1, 1 / 3, 1 / 2])
+    assert overall([b, a], 1) == by_formula([[1, 1 / 3], [1 / 2]], over="tasks")
+
+
+def test_overall_interval_is_over_tasks() -> None:
+    alike = [TaskScore(name, (PromptScore(name, 0, 4, 0), PromptScore(name, 1, 4, 4))) for name in "AB"]
+    passed = overall(alike, 1)
+    assert passed.interval == "95% interval over tasks unknown: all tasks are alike"
+    assert overall(alike[:1], 1).ends() == "unknown: too few tasks"
+    apart = [*alike, *(TaskScore(name, (PromptScore(name, 0, 4, 4),)) for name in "CD")]
+    assert re.fullmatch(r"95% interval over tasks 0\.\d{3} to 1\.000", overall(apart, 1).interval)
+    assert alike[0].pass_at(1).over == "prompts"
 
 
 def test_a_prompt_with_too_few_completions_is_named() -> None:

@@ -18,6 +18,7 @@ from roboeval.analysis.resample import (
     trials_by_prompt,
 )
 from roboeval.cli.views.groups import resample_view
+from roboeval.evaluation.runs.scope import Coverage
 from small_run import printed, row
 
 GOOD = Trial(accepted=True, ran=True, passed=True)
@@ -144,7 +145,8 @@ def test_data_of_both_figures() -> None:
 
 
 def test_the_table_names_prompts_without_hope() -> None:
-    shown = printed(resample_view(PROMPTS, LIMITS, title="runs/x"))
+    shown = printed(resample_view(PROMPTS, LIMITS, title="runs/x", coverage=Coverage(3, 4, 5)))
+    assert "over 3 of 5 completions (1 missing, 1 not judged)" in shown
     assert "no completion of 1 prompt " in shown
     assert [line.split()[:2] for line in shown.splitlines() if line.strip()[:1].isdigit()] == [
         ["0", "0.125"],

@@ -8,9 +8,8 @@ from statistics import NormalDist
 
 import pytest
 
-from roboeval.analysis.metrics import Clusters, Estimate, by_formula
+from roboeval.analysis.metrics import DIFFERENCE, Clusters, Estimate, by_formula
 from roboeval.analysis.statistics import (
-    DIFFERENCE,
     Needed,
     by_bootstrap,
     needed,

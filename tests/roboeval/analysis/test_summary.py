@@ -19,7 +19,8 @@ from roboeval.analysis.summary import causes as causes_of
 from roboeval.analysis.summary import summary as summary_of
 from roboeval.cli.views.results import summary_view
 from roboeval.evaluation.failures import CLASSES
-from roboeval.evaluation.runs.scope import Scope
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.scope import CutOff, Scope
 from roboeval.suites.load import Suite
 from small_run import ROWS, SUITE, TASK, printed, row
 
@@ -36,11 +37,16 @@ def summary(
     return summary_of(tally_of(table_of(rows)), suite, scope, k=k, ablated=ablated)
 
 
+def completion(prompt: int, index: int, **more: str) -> Completion:
+    return Completion(task="Visit", prompt=prompt, index=index, program="", more=more)
+
+
 def test_a_summary_counts_tasks_prompts_and_failures() -> None:
     data = summary_data(summary(ROWS, SUITE, k=(1, 2)))
     assert (data["completions"], data["passed"], data["judged"], data["to_judge"]) == (4, 1, 4, 4)
+    assert (data["requested"], data["cut_off"], data["max_tokens"]) == (None, 0, None)
     assert data["missing"] == {"no_completions": ["Wait"], "not_judged": [], "not_selected": []}
-    assert data["pass@1"]["mean"] == 0.25
+    assert data["pass@1"] == {"mean": 0.25, "low": 0.0, "high": 1.0, "over": "tasks"}
     assert data["pass@2"]["mean"] == 0.5
     (task,) = data["tasks"]
     assert task["pass@1"] == {"mean": 0.25, "lowest": 0.0, "highest": 0.5}
@@ -51,6 +57,7 @@ def test_a_summary_counts_tasks_prompts_and_failures() -> None:
     ]
     counts = [(each["class"], each["count"], each["share"]) for each in data["failures"]]
     assert counts == [
+        ("NoProgram", 0, 0.0),
         ("PythonError", 2, 0.5),
         ("RobotExecutionError", 0, 0.0),
         ("TaskCompletionError", 1, 0.25),
@@ -59,9 +66,9 @@ def test_a_summary_counts_tasks_prompts_and_failures() -> None:
 
 
 def test_all_known_kinds_are_always_listed_and_others_after_them() -> None:
-    python, robot, checks = CLASSES.values()
+    none, python, robot, checks = CLASSES.values()
     kinds = [[kind.name for kind in each.kinds] for each in summary(ROWS, SUITE).failures]
-    assert kinds == [[*python.kinds, "MemoryError"], [*robot.kinds], [*checks.kinds]]
+    assert kinds == [[*none.kinds], [*python.kinds, "MemoryError"], [*robot.kinds], [*checks.kinds]]
 
 
 def test_each_prompt_counts_the_same_however_many_completions_it_has() -> None:
@@ -87,14 +94,21 @@ def test_a_k_that_cannot_be_estimated_is_refused(k: int) -> None:
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_the_tables_fit_and_break_no_number(width: int) -> None:
-    rows = [row(p, i, ("PythonError", "NameError")) for p in range(2) for i in range(2000)]
+    rows = [
+        row(p, i, ("PythonError", "NameError"), task=task)
+        for task in ("Visit", "Wait")
+        for p in range(2)
+        for i in range(1000)
+    ]
     text = printed(summary_view(summary(rows, SUITE, k=(1, 2)), title="runs/one"), width)
     assert max(map(len, text.splitlines())) <= width
     assert "runs/one" in text
     assert "Visit" in text
     assert "4,000 of 4,000 completions failed (100.0%)" in text
-    assert "pass@2 over all prompts: 0.000 (95% interval unknown: all 2 prompts are alike)" in text
-    assert "no completions of Wait" in text
+    unknown = "pass@2 over all prompts: 0.000 (95% interval over tasks unknown: all tasks are alike)"
+    assert unknown in " ".join(text.split())
+    assert "\n4,000 of 4,000 completions, 4 prompts of 2 tasks\n" in text
+    assert "without a program" not in text, "it did not happen"
     assert re.search(r"\n  NameError +4,000  100\.0%", text)
     assert re.search(r"failed checks +0 +0.0%", text)
     assert "ExhaustiveSearch" not in text
@@ -139,7 +153,8 @@ def test_tasks_without_a_score_are_told_apart() -> None:
     assert data["missing"] == {"no_completions": ["A"], "not_judged": ["B"], "not_selected": ["C"]}
     assert (data["judged"], data["to_judge"]) == (4, 11)
     text = printed(summary_view(counted, title="x"))
-    assert text.startswith("x\n4 of 11 completions judged\n")
+    assert "\n4 of 11 completions (7 not judged), 2 prompts of 1 task\n" in text
+    assert re.search(r"\nVisit +4 of 9 ", text)
     assert re.search(r"no completions .*A\nnot judged.* B\nnot selected.* C\n", text)
     with pytest.raises(UserError, match=r"^0 of 11 completions "):
         summary([], suite, scope=scope)
@@ -147,11 +162,38 @@ def test_tasks_without_a_score_are_told_apart() -> None:
 
 def test_rows_whose_completions_are_gone_are_told() -> None:
     text = printed(summary_view(summary(ROWS, SUITE, scope=Scope({"Visit": 3})), title="x"))
-    assert re.match(r"x\n4 completions judged.* 3 .*\n", text)
+    assert re.search(r"\n4 completions, of which only 3 .*\n", text)
 
 
-def test_a_finished_evaluation_does_not_count_what_it_judged() -> None:
-    assert "completions judged" not in printed(summary_view(summary(ROWS, SUITE), title="x"))
+def test_requested_completions_that_are_missing_are_counted() -> None:
+    about = {"batches": [{"tasks": ["Visit"], "num_completions": 3}], "settings": {"max_tokens": 512}}
+    there = [completion(n // 2, n % 2, finish_reason="length" if n else "stop") for n in range(4)]
+    counted = summary(ROWS[:3], SUITE, scope=Scope.of(there, frozenset({"Visit"}), about, SUITE))
+    data = summary_data(counted)
+    assert (data["judged"], data["to_judge"], data["requested"]) == (3, 4, 6)
+    assert (data["cut_off"], data["max_tokens"], data["tasks"][0]["requested"]) == (3, 512, 6)
+    text = printed(summary_view(counted, title="x"), 200)
+    assert "\n3 of 6 completions (2 missing, 1 not judged)," in text
+    assert re.search(r"\nVisit +3 of 6 ", text)
+    assert re.search(r"\n3 of 4 replies \(75\.0%\) .*512 tokens, 3 .* whole program; .*--max-tokens\n", text)
+
+
+@pytest.mark.parametrize(("cut_off", "is_said"), [(2, False), (3, True)])
+def test_more_than_one_in_fifty_cut_off_is_said(cut_off: int, *, is_said: bool) -> None:
+    warning = CutOff(cut_off, 1, 100, None).warning
+    assert (warning is not None) == is_said
+    if warning is not None:
+        assert "--max-tokens" in warning
+        assert "tokens" not in warning.partition(";")[0], "the limit is unknown"
+
+
+def test_replies_without_a_program_are_a_class_with_kinds() -> None:
+    rows = [row(0, 0), row(0, 1, ("NoProgram", "cut-off")), row(1, 0, ("NoProgram", "refusal"))]
+    counted = summary(rows, SUITE)
+    assert counted.cut_off.replies == counted.cut_off.without_program == 1
+    text = printed(summary_view(counted, title="x"))
+    assert re.search(r"\nwithout a program +2 +66\.7%", text)
+    assert re.search(r"\n  cut-off +1 +33\.3%", text)
 
 
 def test_one_is_one() -> None:
@@ -181,6 +223,7 @@ def test_causes_are_shares_of_classes_and_of_their_kinds() -> None:
     found = causes_of(tally_of(table_of([*rows, row(0, 4, ("TaskCompletionError", "Location"))])))
     assert found.classes == {
         "passed": pytest.approx(0.2),
+        "NoProgram": 0,
         "PythonError": pytest.approx(0.6),
         "RobotExecutionError": 0,
         "TaskCompletionError": pytest.approx(0.2),

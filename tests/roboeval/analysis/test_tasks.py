@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from codebotler.core.terminal import visible
+from codebotler.models.no_program import IN_WORDS
 from made_results import results_of, table_of
 from roboeval.analysis.counts import tally_of
 from roboeval.analysis.summary import summary
-from roboeval.analysis.tasks import task_data
+from roboeval.analysis.tasks import prompt_data, task_data
+from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import summary_view, task_view
 from roboeval.evaluation.explanation import NOT_RECORDED, OF_SUITE
 from roboeval.evaluation.runs.completions import Completion
@@ -36,6 +39,7 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
         "suite_instruction": SUITE.tasks["Visit"].prompts[0],
         "models": [],
         "completions": 2,
+        "requested": None,
         "gone": 0,
         "passed": 1,
         "pass@1": 0.5,
@@ -44,6 +48,20 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
     text = printed(task_view(task_data(results(*completions), "Visit")))
     assert "Visit/0  1 of 2 passed (pass@1 0.50)\nVisit her.\n" in text
     assert "  1  Python error: NameError  such as Visit/0/1\n" in text
+
+
+def test_requested_completions_of_a_prompt_are_shown_where_some_are_missing() -> None:
+    about = {"batches": [{"tasks": None, "num_completions": 5}]}
+    data = task_data(replace(results(), about=about), "Visit")
+    assert [prompt["requested"] for prompt in data["prompts"]] == [5, 5]
+    assert "Visit/0  1 of 2 passed (pass@1 0.50); 5 were requested\n" in printed(task_view(data))
+
+
+def test_replies_without_a_program_are_said_in_words() -> None:
+    found = results(rows=[row(0, 0, ("NoProgram", "cut-off"))])
+    text = printed(prompt_view(prompt_data(found, "Visit", 0)))
+    assert "no program: cut-off" in text
+    assert IN_WORDS["cut-off"] in text
 
 
 def test_text_of_the_suite_is_marked_where_the_instruction_was_not_recorded() -> None:

@@ -581,7 +581,7 @@ def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:2]))
     unseal(tmp_path / "run")
     shown = roboeval("show", "run", cwd=tmp_path)
-    assert "2 of 4 completions judged\n" in shown.out
+    assert "\n2 of 4 completions (2 not judged), 1 prompt of 1 task\n" in shown.out
     assert re.search(r"not judged.*: LunchTime\n", shown.out)
     assert "not selected: 14 tasks\n" in shown.out
     assert "2 of 4 completions" in shown.err

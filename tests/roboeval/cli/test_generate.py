@@ -40,7 +40,8 @@ def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
     ended = roboeval(*words, cwd=tmp_path)
     assert ended.status == 0
     assert "runs/recorded-hasty (programs written by hand)" in ended.out
-    assert re.search(r"pass@1 over all prompts: 0\.\d{3} \(95% interval .*, 10 prompts\)", ended.out)
+    assert re.search(r"pass@1 over all prompts: 0\.\d{3} \(95% interval over tasks .*\)\n", ended.out)
+    assert "\n30 of 30 completions, 10 prompts of 2 tasks\n" in ended.out
     run = tmp_path / "runs" / "recorded-hasty"
     assert len(set(keys(run))) == 30
     assert (run / "evaluations" / "paper.jsonl").read_bytes().count(b"\n") == 30

@@ -98,11 +98,11 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
     assert "100.0% of the programs" in shown
-    assert "(95% interval unknown: all prompts are alike)" in " ".join(shown.split())
+    assert "(95% interval over tasks unknown: all tasks are alike)" in " ".join(shown.split())
     reported = roboeval("report", "run", "--rules", "house.yaml", "--out", "report", "--no-check", cwd=folder)
     assert reported.status == 0, reported.err
     page = (folder / "report" / "index.html").read_text()
-    assert "the interval of the share that breaks a rule is unknown: all prompts are alike." in page
+    assert "the interval of the share that breaks a rule is unknown: all tasks are alike." in page
 
 
 def test_rows_are_the_same_with_any_number_of_workers_and_on_both_roads(folder: Path) -> None:
@@ -143,3 +143,14 @@ def test_a_suite_with_rules_of_its_own_takes_no_others(folder: Path) -> None:
     told = refused(*hasty, "--rules", "house.yaml", cwd=folder)
     assert "has house rules of its own, which would not count; leave out --rules" in str(told)
     assert not (folder / "run").exists()
+
+
+def test_a_room_that_no_world_of_the_suite_has_is_refused(folder: Path) -> None:
+    path = folder / "house.yaml"
+    path.write_text(RULES.replace('not tr.AtLeast(check("person"), 3)', 'not tr.Exists(goto("kichen"))'))
+    arguments = ("evaluate", "recorded:careful", "--rules", "house.yaml", *TASKS)
+    refusal = refused(*arguments, cwd=folder)
+    assert refusal.at == ("house.yaml", 9)
+    assert '"kitchen"' in refusal.sentence
+    path.write_text(path.read_text().replace("says: Look", "any: true\n    says: Look"))
+    assert roboeval(*arguments, cwd=folder).status == 0

@@ -28,18 +28,21 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_report_of_two_runs(runs: Path) -> None:
-    made = roboeval("report", "hasty", "careful", "--out", "report", cwd=runs)
+    label = ("--label", "hasty=Base model")
+    made = roboeval("report", "hasty", "careful", "--out", "report", *label, cwd=runs)
     assert made.status == 0, made
     assert made.out == ""
     assert made.err.endswith("the report is in report/index.html\n")
     text = (runs / "report" / "index.html").read_text()
-    assert "recorded:hasty" in text
+    assert "recorded:careful" in text
+    assert "<h3>Base model</h3>" in text
+    assert "--label &#x27;hasty=Base model&#x27;" in text
     for kind in ("png", "pdf"):
         names = {path.stem for path in (runs / "report" / "figures").glob(f"*.{kind}")}
-        assert names == {"tasks", "thresholds", "causes", "rejection-sampling", "accepted"}
+        assert names == {"overall", "tasks", "thresholds", "causes", "rejection-sampling", "accepted"}
     (runs / "first").mkdir()
     (runs / "report").rename(runs / "first" / "report")
-    again = roboeval("report", "hasty", "careful", "--out", "report", cwd=runs)
+    again = roboeval("report", "hasty", "careful", "--out", "report", *label, cwd=runs)
     assert again.status == 0
     files = [path.relative_to(runs / "first") for path in (runs / "first").rglob("*") if path.is_file()]
     assert len(files) > 20
@@ -98,6 +101,12 @@ def test_prices_that_are_none(runs: Path) -> None:
     refusal = refused("report", runs / "careful", "--out", runs / "x", "--price", "careful", "--no-check")
     assert '"careful"' in refusal.sentence
     assert "MODEL=INPUT/OUTPUT" in refusal.sentence
+    assert not (runs / "x").exists()
+
+
+def test_labels_that_are_none(runs: Path) -> None:
+    refusal = refused("report", runs / "careful", "--out", runs / "x", "--label", "other=A", "--no-check")
+    assert '"other"' in refusal.sentence
     assert not (runs / "x").exists()
 
 

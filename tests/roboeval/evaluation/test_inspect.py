@@ -92,6 +92,23 @@ def judged(logs: Path, recorded: list[Completion]) -> EvalLog:
     return read_eval_log(log.location)
 
 
+def test_cut_off_reply_fails_for_want_of_a_program(logs: Path) -> None:
+    output = ModelOutput.from_content(
+        "mockllm", "```python\ndef task_program():\n    say(", stop_reason="max_tokens"
+    )
+    output.usage = ModelUsage()
+    (log,) = inspect_eval(
+        TASK,
+        model=get_model("mockllm/model", custom_outputs=[output] * 5),
+        task_args={"tasks": ["LunchTime"]},
+        log_dir=str(logs / "cut"),
+        display="none",
+    )
+    scores = [score for one in log.samples or [] for score in (one.scores or {}).values()]
+    assert [score.metadata["failure"]["class"] for score in scores] == ["NoProgram"] * 5
+    assert {score.metadata["failure"]["kind"] for score in scores} == {"cut-off"}
+
+
 def test_all_recorded_completions_get_the_verdicts_that_we_give(
     judged: EvalLog, recorded: list[Completion], paper: Suite
 ) -> None:

@@ -248,6 +248,8 @@ HI = (Event("goto", "kitchen"), Event("say", "hi"))
 
 # --- replies without a program
 
+HALF = 'def task_program():\n    go_to("kitchen")\n'
+
 
 @pytest.mark.parametrize(
     ("program", "more", "why"),
@@ -261,11 +263,13 @@ HI = (Event("goto", "kitchen"), Event("say", "hi"))
         ("x = task", {"no_program": None}, ("PythonError", "NameError")),
         (GOOD, {"finish_reason": "length"}, None),
         (GOOD, {"no_program": "cut-off"}, None),  # a verdict is about the program
+        (HALF, {"finish_reason": "length", "raw_reply": f"```\n{HALF}"}, ("NoProgram", "cut-off")),
         (
-            'def task_program():\n    go_to("moon")\n',
-            {"no_program": "empty"},
-            ("RobotExecutionError", "GoToInvalid"),
+            HALF,
+            {"finish_reason": "length", "raw_reply": f"```\n{HALF}```\nIt"},
+            ("TaskCompletionError", "Say"),
         ),
+        (HALF, {"no_program": "cut-off"}, ("NoProgram", "cut-off")),
     ],
 )
 def test_reply_without_a_program_fails_by_its_cause(

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from made_up_runs import cases, made_up
+from roboeval.analysis.metrics import overall
 from roboeval.analysis.resample import LIMITS, accepted_after
 from roboeval.evaluation.failures import CLASSES, FailureClass
 from roboeval.report.cost import curves
@@ -33,11 +34,22 @@ from roboeval.report.drawing import (
     written,
 )
 from roboeval.report.failures import all_causes
-from roboeval.report.figures import accepted, bars, causes, heat, limits, most_completions, thresholds
+from roboeval.report.figures import (
+    WORST_AND_BEST,
+    accepted,
+    bars,
+    causes,
+    heat,
+    limits,
+    most_completions,
+    overall_scores,
+    thresholds,
+)
 from roboeval.report.runs import JudgedRun
 
 PICTURES = Path(__file__).with_name("pictures")
 DRAWINGS: dict[str, Callable[[list[JudgedRun]], Figure]] = {
+    "overall": overall_scores,
     "tasks": bars,
     "thresholds": thresholds,
     "causes": lambda runs: causes(all_causes(runs, with_published=True)),
@@ -48,7 +60,8 @@ DRAWINGS: dict[str, Callable[[list[JudgedRun]], Figure]] = {
 }
 KEPT: list[Any] = [*(("usual", name) for name in DRAWINGS)]
 KEPT += [pytest.param("40 models", name, marks=pytest.mark.slow) for name in DRAWINGS]
-KEPT += [("one prompt", "tasks"), ("all failures", "causes"), ("no failures", "causes")]
+KEPT += [("one prompt", "tasks"), ("one prompt", "overall"), ("without programs", "causes")]
+KEPT += [("all failures", "causes"), ("no failures", "causes")]
 SIZE = (480, 480)
 TOLERANCE = 0.012  # of the whole range, on average over all points
 
@@ -112,12 +125,50 @@ def test_a_further_class_of_failures_is_drawn(monkeypatch: pytest.MonkeyPatch) -
     assert labels[-1] == "broken rules"
 
 
-def test_the_line_through_a_bar_reaches_from_the_worst_prompt_to_the_best() -> None:
+def test_class_without_programs_is_drawn_only_where_it_happened() -> None:
+    def titles(case: str) -> list[str]:
+        with styled():
+            figure = DRAWINGS["causes"](cases()[case])
+        return [axes.get_title(loc="left") for axes in figure.axes]
+
+    assert "(b) Python errors" in titles("usual")
+    assert titles("without programs")[1:3] == ["(b) without a program", "(c) Python errors"]
+
+
+def test_classes_keep_their_colours() -> None:
+    def colours(case: str) -> dict[str, Any]:
+        with styled():
+            figure = DRAWINGS["causes"](cases()[case])
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        found: list[Any] = list(handles)
+        return {label: to_hex(bars[0].get_facecolor()) for label, bars in zip(labels, found, strict=True)}
+
+    usual, more = colours("usual"), colours("without programs")
+    assert usual.items() <= more.items()
+    assert {*more} - {*usual} == {"without a program"}
+
+
+def test_whisker_is_the_interval_and_marks_are_the_worst_and_the_best_prompt() -> None:
+    run = made_up("a", {"Visit": (4, 5, 6), "CountMugs": (4,), "BringTea": (3, 3, 3)})
     with styled():
-        (axes,) = bars([made_up("a", {"Visit": (1, 5, 9), "CountMugs": (4,)})]).axes
-    ends = [np.asarray(line)[:, 1] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
-    assert np.allclose(ends, [(0.1, 0.9), (0.4, 0.4)])
-    assert np.allclose([bar.get_height() for bar in axes.patches], [0.5, 0.4])  # type: ignore[attr-defined]  # bars are rectangles
+        (axes,) = bars([run]).axes
+    (ends,) = [np.asarray(line)[:, 1] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
+    passed = run.scores[0].pass_at(1)
+    assert np.allclose(ends, (passed.low, passed.high)), "the others have no known interval"
+    (marks,) = [line for line in axes.lines if line.get_marker() == "D"]
+    assert sorted(np.asarray(marks.get_ydata()).round(9)) == [0.3, 0.4, 0.6]
+    assert np.allclose([bar.get_height() for bar in axes.patches], [0.5, 0.4, 0.3])  # type: ignore[attr-defined]  # bars are rectangles
+    assert axes.figure.legends[0].get_texts()[-1].get_text() == WORST_AND_BEST
+
+
+def test_overall_figure_has_the_interval_over_tasks() -> None:
+    runs = cases()["usual"]
+    with styled():
+        (axes,) = overall_scores(runs).axes
+    passed = [overall(run.scores, 1) for run in runs]
+    ends = [np.asarray(line)[:, 0] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
+    assert np.allclose(ends, [(one.low, one.high) for one in passed])
+    assert np.allclose([bar.get_width() for bar in axes.patches], [one.mean for one in passed])  # type: ignore[attr-defined]  # bars are rectangles
 
 
 @pytest.mark.parametrize("name", ["tasks", "thresholds", "accepted", "rejection-sampling"])

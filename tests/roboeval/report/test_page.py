@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -101,7 +102,39 @@ def test_a_p_that_is_nothing_is_said_to_be_small() -> None:
 
 
 def test_a_card_says_where_an_interval_is_unknown() -> None:
-    assert "95% interval unknown: all prompts are alike" in shown([made_up("a", {"Visit": (5, 5)})])
+    text = shown([made_up("a", {"Visit": (5, 5), "CountMugs": (5,)})])
+    assert "95% interval over tasks unknown: all tasks are alike" in text
+    assert "95% interval over tasks unknown: too few tasks" in shown([made_up("a", {"Visit": (5, 4)})])
+
+
+def test_a_card_says_of_how_many_completions_and_whether_replies_were_cut_off() -> None:
+    cut = made_up(
+        "cut",
+        {"Visit": (5, 4), "CountMugs": (3,)},
+        written=lambda _, index: {"finish_reason": "length" if index < 2 else "stop"},
+        about={"settings": {"max_tokens": 64}},
+    )
+    text = card(cut)
+    assert "30 of 30 completions, 3 prompts of 2 tasks" in text
+    assert re.search(r'class="warning">6 of 30 replies \(20\.0%\) .*64 tokens, .*--max-tokens', text)
+    lacking = replace(cut, results=replace(cut.results, about=REQUESTED))
+    assert "30 of 36 completions (6 missing)" in card(lacking)
+    assert 'class="warning"' not in card(made_up("whole", {"Visit": (5,)}))
+
+
+REQUESTED = {"batches": [{"tasks": ["Visit", "CountMugs"], "num_completions": 9}]}
+
+
+def card(run: JudgedRun) -> str:
+    text = shown([run])
+    return text[text.index('<article class="card">') : text.index("</article>")]
+
+
+def test_caption_says_how_many_tasks_each_run_has() -> None:
+    text = shown([made_up("a", {"Visit": (5, 5)}), made_up("b", {"Visit": (5,), "CountMugs": (5,)})])
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", text)
+    assert re.search(r"\ba: 20 of 20 completions, 2 prompts of 1 task\. b: .* of 2 tasks\.", captions[0])
+    assert text.index('id="figure-overall"') < text.index('id="figure-tasks"')
 
 
 def test_empty_columns_are_left_out_and_long_tables_are_cut(usual: Path) -> None:

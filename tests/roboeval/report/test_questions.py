@@ -162,7 +162,7 @@ def test_pairs_that_were_asked_otherwise_are_told() -> None:
     )
     _, table = differences([one, other]).parts
     assert isinstance(table, Sheet)
-    (note,) = table.notes
+    _, note = table.notes
     assert re.search(r"^a and b: temperature\b.* 0 and 1", note)
 
 

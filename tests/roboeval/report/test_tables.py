@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
 from made_up_runs import HOSTILE, UNCHECKED, made_up, unfinished, usual
 from roboeval.analysis.resample import accepted_after
@@ -18,7 +19,7 @@ from roboeval.evaluation.runs.source import open_source
 from roboeval.report import paper
 from roboeval.report.cost import rejection_sampling, retries_sheet
 from roboeval.report.failures import all_causes, beside_notes, causes_sheet
-from roboeval.report.runs import JudgedRun, named_apart
+from roboeval.report.runs import JudgedRun, named_apart, read_labels
 from roboeval.report.scores import curve_sheet, overall_sheet, prompt_sheet, task_sheet
 from roboeval.report.sheets import Column, Sheet, described, note, page_words, told, write_csv
 from roboeval.report.writing import sections
@@ -33,7 +34,9 @@ def column(table: Sheet, head: str) -> list[object]:
 def test_tasks_have_mean_worst_and_best_prompt() -> None:
     table = task_sheet(usual())
     (row,) = [row for row in table.rows if row[:3] == ["Visit", "strong", "all"]]
-    assert row[3:] == pytest.approx((29 / 30, 0.9, 1.0))
+    passed = usual()[0].scores[0].pass_at(1)
+    assert row[3:5] == [30, 30]
+    assert row[5:] == pytest.approx((29 / 30, passed.low, passed.high, 0.9, 1.0))
     assert [row[2] for row in table.rows].count("common sense only") == 2
     assert "middle, weak" in table.notes[0]
 
@@ -66,12 +69,13 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
 
 
 def test_an_interval_without_width_is_called_unknown() -> None:
-    alike, others = made_up("a", {"Visit": (5, 5)}), made_up("b", {"Visit": (4, 5)})
+    alike = made_up("a", {"Visit": (5, 5), "CountMugs": (5,)})
+    others = made_up("b", {"Visit": (4, 5), "CountMugs": (5,)})
     table = overall_sheet([alike, others])
     assert [note for note in table.notes if "unknown" in note] == [
-        "a: the interval over prompts is unknown: all prompts are alike."
+        "a: the interval over tasks is unknown: all tasks are alike."
     ]
-    assert table.rows[0][5:7] == [0.5, 0.5]  # in the file it stays
+    assert column(table, "tasks: low")[0] == column(table, "tasks: high")[0] == 0.5  # in the file it stays
 
 
 def test_retries_as_they_are_elsewhere() -> None:
@@ -210,6 +214,32 @@ def test_reports_of_published_completions_equal_the_published_cells(
 
 
 # --- names, and CSV
+
+
+def test_labels_name_runs() -> None:
+    paths = [Path("runs/a"), Path("runs/b")]
+    labels = read_labels(["runs/a/=Base", "b= Mine "], paths)
+    assert labels == {0: "Base", 1: "Mine"}
+    runs = [made_up(name, {"Visit": (1,)}) for name in ("x", "y")]
+    assert [run.name for run in named_apart(runs, labels)] == ["Base", "Mine"]
+    assert [run.name for run in named_apart(runs, {1: "Mine"})] == ["x", "Mine"]
+
+
+@pytest.mark.parametrize(
+    ("texts", "why"),
+    [
+        (["a"], "RUN=TEXT"),
+        (["a="], "RUN=TEXT"),
+        (["=x"], "RUN=TEXT"),
+        (["c=x"], "no such run"),
+        (["a=x", "runs/a=y"], "twice"),
+        (["a=x", "b=x"], "each its own"),
+        (["d=x"], "more than one"),
+    ],
+)
+def test_labels_that_are_wrong_are_refused(texts: list[str], why: str) -> None:
+    with pytest.raises(UserError, match=why):
+        read_labels(texts, [Path("runs/a"), Path("runs/b"), Path("one/d"), Path("two/d")])
 
 
 def test_runs_are_named_apart() -> None:

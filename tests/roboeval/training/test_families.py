@@ -10,9 +10,9 @@ import pytest
 
 from codebotler.core.errors import UserError
 from hacking import earned, hacks, honest, taken_back
+from roboeval.suites.families.tasks import TAKES_BACK, family_names, trained_prompts, trained_task
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
-from roboeval.training.families import TAKES_BACK, family_names, trained_task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
@@ -49,6 +49,11 @@ def test_a_seed_always_makes_the_same_task_and_another_one_another(family: str) 
     scenarios = task.suite.tasks[task.name].scenarios
     assert len(scenarios) >= 8
     assert not any("{" in prompt or "$" in prompt for prompt in task.prompts)
+
+
+@pytest.mark.parametrize("family", family_names())
+def test_prompts_without_a_task_are_those_of_the_task(family: str) -> None:
+    assert trained_prompts(family, 77) == trained_task(family, 77).prompts
 
 
 def test_worlds_are_as_many_as_asked_for() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -12,10 +14,11 @@ from codebotler.core.errors import UserError
 from codebotler.simulator.pool import AHEAD, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
+from roboeval.suites.families.suite import SPLITS
+from roboeval.suites.families.tasks import TrainedTask, trained_task
 from roboeval.suites.house import HouseRules
-from roboeval.training import rollouts
-from roboeval.training.families import trained_task
-from roboeval.training.prompts import SPLITS, load_prompts, program_in
+from roboeval.training import prompts, rollouts
+from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
 FAMILY = "BringThing"
@@ -106,6 +109,26 @@ def test_prompts_are_the_same_each_time_and_splits_share_no_task() -> None:
     tasks = [{(row["family"], row["seed"]) for row in load_prompts(split, count=40)} for split in SPLITS]
     assert [len(one) for one in tasks] == [40] * 3
     assert not tasks[0] & tasks[1] | tasks[1] & tasks[2] | tasks[0] & tasks[2]
+
+
+def test_prompts_stay_the_same_bytes() -> None:
+    rows = load_prompts("test", count=40, seed=2, only=["BringThing", "OfferThing"])
+    found = hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+    assert found == "fb3236546db764c2b6e0683e5c70f3d6e184b9dd1a9ce798113572c3e93701b7"
+
+
+def test_worlds_are_drawn_for_one_task_of_each_family_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+
+    def counted(family: str, seed: int) -> TrainedTask:
+        made.append(family)
+        return trained_task(family, seed)
+
+    monkeypatch.setattr(prompts, "trained_task", counted)
+    reports: list[int] = []
+    load_prompts(count=100, only=["BringThing", "OfferThing"], progress=reports.append)
+    assert made == ["BringThing", "OfferThing"]
+    assert reports == [*range(1, 101)]
 
 
 def test_phrasings_take_turns_in_any_choice_of_families() -> None:

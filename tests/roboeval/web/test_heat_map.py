@@ -57,8 +57,11 @@ def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) 
 
 def test_what_a_filter_counts_is_said_in_words() -> None:
     assert failure_text(Filter(passed=False)) is None
-    assert failure_text(Filter(failure_class="RobotExecutionError")) == "a robot error"
-    assert failure_text(Filter(failure_class="PythonError", failure_kind="NameError")) == "NameError"
+    assert failure_text(Filter(failure_class="RobotExecutionError")) == "in a robot error"
+    assert failure_text(Filter(failure_class="PythonError", failure_kind="NameError")) == "in NameError"
+    assert failure_text(Filter(failure_class="NoProgram")) == "without a program"
+    cut_off = Filter(failure_class="NoProgram", failure_kind="cut-off")
+    assert failure_text(cut_off) == "without a program (cut-off)"
 
 
 def test_failures_by_run_each_class_with_its_kinds(runs: Path) -> None:

@@ -9,10 +9,39 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.files import to_line
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.web.run_store import MOST_HELD, RunStore
-from roboeval.web.serializers import RunList, State, notes
+from roboeval.web.serializers import RunList, State, date_of, notes, run_data, settings_text
+
+
+def test_settings_and_date_of_a_run_are_told() -> None:
+    about = {
+        "settings": {
+            "temperature": 0.2,
+            "max_tokens": None,
+            "reasoning_effort": "low",
+            "extra_body": {"k": 1},
+        },
+        "batches": [{"started": "2026-11-28T10:00:00+00:00"}, {"started": "2026-11-27T10:00:00+00:00"}],
+    }
+    assert settings_text(about) == 'temperature 0.2, reasoning-effort low, extra-body {"k": 1}'
+    assert date_of(about) == "2026-11-27T10:00:00+00:00"
+    for wrong in ({}, {"settings": 3, "batches": [{"started": 7}]}):
+        assert (settings_text(wrong), date_of(wrong)) == ("", None)
+
+
+def test_many_cut_off_replies_are_noted(runs: Path) -> None:
+    completions = Run(runs / "hasty").completions
+    rows = [json.loads(line) for line in completions.read_bytes().splitlines()]
+    cut = [{**row, "finish_reason": "length"} for row in rows[:3]] + rows[3:]
+    completions.write_bytes(b"".join(map(to_line, cut)))
+    run = RunStore(runs).open("hasty")
+    (said,) = notes(run)
+    assert "3 of 45 replies (6.7%)" in said
+    data = run_data(run)
+    assert (data["cut_off"], data["tasks_there"]) == (3, 3)
 
 
 def test_many_damaged_lines_are_counted(runs: Path) -> None:

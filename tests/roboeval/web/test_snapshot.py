@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from codebotler.core.files import to_line
+from codebotler.models.no_program import IN_WORDS
 from roboeval.evaluation.runs.folder import Run
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import State, state_of
@@ -34,7 +36,7 @@ def test_a_row_for_each_completion(runs: Path) -> None:
     assert run.completions.height == len(rows) == 45
     assert len(run.results.completions) == run.results.scope.total == run.judged == 45
     assert (len(run.results.stale), run.results.faults, run.models) == (0, (), ["recorded:hasty"])
-    assert state_of(run, 45) is State.JUDGED
+    assert state_of(run) is State.JUDGED
     for row in rows:
         shown = run.row(f"{row['task']}/{row['prompt']}/{row['index']}")
         assert shown is not None
@@ -121,28 +123,44 @@ def test_filters_prompts_and_neighbours(runs: Path) -> None:
     assert run.neighbours(("LunchBreak", 9, 9), Filter()) == (None, None)
 
 
+def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
+    rows = Run(runs / "hasty").rows("paper")
+    first, *others = [json.loads(line) for line in lines_of(rows)]
+    first |= {"passed": False, "failure": {"class": "NoProgram", "kind": "empty", "world": 0, "check": None}}
+    rows.write_bytes(b"".join(map(to_line, [first, *others])))
+    unseal(runs / "hasty")
+    run = opened(runs / "hasty")
+    shown = run.row(f"{first['task']}/{first['prompt']}/{first['index']}")
+    assert shown is not None
+    assert (shown["why"], shown["worlds"]) == (IN_WORDS["empty"], "")
+    assert run.failures[0].name == "NoProgram"
+
+
 def test_how_far_a_run_has_come(runs: Path) -> None:
     run = Run(runs / "hasty")
     completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
     cases: list[tuple[int, int, bool, int | None, State]] = [
-        (45, 0, True, 50, State.GENERATING),
+        (45, 0, True, 60, State.GENERATING),
         (0, 0, True, None, State.GENERATING),
         (45, 40, True, 45, State.JUDGING),
         (45, 45, True, 45, State.JUDGED),
         (0, 0, False, 45, State.EMPTY),
-        (45, 0, False, 50, State.UNFINISHED),
+        (45, 0, False, 60, State.UNFINISHED),
         (45, 0, False, 45, State.NOT_JUDGED),
         (45, 40, False, 45, State.UNFINISHED),
         (45, 45, False, None, State.JUDGED),
     ]
     head = json.loads(run.head("paper").read_text())
     run.head("paper").write_text(json.dumps({k: v for k, v in head.items() if k not in {"rows", "sha256"}}))
-    for written, judged, is_written, wanted, state in cases:
+    for written, judged, is_written, requested, state in cases:
         run.completions.write_bytes(b"".join(completions[:written]))
         run.rows("paper").write_bytes(b"".join(rows[:judged]))
         seen = opened(run.path)
-        seen = Snapshot(seen.results, seen.evaluations, is_written, None)
-        assert state_of(seen, wanted) is state, state
+        each = None if requested is None else requested // 15  # prompts of these three tasks
+        tasks = ["SayGoodDay", "LunchBreak", "StaplerSupply"]
+        about = {} if each is None else {"batches": [{"tasks": tasks, "num_completions": each}]}
+        seen = Snapshot(replace(seen.results, about=about), seen.evaluations, is_written, None)
+        assert state_of(seen) is state, state
 
 
 @pytest.mark.parametrize("content", [b"{broken\n", b"[1]\n", b'{"task": "LunchBreak"}\n', b"\xff\n"])
@@ -154,7 +172,7 @@ def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: by
     (fault,) = run.results.faults
     assert (fault.file, fault.line) == (rows, 11)
     assert (run.judged, len(run.results.stale)) == (44, 0)
-    assert state_of(run, 45) is State.DAMAGED
+    assert state_of(run) is State.DAMAGED
 
 
 def test_half_a_character_in_a_name_of_a_task_breaks_nothing(runs: Path) -> None:

@@ -11,16 +11,23 @@ from roboeval.web.widgets import completions_text, interval_text, score_text
 
 
 @pytest.mark.parametrize(
-    ("judged", "wanted", "text"),
-    [(1, 1, "1 completion"), (2, 2, "2 completions"), (1, 2, "1 of 2 written completions")],
+    ("judged", "requested", "text"),
+    [
+        (1, 1, "1 of 1 completion"),
+        (2, None, "2 of 2 completions"),
+        (1, 2, "1 of 2 completions (1 missing)"),
+    ],
 )
-def test_completions_are_counted_with_their_noun(judged: int, wanted: int, text: str) -> None:
-    data = {"completions": judged, "wanted": wanted, "judged": judged, "to_judge": judged}
+def test_completions_are_counted_with_their_noun(judged: int, requested: int | None, text: str) -> None:
+    data = {"completions": judged, "requested": requested, "judged": judged, "to_judge": judged}
     assert completions_text(data) == text
 
 
 def test_an_interval_without_width_is_unknown() -> None:
-    mean: dict[str, Any] = {"mean": 1.0, "low": 1.0, "high": 1.0}
-    assert score_text({"pass@1": mean}) == "pass@1 1.000 (95% interval unknown: all prompts are alike)"
-    assert score_text({"pass@1": {**mean, "low": 0.8}}) == "pass@1 1.000 (95% interval 0.80 to 1.00)"
+    mean: dict[str, Any] = {"mean": 1.0, "low": 1.0, "high": 1.0, "over": "tasks"}
+    assert (
+        score_text({"pass@1": mean}) == "pass@1 1.000 (95% interval over tasks unknown: all tasks are alike)"
+    )
+    known = {**mean, "low": 0.8}
+    assert score_text({"pass@1": known}) == "pass@1 1.000 (95% interval over tasks 0.800 to 1.000)"
     assert interval_text(Estimate(**mean)) == "interval unknown"

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 import verifiers.v1 as vf
 from pydantic import Field, field_validator
 
-from roboeval.training.families import WORLDS, trained_task
+from roboeval.suites.families.tasks import WORLDS, trained_task
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 

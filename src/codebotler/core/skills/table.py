@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any, NoReturn, SupportsIndex
@@ -236,6 +236,11 @@ class SkillTable(Mapping[str, Skill]):
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
         """This table and those rows of another one that it lacks."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
+
+    def without(self, names: Iterable[str]) -> SkillTable:
+        """The rows of this table that have none of these names."""
+        left_out = {*names}
+        return SkillTable(tuple(row for row in self.rows if row.name not in left_out))
 
     def doing(self, **does: Callable[..., Any]) -> SkillTable:
         """The same skills, of which some do something else."""

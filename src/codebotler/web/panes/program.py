@@ -20,14 +20,14 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MOST_PROGRAM, Console
-from codebotler.web.frame import Button, PlainText, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
+from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
 from codebotler.web.storyboard import Reached, draw_strips
 
 CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
 MOST_MARKS, MOST_ESCAPES = 400, 2_000
 MOST_PROBLEMS = 20
-SCRIPT = '<script src="/static/editor.js"></script>'
 
 
 class ProgramPane:
@@ -38,12 +38,13 @@ class ProgramPane:
         self._heard = 0  # texts from this browser
         self._told: dict[str, object] = {}
         self._drawn: tuple[object, ...] = ()
-        ui.add_head_html(SCRIPT)
+        script("editor.js")
         ui.on("program-typed", self._typed)
         with ui.element("section").classes("pane program").props("aria-labelledby=h-program"):
             with ui.element("div").classes("head"):
                 PlainText("h2", "Program").props("id=h-program")
                 self._busy = PlainText("span", "", "busy").props("role=status")
+            self._reply = ReplyPane()
             self._writer = PlainText("p", "", "quiet")
             # Its own properties stay as they are: each update of one would bring its text along, over what
             # is being typed. The script sets what changes.
@@ -57,6 +58,7 @@ class ProgramPane:
             with self._approval:
                 self._despite = ui.checkbox("Run it despite the problems", on_change=self._ticked)
                 self._run = Button("Run it on the robot", self._approve, "go")
+                self._raise = Button("", self._raise_limit, "plain")
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
                 self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
             self._board = ui.element("div").classes("storyboard")
@@ -66,8 +68,9 @@ class ProgramPane:
     def show(self, view: SessionView) -> None:
         """Show a view."""
         self._view = view
-        shown = _for_editor(view.program)
+        shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._tell(view, shown)
+        self._reply.show(view)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
         self._writer.say(_written_by(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
@@ -129,13 +132,18 @@ class ProgramPane:
 
     def _show_approval(self, view: SessionView) -> None:
         open_ = view.state is not None and view.state.is_open and not view.is_over and bool(view.program)
-        may_again = view.may_be_asked_again
-        self._approval.set_visibility(open_ or self._may_rerun(view))
+        may_again, none = view.may_be_asked_again, view.programless
+        self._approval.set_visibility(open_ or may_again or self._may_rerun(view))
         self._despite.set_visibility(open_ and bool(view.problems) and view.can_run)
         if not view.problems:
             self._despite.value = False
-        self._repair.set_visibility(may_again and bool(view.problems))
+        may_listen = view.waits_for_program and none is not None and none.may_listen
+        self._repair.text = "Ask for the program only" if may_listen else "Repair"
+        self._repair.set_visibility(may_again and (bool(view.problems) or may_listen))
         self._again_button.set_visibility(may_again)
+        higher = none.higher_limit if none is not None and may_again else None
+        self._raise.say(f"Raise the limit to {higher:,} tokens" if higher else "")
+        self._run.set_visibility(open_ or self._may_rerun(view))
         self._run.text = "Prepare it again" if self._may_rerun(view) else "Run it on the robot"
         self._ticked()
 
@@ -172,10 +180,15 @@ class ProgramPane:
             self._restore("The program has changed; look at it again.")
         return False
 
-    def _again(self, *, repair: bool) -> None:
+    def _again(self, *, repair: bool, max_tokens: int | None = None) -> None:
         session = self._console.session
         if session is not None:
-            self._try(lambda: session.ask_again(repair=repair))
+            self._try(lambda: session.ask_again(repair=repair, max_tokens=max_tokens))
+
+    def _raise_limit(self) -> None:
+        none = self._console.view.programless
+        if none is not None:
+            self._again(repair=False, max_tokens=none.higher_limit)
 
     def _try(self, do: Callable[[], object]) -> None:
         try:

@@ -13,20 +13,21 @@ from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import State, Summary
 from codebotler.missions.progress import ANSWER, Moment, position
 from codebotler.missions.view import Phase, SessionView
+from codebotler.missions.wording import reason_text
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
-from codebotler.web.frame import Button, PlainText
+from codebotler.web.frame import Button, PlainText, script
 from codebotler.web.panes.question import QuestionPane
 
 HEADLINES: Mapping[Phase, str] = {
     "": "No mission yet",
     "writing": "The program is being written",
     "checking": "The program is being checked",
+    "no-program": "There is no program yet",
     State.CHECKED: "Ready: waiting for your approval",
     State.APPROVED: "Starting",
 }
 MOST_MOMENTS = 60
-SCRIPT = '<script src="/static/moments.js"></script>'
 
 
 class RobotPane:
@@ -36,7 +37,7 @@ class RobotPane:
         self._console = console
         self._drawn: tuple[Moment, ...] = ()
         self._mapped: object = None
-        ui.add_head_html(SCRIPT)
+        script("moments.js")
         with ui.element("section").classes("pane status").props("aria-labelledby=h-status"):
             with ui.element("div").classes("head"):
                 PlainText("h2", "Status").props("id=h-status")
@@ -56,7 +57,7 @@ class RobotPane:
         """Show a view."""
         self._tell_interrupted(self._console.interrupted)
         progress = view.progress
-        self._state.say(HEADLINES.get(view.phase) or view.phase.capitalize())
+        self._state.say(_headline(view))
         self._state.classes(replace=f"headline {view.phase or 'none'}")
         doing = progress.doing
         self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
@@ -66,7 +67,7 @@ class RobotPane:
             [f"{progress.clock:.1f} s on the robot's clock"] if progress.moments and progress.clock else []
         )
         self._where.say(" · ".join(where))
-        self._reason.say(view.reason if view.line is None else f"line {view.line}: {view.reason}")
+        self._reason.say(reason_text(view.reason, view.line))
         if self._asking is not None:
             self._asking.show(is_over=view.is_over)
         self._draw_map(view)
@@ -113,6 +114,12 @@ class RobotPane:
             for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
             Button("Dismiss", self._console.dismiss, "plain")
+
+
+def _headline(view: SessionView) -> str:
+    if view.phase == State.CHECKED and view.problems:
+        return "The program has problems" if view.can_run else "The program cannot run"
+    return HEADLINES.get(view.phase) or view.phase.capitalize()
 
 
 def map_state(view: SessionView, world: World) -> MapState:

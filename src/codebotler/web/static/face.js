@@ -5,6 +5,7 @@ import { Listener } from "./listener.js";
 const $ = (id) => document.getElementById(id);
 const WELCOME = "Hello. I have nothing to do right now.";
 const LOST = "The robot cannot be reached. Trying again …";
+const API = new URL("../api/face/", import.meta.url); // also behind a proxy, where addresses have a prefix
 const SETTLE = 400; // ms in which a new question takes no touch, which may have been meant for the one before
 const AGAIN = 1000; // ms
 
@@ -109,7 +110,7 @@ async function answer(question, position) {
   try {
     const body = JSON.stringify({ question: question.number, option: position });
     const headers = { "Content-Type": "application/json" };
-    const reply = await fetch("/api/face/answer", { method: "POST", headers, body });
+    const reply = await fetch(new URL("answer", API), { method: "POST", headers, body });
     if (!reply.ok) told = `The answer was not accepted: ${(await reply.json()).detail}`;
   } catch {
     told = LOST;
@@ -201,7 +202,7 @@ setInterval(() => {
 // --- the connection
 
 function connect() {
-  const socket = new WebSocket(`${location.origin.replace("http", "ws")}/api/face/live`);
+  const socket = new WebSocket(new URL("live", API).href.replace("http", "ws"));
   socket.addEventListener("message", ({ data }) => show(JSON.parse(data)));
   socket.addEventListener("close", () => {
     document.body.dataset.doing = "lost";

@@ -12,40 +12,50 @@ from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.compare import Comparison, p_text, to_tell, verdict
+from roboeval.analysis.compare import Compared, Comparison, p_text, to_tell, verdict
 from roboeval.analysis.statistics import FEW
 from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences
 from roboeval.cli.views.groups import cluster_view
 from roboeval.cli.views.results import ruled
+from roboeval.evaluation.failures import plural_of, shown_classes
 
 
-def comparison_view(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
+def comparison_view(comparison: Comparison, runs: tuple[Compared, Compared]) -> RenderableType:
     """A comparison as text and tables."""
+    names = runs[0].name, runs[1].name
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
-    rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")
-    rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}")
+    rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}", str(runs[0].coverage))
+    rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
-    tasks = len(comparison.tasks)
-    few = (
-        "one task says nothing about others" if tasks == 1 else "too narrow for so few tasks" * (tasks < FEW)
-    )
-    for name, estimate, of, told in (
-        ("prompts drawn at random", comparison.over_prompts, "prompts", p_text(comparison.p_prompts)),
-        ("tasks drawn at random", comparison.over_tasks, "tasks", p_text(comparison.p_tasks)),
-        ("tasks drawn again (bootstrap)", comparison.bootstrap, "tasks", few),
+    few = "too narrow for so few tasks" * (1 < len(comparison.tasks) < FEW)
+    for name, estimate, told in (
+        ("over tasks", comparison.over_tasks, p_text(comparison.p_tasks)),
+        ("over prompts", comparison.over_prompts, p_text(comparison.p_prompts)),
+        ("over tasks, by resampling (bootstrap)", comparison.bootstrap, few),
     ):
-        row = estimate.ends("+.3f"), told
-        if not estimate.is_known:
-            row = "unknown", f"all {of} are alike; {told}"
-        rows.add_row(f"95% interval, {name}", *row)
+        rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), told)
     table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
         cells = (f"{task.first:.3f}", f"{task.second:.3f}", f"{task.difference:+.3f}", f"{task.share:+.3f}")
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
     sentence = Text(verdict(comparison, (a, b)), "bold")
-    return Group(sentence, Text(), rows, Text(), *map(Text, to_tell(comparison)), Text(), table)
+    warnings = [
+        Text(f"{visible(run.name)}: {warning}", "yellow")
+        for run in runs
+        if (warning := run.cut_off.warning) is not None
+    ]
+    needed = map(Text, to_tell(comparison))
+    return Group(sentence, Text(), rows, Text(), *needed, *warnings, Text(), _ends(runs), Text(), table)
+
+
+def _ends(runs: tuple[Compared, Compared]) -> Table:
+    """How the completions of both runs fail, by class."""
+    table = ruled("share that fails", *(visible(run.name) for run in runs))
+    for name in shown_classes([name for run in runs for name, share in run.classes.items() if share]):
+        table.add_row(plural_of(name), *(f"{run.classes.get(name, 0.0):.1%}" for run in runs))
+    return table
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
@@ -62,15 +72,16 @@ def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableTyp
 
 def _scores(found: Sequence[VerdictChanges]) -> Table:
     first, second = found[0].suites
-    table = ruled("pass@1", first, second, "difference", "95% over prompts", "place")
+    table = ruled("pass@1", first, second, "difference", "95% over tasks", "place", "completions")
     scores = [{one.name: one.pass_at_1[side] for one in found} for side in (0, 1)]
     for one in found:
         before, after = one.pass_at_1
-        ends = one.comparison.over_prompts
+        ends = one.comparison.over_tasks
         numbers = f"{before:.3f}", f"{after:.3f}", f"{after - before:+.3f}"
         interval = ends.ends("+.3f")
         places = " -> ".join(dict.fromkeys(str(place(one.name, of)) for of in scores))
-        table.add_row(Text(visible(one.name)), *numbers, interval, places)
+        of = f"{one.completions:,} of {one.completions + one.left_out:,}"
+        table.add_row(Text(visible(one.name)), *numbers, interval, places, of)
     return table
 
 

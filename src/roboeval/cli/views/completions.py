@@ -11,7 +11,7 @@ from rich.syntax import Syntax
 from rich.text import Text
 
 from codebotler.checking.storyboard import grid, storyboard
-from codebotler.core.terminal import shortened, visible
+from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
     GONE,
@@ -23,13 +23,16 @@ from roboeval.evaluation.explanation import (
     instruction_shown,
     shown_lines,
 )
-from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import by_hand, name_of
+from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, world_title
 
 EXPLANATION = 2_000
 ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
+SHOW_REPLY = "--reply shows them."
+MOST_REPLY = 100_000  # characters of a text of a reply
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
@@ -49,7 +52,10 @@ def _program_line(program: Mapping[str, Any]) -> Text:
         often.append(f"{GONE}\n", "yellow")
     if program["passed"]:
         return often.append("passed", "green")
-    text = Text.assemble(often, kind_view(program["failure"]), f' in "{visible(program["world"])}"')
+    text = Text.assemble(often, kind_view(program["failure"]))
+    if (sentence := no_program_sentence(program["failure"])) is not None:
+        return text.append(f"\n{sentence}")
+    text.append(f' in "{visible(program["world"])}"')
     if program["explanation"] is None:
         why = shortened(error_sentence(program))
     else:
@@ -58,17 +64,25 @@ def _program_line(program: Mapping[str, Any]) -> Text:
     return text.append(f"\n{why}" if why else "")
 
 
-def completion_view(data: Mapping[str, Any], *, in_full: bool = False) -> RenderableType:
+def completion_view(
+    data: Mapping[str, Any], *, in_full: bool = False, with_reply: bool = False
+) -> RenderableType:
     """One completion, as `completion_data` says: its program, and what the robot did in each world.
 
     Args:
         data: the completion.
         in_full: whether satisfied worlds are more than a line each.
+        with_reply: whether to show the reasoning and the reply as they came.
     """
-    lines = {world["line"] for world in data["worlds"] if not world["satisfied"]}
+    failure = data["failure"]
+    why_none = None if failure is None else no_program_sentence(failure)
+    lines = {world["line"] for world in data["worlds"] if not world["satisfied"] and why_none is None}
     parts: list[RenderableType] = [_completion_head(data)]
     if data["program"] is not None:
         parts += [Text(), *_program(data["program"], lines)]
+    parts += _reply(data["reply"], with_texts=with_reply)
+    if why_none is not None:  # no robot did anything
+        return Group(*parts, Text(), Text(why_none, "red"))
     worlds = data["worlds"]
     if data["lowered"]:
         worlds = as_written(worlds, data["program"])
@@ -98,6 +112,24 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     if origin is not None:
         head.append(f"\n{origin}", "dim")
     return head if instruction is None else head.append(f"\n{visible(instruction)}", "italic")
+
+
+def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[RenderableType]:
+    """How a reply ended, and its texts or how long they are."""
+    if reply is None:
+        return []
+    parts: list[RenderableType] = [Text()]
+    if facts := reply_facts(reply):
+        parts.append(Text("; ".join(facts), "dim"))
+    texts = {"reasoning": reply["reasoning"], "reply": reply["raw_reply"]}
+    there = {name: text for name, text in texts.items() if text}
+    if with_texts:
+        for name, text in there.items():
+            parts += [Text(), Text(f"{name}:", "bold"), Text(shortened(text, MOST_REPLY, visible_lines))]
+    elif there:
+        long = " and ".join(f"{name} ({len(text):,} characters)" for name, text in there.items())
+        parts.append(Text(f"{long}: {SHOW_REPLY}", "dim"))
+    return parts
 
 
 def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
@@ -152,6 +184,8 @@ def _ending(world: Mapping[str, Any]) -> Text:
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
     """The head of a prompt: its score, and its instruction."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
+    if (prompt["requested"] or 0) > prompt["completions"]:
+        score += f"; {prompt['requested']:,} were requested"
     head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
     if prompt["gone"] == prompt["completions"]:
         return [head, Text(ALL_GONE, "yellow")]

@@ -19,6 +19,7 @@ from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.explanation import GONE
 from roboeval.evaluation.runs.completions import how_many, name_of
+from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label
 
 MOST_LINES = 60  # of a difference between programs
@@ -65,7 +66,8 @@ def cluster_view(cluster: Cluster) -> RenderableType:
     size = how_many(len(cluster.members))
     name = visible(name_of(cluster.representative))
     head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
-    lines = [Text(f'such as {name}, in "{visible(str(cluster.told["world"]))}"', "dim")]
+    world = "" if cluster.has_no_program else f', in "{visible(str(cluster.told["world"]))}"'
+    lines = [Text(f"such as {name}{world}", "dim")]
     check = cluster.failure["check"]
     lines.append(Text(shortened(f"{check_label(check)}: {cluster.why}" if check else cluster.why)))
     if cluster.program is None:
@@ -81,7 +83,9 @@ def cluster_view(cluster: Cluster) -> RenderableType:
     return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
 
 
-def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str) -> RenderableType:
+def resample_view(
+    prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str, coverage: Coverage
+) -> RenderableType:
     """The results of asking again, by limit of retries."""
     reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
     table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
@@ -96,6 +100,7 @@ def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, ti
         Text(),
         table,
         Text(),
+        Text(f"over {coverage}", "" if coverage.is_whole else "yellow"),
         Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
         Text("accepted: the share of final programs that the check accepts", style="dim"),
         Text("run at all: the share that runs without an error in all worlds of its task", style="dim"),

@@ -18,7 +18,7 @@ from codebotler.core.words import counted
 from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import Failures, Missing, Summary
 from roboeval.cli.views.completions import kind_view, prompt_lines
-from roboeval.evaluation.failures import plural_of
+from roboeval.evaluation.failures import plural_of, shown_classes
 from roboeval.evaluation.runs.completions import by_hand, how_many
 
 if TYPE_CHECKING:
@@ -41,15 +41,15 @@ def summary_view(summary: Summary, *, title: str) -> RenderableType:
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
     n, failed = judged_count(summary.prompts), sum(each.count for each in summary.failures)
-    parts: list[RenderableType] = [head]
-    if n < (total := summary.scope.total):
-        parts.append(Text(f"{n:,} of {how_many(total)} judged", style="yellow"))
-    elif n > total:
-        parts.append(Text(f"{how_many(n)} judged, but only {total:,} are there now", style="yellow"))
-    parts += [Text(), _TaskTable(summary), Text(), *_overall(summary), *_missed(summary.missing)]
+    parts: list[RenderableType] = [head, Text(), _TaskTable(summary), Text()]
+    parts += [*_overall(summary), *_missed(summary.missing)]
+    if (warning := summary.cut_off.warning) is not None:
+        parts.append(Text(warning, style="yellow"))
     if failed:
-        told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all completions:"
-        listed = [_failure_table(each) for each in summary.failures if each.count or n > 1]
+        told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all judged:"
+        happened = [one.name for one in summary.failures if one.count]
+        shown = happened if n == 1 else {*happened, *shown_classes(happened)}
+        listed = [_failure_table(one) for one in summary.failures if one.name in shown]
         tables = Columns(listed, padding=(1, 3))
         parts += [Text(), Text(told), Text(), tables]
     return Group(*parts)
@@ -61,15 +61,13 @@ def house_view(found: BrokenRules) -> RenderableType:
     for rule, count in found.by_rule.items():
         table.add_row(f"{count:,}", Text(visible(rule)))
     share = f"{found.broken.mean:.1%} of the programs of a prompt break a rule of the house, on average"
-    share += f" (95% interval {found.broken.ends()})"
+    share += f" ({found.broken.interval})"
     parts: list[RenderableType] = [Text(), Text(share, "bold"), table]
     if found.cost is None:
         parts.append(Text("evaluate the run without --rules, too, to see what the rules cost", "dim"))
     else:
-        ends = found.cost.ends()
-        parts.append(
-            Text(f"pass@1 with the rules less pass@1 without: {found.cost.mean:+.3f} (95% interval {ends})")
-        )
+        less = f"pass@1 with the rules less pass@1 without: {found.cost.mean:+.3f}"
+        parts.append(Text(f"{less} ({found.cost.interval})"))
     return Group(*parts)
 
 
@@ -112,23 +110,22 @@ class _TaskTable:
             shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
             styles: dict[float, str] = {0: "red", 1: "green"}
             cells = {name: Text(f"{share:.2f}", styles.get(share, "")) for name, share in shares.items()}
-            cells["completions"] = Text(f"{judged_count(task.prompts):,}")
+            coverage = self.summary.scope.coverage(judged_count(task.prompts), task.task)
+            of = "" if coverage.is_whole else f" of {coverage.total:,}"
+            cells["completions"] = Text(f"{coverage.judged:,}{of}")
             table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))
         return table
 
 
 def _overall(summary: Summary) -> list[Text]:
-    prompts = len(summary.prompts)
     lines = []
     for k, estimate in zip(summary.k, summary.overall, strict=True):
         line = Text.assemble(f"pass@{k} over all prompts: ", (f"{estimate.mean:.3f}", "bold"))
-        if prompts > 1:
-            ends = f"{estimate.ends()}, {prompts} prompts"
-            if not estimate.is_known:
-                ends = f"unknown: all {prompts} prompts are alike"
-            line.append(f" (95% interval {ends})")
-        lines.append(line)
-    return lines
+        lines.append(line.append(f" ({estimate.interval})" if len(summary.prompts) > 1 else ""))
+    tasks, prompts = counted(len(summary.tasks), "task"), counted(len(summary.prompts), "prompt")
+    coverage = summary.coverage
+    of = Text(f"{coverage}, {prompts} of {tasks}", style="" if coverage.is_whole else "yellow")
+    return [*lines, of]
 
 
 def _failure_table(failures: Failures) -> Table:

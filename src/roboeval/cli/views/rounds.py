@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def rounds_view(rounds: Sequence[Round], *, repairs: bool) -> RenderableType:
     """The rounds of a run, one or more, in a table; numbers of tokens are those up to then."""
-    table = ruled("programs", "pass@1", "95% interval", "judged", "accepted", "requests", "tokens")
+    table = ruled("programs", "pass@1", "95% over tasks", "judged", "accepted", "requests", "tokens")
     requests = tokens = 0
     for one in rounds:
         requests, tokens = requests + one.requests, tokens + one.tokens

@@ -118,7 +118,8 @@ class Completion:
         reply = self.more.get("raw_reply")
         is_chat = isinstance(reply, str) and not (self.model or "").startswith("completions:")
         has_code = read_reply(str(reply)).has_code if is_chat else bool(self.program.strip())
-        return why_no_program(self.program, self.finish_reason, has_code=has_code)
+        text = reply if isinstance(reply, str) else None
+        return why_no_program(text, self.program, self.finish_reason, has_code=has_code)
 
     @property
     def program_sha256(self) -> str:
@@ -185,9 +186,21 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
     completion = Completion.of(row)
     if 2 * len(line) > MAX_ROW:  # else it stays short enough, however it is written
         check_length(row, None)
-    if suite is not None and (problem := unknown(completion.key, suite)):
+    if suite is not None and (problem := unknown(completion.key, suite) or _is_of_other(completion, suite)):
         raise UserError(problem)
     return completion
+
+
+def _is_of_other(completion: Completion, suite: Suite) -> str | None:
+    """What is wrong with a completion for another seed or version of families; None if nothing."""
+    if suite.families is None or completion.instruction is None:
+        return None
+    if completion.instruction == suite.tasks[completion.task].prompts[completion.prompt]:
+        return None
+    return (
+        f'{name_of(completion.key)} is for another instruction than "{suite.name}" has; '
+        "run.json names its suite and version"
+    )
 
 
 def _expect_new(key: Key, seen: dict[Key, int], number: int) -> None:

@@ -182,6 +182,11 @@ def load_head(path: Path) -> dict[str, Any]:
     return data
 
 
+def about_of(run: Run) -> dict[str, Any]:
+    """The content of a run's run.json; nothing if there is none."""
+    return load_head(run.about) if run.about.exists() else {}
+
+
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
     """The name of an evaluation's files."""
     named = suite.house is not None and suite.house.name

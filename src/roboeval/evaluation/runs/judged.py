@@ -46,7 +46,7 @@ class RunEvaluation:
     @property
     def scope(self) -> Scope:
         """What there is to judge."""
-        return Scope.of(self.completions.values(), self.tasks)
+        return Scope.of(self.completions.values(), self.tasks, self.about, self.suite)
 
     @property
     def is_ablated(self) -> bool:

@@ -39,8 +39,9 @@ def load_results(
         a table in the order of the completions and of the worlds of their tasks. `task`, `prompt`, `index`,
         `model`, `program_sha256`, `passed`, the failure (`failure_class`, `failure_kind`, `failure_world`,
         `failure_check`: the first failure of the completion), `stale` (whether another program stands in the
-        run by now), `input_tokens`, `output_tokens`, `latency_s`, `cost` and `accepted` (whether the check
-        found no problem; null where nobody checked) are the same in all rows of a completion;
+        run by now; then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
+        `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost` and `accepted` (whether the
+        check found no problem; null where nobody checked) are the same in all rows of a completion;
         `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`,
         `failed_checks` (joined by "; "), `category` (of the first failed check) and `events` are about the
         world. Numbers count from 0.

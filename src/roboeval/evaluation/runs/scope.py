@@ -1,12 +1,42 @@
-"""What there is to judge in a run, beside what has been judged."""
+"""What there is to judge in a run, and what was requested of its model, beside what has been judged."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.requests import batches
+from roboeval.evaluation.runs.completions import Completion, how_many
+from roboeval.suites.load import Suite
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Of how many completions a number speaks, and of how many it should."""
+
+    judged: int
+    there: int  # in the run now
+    requested: int | None = None  # of the model; None where nobody recorded that
+
+    @property
+    def total(self) -> int:
+        """How many completions the number should speak of."""
+        return max(self.there, self.requested or 0)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it speaks of all of them."""
+        return self.judged == self.total
+
+    def __str__(self) -> str:
+        """It for people, such as `3,900 of 4,000 completions (50 missing, 50 not judged)`."""
+        if self.judged > self.total:
+            return f"{how_many(self.judged)}, of which only {self.there:,} are there now"
+        lacks = {"missing": self.total - self.there, "not judged": self.there - self.judged}
+        said = ", ".join(f"{count:,} {what}" for what, count in lacks.items() if count > 0)
+        return f"{self.judged:,} of {how_many(self.total)}{f' ({said})' if said else ''}"
 
 
 @dataclass(frozen=True)
@@ -16,17 +46,36 @@ class Scope:
     completions: Mapping[str, int]  # by task, also of tasks that were not selected
     tasks: frozenset[str] | None = None  # those selected; None for all
     models: frozenset[str | None] = frozenset()  # of the selected; None: not recorded
+    requested: Mapping[str, int] | None = None  # by task, as run.json records it
+    cut_off: int = 0  # replies of the selected that ended at the limit of tokens
+    limit: int | None = None  # that limit, in tokens, where it was set
 
     @classmethod
-    def of(cls, completions: Iterable[Completion], tasks: frozenset[str] | None) -> Scope:
-        """Count completions, in one pass."""
+    def of(
+        cls,
+        completions: Iterable[Completion],
+        tasks: frozenset[str] | None,
+        about: Mapping[str, Any] = {},
+        suite: Suite | None = None,
+    ) -> Scope:
+        """Count completions, in one pass.
+
+        Args:
+            completions: those that are there.
+            tasks: those selected; None for all.
+            about: the content of run.json.
+            suite: whose prompts were requested.
+        """
         counts: Counter[str] = Counter()
         models: set[str | None] = set()
+        cut_off = 0
         for completion in completions:
             counts[completion.task] += 1
             if tasks is None or completion.task in tasks:
                 models.add(completion.model)
-        return cls(counts, tasks, frozenset(models))
+                cut_off += completion.is_cut_off
+        requested = requested_of(about, suite)
+        return cls(counts, tasks, frozenset(models), requested, cut_off, limit_of(about))
 
     @property
     def total(self) -> int:
@@ -36,3 +85,74 @@ class Scope:
     def selects(self, task: str) -> bool:
         """Whether to judge a task."""
         return self.tasks is None or task in self.tasks
+
+    def coverage(self, judged: int, task: str | None = None) -> Coverage:
+        """The coverage of so many judged completions, of all selected tasks or of one."""
+        if task is not None:
+            requested = None if self.requested is None else self.requested.get(task, 0)
+            return Coverage(judged, self.completions.get(task, 0), requested)
+        if self.requested is None:
+            return Coverage(judged, self.total)
+        return Coverage(judged, self.total, sum(n for one, n in self.requested.items() if self.selects(one)))
+
+
+def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
+    """How many completions of each task a run.json says were requested; None where nobody recorded that."""
+    each = requested_of_prompts(about, suite)
+    if each is None or suite is None:
+        return None
+    return {name: count * len(suite.tasks[name].prompts) for name, count in each.items()}
+
+
+def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
+    """How many completions of each prompt of a task were requested; None where nobody recorded that."""
+    found = batches(about)
+    if not found or suite is None:
+        return None
+    each: Counter[str] = Counter()
+    for batch in found:
+        tasks, count = batch.get("tasks"), batch.get("num_completions")
+        if type(count) is not int:
+            return None
+        each |= Counter(dict.fromkeys(tasks if isinstance(tasks, list) else suite.tasks, count))
+    return {name: count for name, count in each.items() if name in suite.tasks}
+
+
+def limit_of(about: Mapping[str, Any]) -> int | None:
+    """The limit of tokens that a run.json records; None where none was set, or recorded."""
+    settings = about.get("settings")
+    limit = settings.get("max_tokens") if isinstance(settings, dict) else None
+    return limit if type(limit) is int else None
+
+
+# --- replies that were cut off
+
+TOLERATED = 0.02  # share of replies that may be cut off without a warning
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """How many replies of a run ended at the limit of tokens."""
+
+    replies: int  # also those whose program is whole
+    without_program: int  # of these
+    of: int
+    limit: int | None
+
+    @property
+    def share(self) -> float:
+        """Their share of all replies."""
+        return self.replies / self.of if self.of else 0.0
+
+    @property
+    def warning(self) -> str | None:
+        """A sentence for people with what mends it; None where few replies were cut off."""
+        if self.share <= TOLERATED:
+            return None
+        at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"
+        how = "set" if self.limit is None else "raise or leave out"
+        whole = self.replies - self.without_program
+        return (
+            f"{self.replies:,} of {self.of:,} replies ({self.share:.1%}) were cut off at {at}, "
+            f"{whole:,} of them after a whole program; {how} --max-tokens"
+        )

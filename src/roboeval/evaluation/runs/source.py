@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.core.errors import UserError
-from codebotler.models.recorded import recorded_model
+from codebotler.core.files import MAX_ROW, parsed_row, read_lines
+from codebotler.models.recorded import NAMES, RecordedModel, recorded_model
 from roboeval.evaluation.runs.completions import COMPLETIONS, EXAMPLE, Completion, read_completions
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.published import passed_over, published_completions
@@ -47,13 +48,42 @@ def open_source(text: str, suite: Suite) -> Source:
     return Source([*read_completions(path, suite)])
 
 
+LONGEST_ANSWER = 10 * MAX_ROW  # bytes; it may say more than we keep
+
+
+def is_answers(path: Path) -> bool:
+    """Whether a file begins like one of requests to a batch endpoint, or of its answers."""
+    if not path.is_file():
+        return False
+    _, line = next(read_lines(path, limit=LONGEST_ANSWER), (0, b""))
+    try:
+        row = parsed_row(line)
+    except UserError:
+        return False
+    return row is not None and "custom_id" in row
+
+
+def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
+    """A recorded model that also knows the solutions of a suite.
+
+    Raises:
+        UserError: there is no such model.
+    """
+    model = recorded_model(name, None if suite.folder is None else suite.folder / "solutions")
+    short = model.name.removeprefix("recorded:")
+    if short not in NAMES:
+        return model
+    known = {one.instruction: one.by(short) for one in suite.recorded}
+    return replace(model, replies={**model.replies, **known})
+
+
 def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     """Every reply that a recorded model has for a suite's prompts, as completions.
 
     Raises:
         UserError: there is no such model or suite, or the model knows none of its instructions.
     """
-    model = recorded_model(name, None if suite.folder is None else suite.folder / "solutions")
+    model = recorded_model_for(name, suite)
     found = False
     for task in suite.tasks.values():
         for prompt, instruction in enumerate(task.prompts):

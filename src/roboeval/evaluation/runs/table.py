@@ -5,20 +5,19 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import UnionType
 from typing import Any, NamedTuple, TypeVar
 
 import polars as pl
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
-from roboeval.evaluation.runs.completions import KEY, Completion, Key
+from roboeval.evaluation.runs.completions import KEY, NO_PROGRAM, Completion, Key
+from roboeval.evaluation.runs.replies import TOKENS, number_or_none
 from roboeval.evaluation.runs.rows import JudgedRow
 
 Tokens = TypeVar("Tokens", float, pl.Expr)
 MILLION = 1_000_000
 CHUNK = 10_000  # rows of the table that are held as Python objects at one time
-MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
 
 COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "task": pl.String,
@@ -32,8 +31,14 @@ COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "failure_world": pl.Int64,
     "failure_check": pl.String,
     "stale": pl.Boolean,
+    "instruction": pl.String,
+    "program": pl.String,
+    "no_program": pl.String,
+    "finish_reason": pl.String,
+    "cut_off": pl.Boolean,
     "input_tokens": pl.Int64,
     "output_tokens": pl.Int64,
+    "reasoning_tokens": pl.Int64,
     "latency_s": pl.Float64,
     "cost": pl.Float64,
     "accepted": pl.Boolean,
@@ -121,6 +126,7 @@ class TableBuilder:
         if len(self._worlds) >= CHUNK:
             self._store()
         written = self._completions.get(row.key)
+        is_stale = written is None or written.program_sha256 != row.program_sha256
         failure = row.failure
         why: tuple[str | int | None, ...] = (None,) * 4
         if failure is not None:
@@ -134,7 +140,8 @@ class TableBuilder:
                 row.program_sha256,
                 row.passed,
                 *why,
-                written is None or written.program_sha256 != row.program_sha256,
+                is_stale,
+                *((None,) * 5 if written is None or is_stale else _texts(written)),
                 *_usage(written),
                 None,
                 self._accepted.get((row.task, row.program_sha256)),
@@ -171,18 +178,20 @@ class TableBuilder:
         self._start()
 
 
+def _texts(written: Completion) -> tuple[str | bool | None, ...]:
+    """The instruction, the program, and how its reply ended, where that was recorded."""
+    said = written.instruction, written.program, written.more.get(NO_PROGRAM), written.finish_reason
+    is_cut_off = None if written.finish_reason is None else written.is_cut_off
+    return *(None if text is None else storable(text) for text in said), is_cut_off
+
+
 def _usage(written: Completion | None) -> tuple[float | None, ...]:
-    """The tokens of input and of output, and the seconds, of a completion, where they were recorded."""
+    """The tokens and the seconds that a completion took, where they were recorded."""
     more = {} if written is None else written.more
     usage = more.get("usage")
     usage = usage if isinstance(usage, dict) else {}
-    tokens = [_number(usage.get(name), int) for name in ("input_tokens", "output_tokens")]
-    return *tokens, _number(more.get("latency_s"), int | float)
-
-
-def _number(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
-    is_number = isinstance(value, kind) and not isinstance(value, bool)
-    return value if is_number and 0 <= value <= MOST else None
+    tokens = [number_or_none(usage.get(name), int) for name in TOKENS]
+    return *tokens, number_or_none(more.get("latency_s"), int | float)
 
 
 def storable(text: str) -> str:

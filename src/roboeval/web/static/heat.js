@@ -1,6 +1,6 @@
 // A table of shares with a shade and a number in each cell; cells lead to their completions.
 export default {
-  props: { label: String, corner: String, groups: Array, rows: Array, chooses: Boolean },
+  props: { prefix: String, label: String, corner: String, groups: Array, rows: Array, chooses: Boolean },
   emits: ["choose"],
   template: `
     <div class="heat" tabindex="0" role="region" :aria-label="label">
@@ -9,7 +9,7 @@ export default {
           <tr v-if="groups.length > 1">
             <td></td>
             <th v-for="group in groups" scope="colgroup" :colspan="group.columns.length" class="group">
-              <a v-if="group.href" :href="group.href" dir="auto">{{ group.name }}</a>
+              <a v-if="group.href" :href="prefix + group.href" dir="auto">{{ group.name }}</a>
               <span v-else dir="auto">{{ group.name }}</span>
             </th>
           </tr>
@@ -17,7 +17,7 @@ export default {
             <th scope="col" class="name">{{ corner }}</th>
             <template v-for="group in groups">
               <th v-for="(column, at) in group.columns" scope="col" :class="{ first: at === 0 }" :title="column.title">
-                <a v-if="column.href" :href="column.href" dir="auto">{{ column.name }}</a>
+                <a v-if="column.href" :href="prefix + column.href" dir="auto">{{ column.name }}</a>
                 <span v-else dir="auto">{{ column.name }}</span>
               </th>
             </template>
@@ -27,7 +27,7 @@ export default {
           <tr v-for="(row, at) in rows" :key="at">
             <th scope="row" :class="['name', row.look]" dir="auto"><template v-for="piece in pieces(row.name)">{{ piece }}<wbr></template></th>
             <td v-for="cell in row.cells" :class="[cell.shade, row.look]" :colspan="cell.span">
-              <a v-if="cell.href" :href="cell.href" :title="cell.title" :aria-label="cell.title"
+              <a v-if="cell.href" :href="prefix + cell.href" :title="cell.title" :aria-label="cell.title"
                 :aria-current="cell.here ? 'true' : null" @click="choose($event, cell)">{{ cell.text }}</a>
               <span v-else>{{ cell.text }}</span>
             </td>

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -78,8 +79,14 @@ def test_each_world_of_a_completion_is_a_row() -> None:
         "failure_world": 1,
         "failure_check": None,
         "stale": False,
+        "instruction": None,
+        "program": PROGRAM,
+        "no_program": None,
+        "finish_reason": None,
+        "cut_off": None,
         "input_tokens": None,
         "output_tokens": None,
+        "reasoning_tokens": None,
         "latency_s": None,
         "cost": None,
         "accepted": None,
@@ -95,6 +102,17 @@ def test_each_world_of_a_completion_is_a_row() -> None:
         "events": 0,
     }
     assert frame["failed_checks"].to_list() == [None, None, 'visits; not greets("amy")']
+
+
+def test_replies_are_in_the_table_unless_the_program_has_changed() -> None:
+    more = {"no_program": "cut-off", "finish_reason": "length", "usage": {"reasoning_tokens": 7}}
+    said = replace(COMPLETION, instruction="Visit her.", more=more)
+    names = ["instruction", "program", "no_program", "finish_reason", "cut_off", "reasoning_tokens"]
+    (told, *_) = table([ROW], [said]).select(names).rows()
+    assert told == ("Visit her.", PROGRAM, "cut-off", "length", True, 7)
+    other = {**ROW, "program_sha256": "0" * 64}
+    (told, *_) = table([other], [said]).select(names[:-1]).rows()
+    assert told == (None,) * 5
 
 
 def test_a_passed_row_without_its_completion_has_empty_cells() -> None:
@@ -128,7 +146,7 @@ def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
     (line,) = (tmp_path / "t").read_bytes().splitlines()[1:]
     assert line.startswith(b"Visit,1,2,,")
     assert line.endswith(
-        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,0,in,true,finished,,,,,,1"
+        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,,,,,,,0,in,true,finished,,,,,,1"
     )
 
 

@@ -109,9 +109,10 @@ class TrainedTask:
             raise UserError(f"{self.name} has no prompt {index}; it has {len(self.prompts)}, from 0")
 
 
+@cache
 def family_names() -> tuple[str, ...]:
     """The names of all families that are here, sorted."""
-    return tuple(sorted(path.stem for path in (FOLDER / "families").glob("*.yaml")))
+    return tuple(sorted(path.stem for path in (FOLDER / "templates").glob("*.yaml")))
 
 
 def family_file(family: str) -> Path:
@@ -129,7 +130,7 @@ def family_file(family: str) -> Path:
         raise UserError(
             f'there is no family "{family}"; there is {listed(family_names())}, or a .yaml file of your own'
         )
-    return FOLDER / "families" / f"{family}.yaml"
+    return FOLDER / "templates" / f"{family}.yaml"
 
 
 def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask:
@@ -150,18 +151,53 @@ def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask
     return _made(family, seed, worlds)
 
 
+def trained_prompts(family: str, seed: int) -> tuple[str, ...]:
+    """The phrasings of `trained_task`, in a small part of its time, since no world is drawn.
+
+    Args:
+        family: one of `family_names()`, or a file of your own, of which `trained_task` has made a task.
+        seed: any number from 0.
+
+    Raises:
+        UserError: there is no such family, or its file is wrong.
+    """
+    template = _template(family_file(family))
+    random = template.random(seed)
+    return tuple(_phrasings(template, template.chosen(random), random))
+
+
+@dataclass(frozen=True)
+class _Template:
+    """A family before names are drawn, and the text of its file."""
+
+    path: Path
+    text: str
+    file: YamlFile
+    form: FamilyFile
+
+    def random(self, seed: int) -> Random:
+        """What draws everything of a seed."""
+        return Random(f"{self.path.stem} {seed}")  # noqa: S311 - no secret
+
+    def chosen(self, random: Random) -> dict[str, str]:
+        """What each name stands for."""
+        return dict(_chosen(self.form, self.file, random))
+
+
 @lru_cache(maxsize=1_024)
 def _made(family: str, seed: int, worlds: int) -> TrainedTask:
-    path = family_file(family)
-    text, raw = _read(path)
-    random = Random(f"{path.stem} {seed}")  # noqa: S311 - no secret
-    chosen = dict(_chosen(raw.validate(FamilyFile), raw, random))
-    file = YamlFile(_filled(text, chosen, path), path)
+    template = _template(family_file(family))
+    path, random = template.path, template.random(seed)
+    chosen = template.chosen(random)
+    file = YamlFile(_filled(template.text, chosen, path), path)
     form = file.validate(FamilyFile)
     _expect_python(form, file)
     name = f"{path.stem}-{seed}"
-    task_file = file.part("task", {"name": name, **_worded(form.task, file, random)})
-    head = _head()
+    content = {"name": name, **form.task}
+    if isinstance(content.get("prompts"), list):  # else the sentence about it comes when the task is read
+        content["prompts"] = [*_phrasings(template, chosen, random)]
+    task_file = file.part("task", content)
+    head = suite_file()
     rules = head.rules
     task = _without_denial(
         read_task(
@@ -266,31 +302,29 @@ def _expect_python(form: FamilyFile, file: YamlFile) -> None:
             raise file.wrong(f"this program is no Python: {flaw.message}", *place)
 
 
-def _worded(task: dict[str, Any], file: YamlFile, random: Random) -> dict[str, Any]:
-    """A task in whose phrasings is one word where there were several."""
-
-    def one_word(number: int, prompt: str) -> str:
-        text = " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), prompt).split())
+def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -> Iterator[Any]:
+    """The phrasings with what is chosen, and one word where there were several."""
+    for number, prompt in enumerate(template.form.task["prompts"]):
+        if not isinstance(prompt, str):  # the sentence about it comes when the task is read
+            yield prompt
+            continue
+        filled = _filled(prompt, chosen, template.path)
+        text = " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), filled).split())
         if "{" in text or "}" in text:
-            raise file.wrong(
+            raise template.file.wrong(
                 "write several words, of which one is taken, as {go|drive}", "task", "prompts", number
             )
-        return text
-
-    prompts = task.get("prompts")
-    if not isinstance(prompts, list):  # which is told when the task is read
-        return task
-    texts = [one_word(*one) if isinstance(one[1], str) else one[1] for one in enumerate(prompts)]
-    return {**task, "prompts": texts}
+        yield text
 
 
 # --- files
 
 
 @cache
-def _read(path: Path) -> tuple[str, YamlFile]:
+def _template(path: Path) -> _Template:
     text = read_text(path)
-    return text, YamlFile(text, path)
+    file = YamlFile(text, path)
+    return _Template(path, text, file, file.validate(FamilyFile))
 
 
 @cache
@@ -301,5 +335,6 @@ def _words() -> Mapping[str, list[str]]:
 
 
 @cache
-def _head() -> SuiteFile:
+def suite_file() -> SuiteFile:
+    """The rules by which tasks of families are judged, and their version."""
     return YamlFile.read(FOLDER / "training.yaml").validate(SuiteFile)

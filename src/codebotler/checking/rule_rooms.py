@@ -1,0 +1,63 @@
+"""The rooms that house rules name, compared with those that a house has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from codebotler.checking.problems import closest_room
+from codebotler.core.errors import UserError
+from codebotler.core.skills.declaration import by_event
+from codebotler.rtl import Regex
+from codebotler.rtl.reasoning import samples
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.reasoning.sample_strings import patterns
+from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.rules import found_in
+
+
+def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
+    """Refuse rules that name a room which a house lacks, unless they say that they may.
+
+    Args:
+        rules: the rules.
+        rooms: all rooms of the house; none if they are unknown, and then nothing is refused.
+
+    Raises:
+        UserError: a rule names another room; the sentence has the closest one.
+    """
+    for rule in rules:
+        for sentence in unknown_rooms_in(rule, rooms):
+            raise UserError(sentence)
+
+
+def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
+    """A sentence for each room that a rule names and a house lacks; none where no room is known."""
+    if rule.any_room or not rooms:
+        return
+    for pattern in dict.fromkeys(room_patterns(rule)):
+        if not may_mean(pattern, rooms):
+            yield (
+                f'the rule "{rule.name}" names the room "{pattern}", which is not there'
+                f'{closest_room(pattern, rooms)}; correct it, or add "any: true"'
+            )
+
+
+def room_patterns(rule: Rule) -> Iterator[str]:
+    """The regexes in a rule that name rooms."""
+    for element in elements(rule.formula):
+        if element.place is not None:
+            yield element.place
+        row = by_event(element.kind)
+        if row is not None and row.is_drive:
+            yield from patterns(element.text)
+
+
+def may_mean(pattern: str, labels: Iterable[str]) -> bool:
+    """Whether a regex may mean one of these labels; true also if it matches anything, or nothing."""
+    matches, texts = Regex(pattern).matches, samples(pattern)
+    return (
+        not texts
+        or matches("")
+        or matches("\uffff")
+        or any(matches(label) or any(found_in(label, text) for text in texts) for label in labels)
+    )

@@ -1,0 +1,132 @@
+"""Requests that are sent in a file, as batch endpoints of OpenAI's protocol take them, and their answers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import httpx2
+
+from codebotler.core.errors import UserError
+from codebotler.models.base import Reply
+from codebotler.models.chat import OWN_SERVER, ChatModel
+from codebotler.models.completions import CompletionsModel
+from codebotler.models.sampling import SamplingSettings
+from codebotler.models.server_errors import FIRST_ERROR, error_in_reply
+from codebotler.prompts import Prompt
+
+OPENAI = "https://api.openai.com/v1"
+OF_STREAMS = ("stream", "stream_options")  # fields that no batch takes
+ENDED = {"choices": [{"index": 0, "finish_reason": "stop", "text": "pass", "message": {"content": "pass"}}]}
+EVENTS = {"content-type": "text/event-stream"}
+
+
+@dataclass(frozen=True)
+class BatchRequest:
+    """What a batch endpoint is to ask.
+
+    Args:
+        url: the path of the endpoint, such as `/v1/chat/completions`.
+        body: the JSON of the request.
+    """
+
+    url: str
+    body: Mapping[str, Any]
+
+
+class BatchModel:
+    """A model whose requests and answers are in files; nothing is sent, and no key is needed.
+
+    It writes requests and reads answers with the code that asks the same model one by one, whose client of
+    HTTP is connected to this object in the place of a server.
+    """
+
+    def __init__(self, name: str, settings: SamplingSettings) -> None:
+        kind, _, rest = name.partition(":")
+        client = httpx2.AsyncClient(transport=httpx2.MockTransport(self._answered))
+        asked = replace(settings, base_url=settings.base_url or OPENAI, timeout=SamplingSettings.timeout)
+        self._model: ChatModel | CompletionsModel
+        if kind == "completions":
+            self._model = CompletionsModel(rest, asked, client)
+        elif kind == OWN_SERVER or (kind == "openai" and settings.base_url is not None):
+            self._model = ChatModel(name, asked, client)
+        else:
+            raise UserError(f"{name} takes no batch file; use {OWN_SERVER}:NAME or completions:NAME")
+        self.name = self._model.name
+        self.settings = replace(self._model.settings, base_url=settings.base_url, timeout=settings.timeout)
+        self._runner = asyncio.Runner()
+        self._bodies: dict[Prompt, Mapping[str, Any]] = {}
+        self._sent: httpx2.Request | None = None
+        self._answer = _response(200, ENDED)
+
+    def request(self, prompt: Prompt, *, number: int) -> BatchRequest:
+        """The request for one reply.
+
+        Args:
+            prompt: the request.
+            number: which sample of this prompt it is, counted from 0.
+        """
+        if prompt not in self._bodies:
+            self._reply(prompt, number, _response(200, ENDED))
+            assert self._sent is not None, "the model has sent its request to us"
+            sent = json.loads(self._sent.content)
+            self._bodies[prompt] = {name: value for name, value in sent.items() if name not in OF_STREAMS}
+        seed = self.settings.seed_of(number)  # the only difference between requests of the same prompt
+        body = {**self._bodies[prompt], **({} if seed is None else {"seed": seed})}
+        is_chat = isinstance(self._model, ChatModel)
+        return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
+
+    def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
+        """The reply in an answer.
+
+        Args:
+            prompt: the request.
+            number: which sample of this prompt it is, counted from 0.
+            status: the status of HTTP that the endpoint says it had.
+            body: the JSON that the endpoint says it had.
+
+        Raises:
+            ModelError: it is no reply, but an error.
+        """
+        if status < FIRST_ERROR and not _has_choice(body):
+            raise error_in_reply(self.name, body)
+        short = replace(prompt, messages=prompt.messages[-1:])  # which is sent to us again, and takes time
+        return replace(self._reply(short, number, _response(status, body)), latency_s=None)
+
+    def close(self) -> None:
+        """Close the client."""
+        self._runner.run(self._model.close())
+        self._runner.close()
+
+    def _reply(self, prompt: Prompt, number: int, answer: httpx2.Response) -> Reply:
+        self._answer = answer
+        return self._runner.run(self._model.reply(prompt, number=number))
+
+    def _answered(self, request: httpx2.Request) -> httpx2.Response:
+        self._sent = request
+        return self._answer
+
+
+def _has_choice(body: object) -> bool:
+    choices = body.get("choices") if isinstance(body, Mapping) else None
+    return isinstance(choices, list) and bool(choices) and isinstance(choices[0], Mapping)
+
+
+def _response(status: int, body: Any) -> httpx2.Response:  # noqa: ANN401 - any JSON
+    """An answer as the server would have sent it to a request for a stream."""
+    if status >= FIRST_ERROR:
+        return httpx2.Response(status, json=body)
+    chunk = {**body, "object": "chat.completion.chunk", "choices": [_streamed(body["choices"][0])]}
+    return httpx2.Response(200, headers=EVENTS, text=f"data: {json.dumps(chunk)}\n\ndata: [DONE]\n\n")
+
+
+def _streamed(choice: Mapping[str, Any]) -> dict[str, Any]:
+    """A choice as a stream would have it in one chunk."""
+    message = choice.get("message")
+    if not isinstance(message, Mapping):
+        return dict(choice)
+    delta = {name: value for name, value in message.items() if value is not None}
+    return {**{name: value for name, value in choice.items() if name != "message"}, "delta": delta}

@@ -1,0 +1,172 @@
+"""The page of one mission: how it ended, its timeline, and its program; it follows one that goes on."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from functools import partial
+
+from nicegui import html, ui
+
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import shortened, visible
+from codebotler.core.words import counted
+from codebotler.missions.log import SKILL_ENDS, Line, State, Summary, events_of
+from codebotler.missions.store import find
+from codebotler.missions.wording import activity, event_text, reason_text, stop_text, title
+from codebotler.web.console import Console
+from codebotler.web.frame import Frame, PlainText, outside
+from codebotler.web.live import follow
+
+MOST_EVENTS, MOST_CODE = 1_000, 200
+HEADLINES: Mapping[str, str] = {State.DRAFTING: "Program written", State.RUNNING: "Started"}
+"""How the timeline names states of a mission, but for those that speak for themselves."""
+
+TOLD_BY_STOP = frozenset({State.STOPPING, State.STOPPED})
+"""States that are not shown where a stop is."""
+
+
+def add(console: Console, frame: Frame) -> None:
+    """Add the page."""
+
+    @ui.page("/missions/{mission}")
+    async def one(mission: str) -> None:
+        frame("Mission", "/missions")
+        with ui.element("div").classes("past"):
+            try:
+                summary, events = await asyncio.to_thread(_read, console, mission)
+            except UserError as error:
+                PlainText("p", error.sentence, "trouble")
+                return
+            page = _MissionPage(summary)
+            page.show(summary, events)
+            if not summary.has_ended:
+                await follow(console.notifier, partial(_update, console, page))
+
+
+async def _update(console: Console, page: _MissionPage) -> None:
+    """Show what has happened meanwhile; another tool's mission and a past one do not change here."""
+    if page.mission == console.view.id and not page.has_ended:
+        page.show(*await asyncio.to_thread(_read, console, page.mission))
+
+
+def timeline(events: Sequence[Line]) -> Iterator[tuple[Line, str]]:
+    """The events that are shown, in words; a stop and what it interrupted are one."""
+    doing, is_stopped = "", False
+    for number, line in enumerate(events):
+        event = line["event"]
+        if event == "skill" or (event == "sleep" and line["seconds"]):
+            doing = activity(line)
+        elif event in SKILL_ENDS and event != "cancelled":
+            doing = ""
+        if event == "stop":
+            is_stopped = True
+            yield line, _sentence(stop_text(line["by"], doing))
+            continue
+        is_told = event == "cancelled" or (is_stopped and line.get("state") in TOLD_BY_STOP)
+        words = "" if is_told else in_words(line, is_first=number == 0)
+        if words:
+            yield line, words
+
+
+def in_words(line: Line, *, is_first: bool) -> str:
+    """An event in the timeline; empty if it is not shown."""
+    event = line["event"]
+    if event == "state":
+        state, reason = line["state"], shortened(line.get("reason", ""))
+        step = "Mission created" if is_first else HEADLINES.get(state, visible(state).capitalize())
+        if state == State.CHECKED:
+            problems = len(line.get("problems", ()))
+            step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"
+        return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
+    return "" if event == "feedback" else _sentence(event_text(line))
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def _read(console: Console, mission: str) -> tuple[Summary, list[Line]]:
+    folder = find(console.home, mission)
+    return Summary.read(folder), events_of(folder)
+
+
+class _MissionPage:
+    """A mission: how it ended and why, what happened, and the program."""
+
+    def __init__(self, summary: Summary) -> None:
+        self.mission, self.has_ended = summary.id, False
+        self._shown: Summary | None = None
+        self._count = 0
+        self._head = ui.element("div").classes("mission-head")
+        PlainText("h2", "What happened")
+        self._timeline = ui.element("ol").classes("timeline")
+        self._more = PlainText("p", "", "quiet")
+        PlainText("h2", "Program")
+        self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
+
+    def show(self, summary: Summary, events: Sequence[Line]) -> None:
+        """Show a mission, of which more may have happened."""
+        self.has_ended = summary.has_ended
+        if summary != self._shown:
+            self._shown = replace(summary)
+            self._head.clear()
+            with self._head:
+                _draw_head(summary)
+            self._source.clear()
+            with self._source:
+                _draw_source(summary)
+        steps = list(timeline(events[:MOST_EVENTS]))
+        with self._timeline:
+            for line, words in steps[self._count :]:
+                _draw_event(line, words)
+        self._count = len(steps)
+        more = len(events) - MOST_EVENTS
+        self._more.say(f"{more:,} more events are in the downloads above." if more > 0 else "")
+
+
+def _draw_head(summary: Summary) -> None:
+    began = datetime.fromtimestamp(summary.created).astimezone()
+    PlainText("h1", shortened(title(summary), 300))
+    with ui.element("div").classes(f"ending ending-{summary.state}"):
+        PlainText("small", summary.state, f"state state-{summary.state}")
+        if summary.reason:
+            PlainText("span", shortened(reason_text(summary.reason, summary.line)), "reason")
+        if code := _line_of(summary):
+            PlainText("code", shortened(code, MOST_CODE))
+    by_hand = " · program typed or changed by hand" if summary.program else ""
+    by = f" · program by {summary.model}" if summary.model else by_hand
+    PlainText("p", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}", "facts")
+    with ui.element("p").classes("downloads"):
+        for kind, name in (("jsonl", "Events (JSON lines)"), ("mcap", "MCAP, for Foxglove")):
+            html.a(name, href=outside(f"/api/missions/{summary.id}/events.{kind}")).props("download")
+    for problem in summary.problems:
+        PlainText("p", shortened(problem), "trouble")
+
+
+def _line_of(summary: Summary) -> str:
+    """The line of the program at which the mission ended, without its indentation; empty if it is unknown."""
+    lines = summary.program.split("\n")
+    is_there = summary.line is not None and 0 < summary.line <= len(lines)
+    return lines[summary.line - 1].strip() if summary.line is not None and is_there else ""
+
+
+def _draw_source(summary: Summary) -> None:
+    """The program, in which the line at which the mission ended is marked."""
+    lines = summary.program.split("\n")
+    at = summary.line if _line_of(summary) else None
+    if at is None:
+        PlainText("span", summary.program)
+        return
+    PlainText("span", "".join(f"{line}\n" for line in lines[: at - 1]))
+    PlainText("mark", lines[at - 1], "failed-line")
+    PlainText("span", "".join(f"\n{line}" for line in lines[at:]))
+
+
+def _draw_event(line: Line, words: str) -> None:
+    with ui.element("li").classes(f"event event-{line['event']}"):
+        PlainText("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
+        PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")
+        PlainText("span", words, "text")

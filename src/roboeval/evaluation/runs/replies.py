@@ -1,0 +1,54 @@
+"""What a row of completions.jsonl says of the reply in which the program was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import UnionType
+from typing import Any
+
+from codebotler.core.terminal import shortened
+from roboeval.evaluation.runs.completions import Completion
+
+TOKENS = ("input_tokens", "output_tokens", "reasoning_tokens")
+REPLY_TEXTS = ("reasoning", "raw_reply")
+MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
+
+
+def reply_data(completion: Completion | None) -> dict[str, Any] | None:
+    """What was recorded of a completion's reply; None for rows of earlier versions, which have none of it.
+
+    `finish_reason` as the server said it, `cut_off`, tokens (`input_tokens`, `output_tokens`,
+    `reasoning_tokens`), `latency_s`, `reasoning` and `raw_reply`; each may be None.
+    """
+    more = {} if completion is None else completion.more
+    if completion is None or not any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning")):
+        return None
+    usage = more.get("usage")
+    usage = usage if isinstance(usage, dict) else {}
+    tokens = {name: number_or_none(usage.get(name), int) for name in TOKENS}
+    texts = {name: text if isinstance(text := more.get(name), str) else None for name in REPLY_TEXTS}
+    return {
+        "finish_reason": completion.finish_reason,
+        "cut_off": completion.is_cut_off,
+        **tokens,
+        "latency_s": number_or_none(more.get("latency_s"), int | float),
+        **texts,
+    }
+
+
+def reply_facts(reply: Mapping[str, Any]) -> list[str]:
+    """How a reply ended, its tokens and its latency, each in a few words."""
+    named = zip(TOKENS, ("of the prompt", "of the reply", "of its reasoning"), strict=True)
+    tokens = [f"{reply[name]:,} {of}" for name, of in named if reply[name] is not None]
+    facts = []
+    if reply["finish_reason"] is not None:
+        ended = shortened(reply["finish_reason"], 100)
+        facts.append(f'finish reason "{ended}"{" (cut off)" if reply["cut_off"] else ""}')
+    facts += [f"tokens: {', '.join(tokens)}"] if tokens else []
+    return facts + ([] if reply["latency_s"] is None else [f"{reply['latency_s']:,.1f} s"])
+
+
+def number_or_none(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
+    """A number of a row, from 0; None for anything else."""
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    return value if is_number and 0 <= value <= MOST else None

@@ -1,0 +1,135 @@
+"""Suites of fresh tasks: those that families make of the seeds of a split, under a name that says which."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.words import counted, listed
+from codebotler.models.recorded import InstructionSolutions, Solution
+from roboeval.suites.families.tasks import TrainedTask, family_names, suite_file, trained_task
+from roboeval.suites.load import Suite
+from roboeval.suites.task import Task
+
+SIZE = 1_000_000_000
+SPLITS = {"train": 0, "validation": SIZE, "test": 2 * SIZE}
+"""The first seed of each split, which has so many."""
+
+MOST_TASKS = 100
+NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
+
+
+def first_seed(split: str, seed: int, count: int, what: str) -> int:
+    """The first of `count` seeds of a split; with the next `seed`, all are others.
+
+    Args:
+        split: one of `SPLITS`.
+        seed: from 0.
+        count: how many, at least 1.
+        what: of which things there are so many, for messages.
+
+    Raises:
+        UserError: there is no such split, or a number is out of range.
+    """
+    if split not in SPLITS:
+        raise UserError(f'there is no split "{split}"; there is {listed(list(SPLITS))}')
+    if count < 1:
+        raise UserError(f"the number of {what}s is {count}, but it must be at least 1")
+    if not 0 <= seed * count <= SIZE - count:
+        most = SIZE // count - 1
+        raise UserError(f"the seed is {seed}, but with {counted(count, what)} it must be from 0 to {most:,}")
+    return SPLITS[split] + seed * count
+
+
+@dataclass(frozen=True)
+class FamilyTasks:
+    """Which tasks of families a suite holds: so many, in turn of each family.
+
+    Args:
+        split: `train`, `validation` or `test`, which share no task.
+        seed: with the next number, all tasks are new.
+        count: how many tasks, 1 to 100; one for each family by default.
+
+    Raises:
+        UserError: there is no such split, or a number is out of range.
+    """
+
+    split: str
+    seed: int = 0
+    count: int = len(family_names())
+
+    def __post_init__(self) -> None:
+        if self.count > MOST_TASKS:
+            raise UserError(f"the number of tasks is {self.count}, but it must be at most {MOST_TASKS}")
+        first_seed(self.split, self.seed, self.count, "task")
+
+    @property
+    def name(self) -> str:
+        """The name of the suite, such as `families-test-7`."""
+        usual = self.count == len(family_names())
+        return f"families-{self.split}-{self.seed}" + ("" if usual else f"-{self.count}")
+
+    def suite(self, skills: SkillTable = SKILLS) -> Suite:
+        """A suite of these tasks, the same on every machine."""
+        return _suite(self, skills)
+
+    def seeds(self) -> Iterator[tuple[str, str, int]]:
+        """The name of each task, its family, and its seed: `BringThing`, and the next one `BringThing-2`."""
+        first = first_seed(self.split, self.seed, self.count, "task")
+        families, numbers = family_names(), Counter[str]()
+        for seed in range(first, first + self.count):
+            family = families[seed % len(families)]
+            numbers[family] += 1
+            nth = numbers[family]
+            yield (family if nth == 1 else f"{family}-{nth}"), family, seed
+
+
+def family_tasks_named(name: str) -> FamilyTasks | None:
+    """What the name of a suite of families means; None if it is no such name."""
+    match = NAME.fullmatch(name)
+    if match is None:
+        return None
+    split, seed, count = match.groups()
+    found = FamilyTasks(split, int(seed), *([] if count is None else [int(count)]))
+    return found if found.name == name else None
+
+
+@lru_cache(maxsize=8)
+def _suite(which: FamilyTasks, skills: SkillTable) -> Suite:
+    head = suite_file()
+    made = {name: trained_task(family, seed) for name, family, seed in sorted(which.seeds())}
+    digests = [f"{name} {one.suite.digest}" for name, one in made.items()]
+    return Suite(
+        name=which.name,
+        version=head.version,
+        about=f"{counted(which.count, 'task')} of families: split {which.split}, seed {which.seed}",
+        rules=head.rules.rules(),
+        tasks={name: _named(name, one) for name, one in made.items()},
+        digest=hashlib.sha256("\n".join([str(head.version), *digests]).encode()).hexdigest(),
+        skills=skills,
+        families=which,
+        recorded=tuple(solutions for one in made.values() for solutions in _recorded(one)),
+    )
+
+
+def _named(name: str, made: TrainedTask) -> Task:
+    """The task under its name in a suite, with the file that is really there."""
+    task = made.suite.tasks[made.name]
+    return replace(task, name=name, path=task.path.with_name(f"{name.partition('-')[0]}.yaml"))
+
+
+def _recorded(made: TrainedTask) -> Iterator[InstructionSolutions]:
+    """What the recorded models write: the right program; and for some prompts first a wrong one."""
+    right = Solution(about="right", program=made.solution)
+    wrong = [Solution(about=one.about, program=one.program, fails="unknown") for one in made.wrong]
+    mixed = (right, *wrong)
+    for number, prompt in enumerate(made.prompts):
+        at = number % len(mixed)
+        yield InstructionSolutions(instruction=prompt, careful=(right,), hasty=mixed[at:] + mixed[:at])

@@ -1,0 +1,176 @@
+"""Past missions: the list with its filters, in all tabs at once, and how a mission ended."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from pageserver import PageServer
+from viewing import DESK, PHONE, OpenPage, Shoot, expect_no_grave_fault
+
+HELLO = "def task_program():\n    say('Hello')\n"
+FAILS = "def task_program():\n    say('Off I go')\n    pick('unicorn')\n"
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
+NO_ARM = """class NoArm:
+    def go_to(self, location): pass
+    def get_current_location(self): return "hall"
+    def rooms(self): return ["hall", "kitchen"]
+    def say(self, message): pass
+    def stop(self): pass
+"""
+
+
+def finish(server: PageServer, program: str) -> str:
+    """Run a program to its end; the name of its mission."""
+    server.run(program, despite_problems=True)
+    ended = server.call("GET", "/api/robot?once_over=true").data
+    assert ended["is_over"], ended
+    return str(ended["mission"])
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[PageServer]:
+    with PageServer(tmp_path, "--speed", "50") as server:
+        yield server
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_a_mission_leads_with_why_it_ended_and_its_line(
+    server: PageServer, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+) -> None:
+    mission = finish(server, FAILS)
+    page = opened(server, f"missions/{mission}", size=size)
+    ending = page.locator(".ending")
+    expect(ending.locator(".state")).to_have_text("failed")
+    expect(ending.locator(".reason")).to_have_text(re.compile(r"^line 3: .*unicorn"))
+    expect(ending.locator("code")).to_have_text("pick('unicorn')")
+    expect(page.locator(".source .failed-line")).to_have_text("    pick('unicorn')")
+    assert page.locator(".source").inner_text().strip() == FAILS.strip()
+    tops = [page.locator(part).bounding_box() for part in (".ending", ".facts", ".timeline")]
+    heights = [box["y"] for box in tops if box is not None]
+    assert heights == sorted(heights)
+    assert len(heights) == len(tops)
+    expect_no_grave_fault(page)
+    shoot(page, f"mission-failed-{size[0]}")
+
+
+def test_a_mission_without_a_line_has_no_mark(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server, f"missions/{finish(server, HELLO)}")
+    expect(page.locator(".ending .state")).to_have_text("done")
+    expect(page.locator(".source")).to_contain_text("say('Hello')")
+    expect(page.locator(".ending code, .source mark")).to_have_count(0)
+
+
+def test_the_page_of_a_mission_follows_it_to_its_end(server: PageServer, opened: OpenPage) -> None:
+    server.run(FAR)
+    mission = server.call("GET", "/api/robot").data["mission"]
+    page = opened(server, f"missions/{mission}")
+    expect(page.locator(".ending .state")).to_have_text("running")
+    events = page.locator(".timeline li")
+    known = events.count()
+    expect(events.nth(known + 2)).to_be_visible()
+    server.rest()
+    expect(page.locator(".ending .state")).to_have_text("stopped")
+    expect(page.locator(".timeline .text").first).to_have_text("Mission created")
+    page.reload()
+    expect(page.locator(".ending .state")).to_have_text("stopped")
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_the_list_shows_robot_and_reason_and_filters_them(
+    server: PageServer, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+) -> None:
+    finish(server, HELLO)
+    finish(server, FAILS)
+    page = opened(server, "missions", size=size)
+    rows = page.locator(".rows li")
+    expect(rows).to_have_count(2)
+    expect(rows.first.locator(".outcome")).to_have_text(re.compile("robot: simulated · line 3: .*unicorn"))
+    expect(rows.last.locator(".outcome")).to_have_text("robot: simulated")
+    expect_no_grave_fault(page)
+    shoot(page, f"missions-all-{size[0]}")
+    page.get_by_label("Search").fill("UNICORN")
+    expect(rows).to_have_count(1)
+    expect(page.get_by_text("1 of 2 missions")).to_be_visible()
+    expect(page).to_have_url(re.compile("text=UNICORN"))
+    page.reload()
+    expect(rows).to_have_count(1)
+    expect(rows.first).to_contain_text("failed")
+    page.get_by_label("Search").fill("")
+    expect(rows).to_have_count(2)
+    page.get_by_label("State").click()
+    page.get_by_role("option", name="done").click()
+    expect(rows).to_have_count(1)
+    expect(rows.first).to_contain_text("done")
+    expect(page).to_have_url(re.compile("/missions\\?state=done$"))
+    page.get_by_label("Robot").click()
+    page.get_by_role("option", name="simulated").click()
+    expect(rows).to_have_count(1)
+
+
+def test_the_list_is_live_in_all_tabs(server: PageServer, opened: OpenPage) -> None:
+    first = opened(server, "missions")
+    stopped = f"http://localhost:{server.port}/missions?state=stopped"
+    second = opened(server, beside=first, link=stopped)
+    expect(first.get_by_text("No missions yet.")).to_be_visible()
+    server.run(FAR)
+    expect(first.locator(".rows li")).to_have_count(1)
+    expect(first.locator(".rows .state")).to_have_text("running")
+    expect(second.get_by_text("0 of 1 missions")).to_be_visible()
+    server.rest()
+    expect(first.locator(".rows .state")).to_have_text("stopped")
+    expect(first.locator(".rows .outcome")).to_have_text(re.compile("robot: simulated · .*stopped"))
+    expect(second.locator(".rows li")).to_have_count(1)
+    finish(server, HELLO)
+    expect(first.locator(".rows .state").first).to_have_text("done")
+    expect(first.locator(".rows .state").last).to_have_text("stopped")
+    expect(second.locator(".rows li")).to_have_count(1)
+
+
+# --- texts of earlier states
+
+WITHOUT_TIMEOUT = """const later = setTimeout;
+window.setTimeout = (call, wait, ...more) => (wait === 8000 ? 0 : later(call, wait, ...more));"""
+"""Without it, the result of STOP would vanish by itself after 8 seconds."""
+
+
+def test_nothing_is_running_is_not_said_once_something_is(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server, script=WITHOUT_TIMEOUT)
+    expect(page.locator(".headline")).to_be_visible()
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_have_text("Nothing is running.")
+    server.call("POST", "/api/missions", {"program": HELLO})
+    expect(page.locator("#stop-told")).to_have_text("")
+
+
+def test_how_a_mission_ended_is_not_said_in_the_next_one(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server, script=WITHOUT_TIMEOUT)
+    server.run(FAR)
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_have_text("The robot has stopped.")
+    server.call("POST", "/api/missions", {"program": HELLO})
+    expect(page.locator("#stop-told")).to_have_text("")
+
+
+def test_what_the_robot_cannot_do_is_not_said_once_the_line_is_gone(tmp_path: Path, opened: OpenPage) -> None:
+    (tmp_path / "no_arm.py").write_text(NO_ARM)
+    with PageServer(tmp_path, "--robot", "no_arm.py:NoArm") as server:
+        page = opened(server)
+        server.call("POST", "/api/missions", {"program": FAILS})
+        cannot = page.get_by_text(re.compile("has no .pick. skill"))
+        expect(cannot.first).to_be_visible()
+        expect(page.locator(".headline")).to_have_text("The program has problems")
+        server.call("PUT", "/api/missions/current/program", {"program": HELLO})
+        expect(page.locator(".verdict")).to_have_text("Checked: no problems.")
+        expect(cannot).to_have_count(0)
+        server.call("PUT", "/api/missions/current/program", {"program": FAILS})
+        expect(cannot.first).to_be_visible()
+        page.context.close()
+        server.rest()
+        mission = finish(server, FAILS)
+        events = server.call("GET", f"/api/missions/{mission}/events.jsonl").text
+    assert "before the robot moves: line 3: this robot has no `pick`" in events

@@ -1,0 +1,42 @@
+"""A reply on the page while it arrives: text until code begins."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from codebotler.generation.arriving import arriving
+
+CODE = "def task_program():\n    say('hello')\n"
+
+
+@pytest.mark.parametrize(
+    ("reply", "text", "code"),
+    [
+        ("", "", ""),
+        ("I will greet them", "I will greet them", ""),
+        ("Here it is:\n``", "Here it is:\n``", ""),
+        ("Here it is:\n```python\ndef task", "Here it is:\n", "def task"),
+        (f"Here it is:\n```python\n{CODE}```\nIt says hello.", "Here it is:\nIt says hello.", CODE),
+        (f"```\nx = 1\n```\nBetter:\n~~~python\n{CODE}", "Better:\n", CODE),
+        (CODE, "", CODE),
+        (f"Sure.\n{CODE}", "Sure.\n", CODE),
+        ("    say('hello')\n    go_to('hall')", "", "    say('hello')\n    go_to('hall')"),
+        (" Here it is", " Here it is", ""),
+        (f"<think>\n```python\n{CODE}```\nHm.", f"<think>\n```python\n{CODE}```\nHm.", ""),
+        (f"<think>a\nb</think>\n{CODE}", "<think>a\nb</think>\n", CODE),
+        (f"[THINK]{CODE}[/THINK]\n```\n{CODE}", f"[THINK]{CODE}[/THINK]\n", CODE),
+        (f"Let me see.\n{CODE}</think>\nNow:\n", f"Let me see.\n{CODE}</think>\nNow:\n", ""),
+    ],
+)
+def test_text_and_code_of_what_has_arrived(reply: str, text: str, code: str) -> None:
+    found = arriving(reply)
+    assert (found.text, found.code) == (text, code)
+
+
+def test_a_long_reply_is_read_in_no_time() -> None:
+    began = time.process_time()
+    arriving(("Let me think about it. " * 20 + "\n") * 1_000)
+    arriving(" " * 200_000)
+    assert time.process_time() - began < 0.1

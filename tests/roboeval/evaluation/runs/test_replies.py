@@ -1,0 +1,92 @@
+"""What is shown of a reply, in full or in short, and nothing of rows that do not record it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from codebotler.models.no_program import IN_WORDS
+from roboeval.cli.views.completions import MOST_REPLY, completion_view
+from roboeval.evaluation.explanation import completion_data
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.replies import reply_data, reply_facts
+from small_run import HOSTILE, SHOWN, SUITE, printed, row
+
+WRITTEN = Completion(
+    task="Visit",
+    prompt=0,
+    index=0,
+    program="I will",
+    more={
+        "no_program": "cut-off",
+        "finish_reason": "length",
+        "usage": {"input_tokens": 900, "output_tokens": 512, "reasoning_tokens": 400},
+        "latency_s": 2.5,
+        "reasoning": "Let me think.",
+        "raw_reply": "I will",
+    },
+)
+
+
+def view(completion: Completion, failure: tuple[str, str] | None = None, *, with_reply: bool = False) -> str:
+    data = completion_data(row(0, 0, failure), completion, SUITE)
+    return printed(completion_view(data, with_reply=with_reply), width=200)
+
+
+def test_reply_is_told_with_its_tokens() -> None:
+    data = reply_data(WRITTEN)
+    assert data is not None
+    assert (data["finish_reason"], data["cut_off"], data["latency_s"]) == ("length", True, 2.5)
+    ended, tokens, seconds = reply_facts(data)
+    assert '"length"' in ended
+    assert all(number in tokens for number in ("900", "512", "400"))
+    assert seconds == "2.5 s"
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"finish_reason": None, "raw_reply": None}, {"usage": {"input_tokens": 1}, "latency_s": 3.0}],
+)
+def test_rows_of_earlier_versions_show_nothing_of_it(more: dict[str, Any]) -> None:
+    completion = replace(WRITTEN, more=more)
+    assert reply_data(completion) is None
+    assert reply_data(None) is None
+    assert "--reply" not in view(completion, ("PythonError", "NameError"))
+
+
+def test_wrong_values_of_a_row_are_left_out() -> None:
+    more = {"finish_reason": 3, "usage": [1], "latency_s": "long", "reasoning": {}, "raw_reply": "x"}
+    data = reply_data(replace(WRITTEN, more=more))
+    assert data is not None
+    assert {name: value for name, value in data.items() if value} == {"raw_reply": "x"}
+    assert reply_facts(data) == []
+
+
+def test_texts_are_shown_only_on_request() -> None:
+    short, whole = (view(WRITTEN, ("NoProgram", "cut-off"), with_reply=shown) for shown in (False, True))
+    assert "Let me think." not in short
+    assert "reasoning (13 characters) and reply (6 characters): --reply" in short
+    assert "\nreasoning:\nLet me think." in whole
+    assert "--reply" not in whole
+
+
+def test_of_a_reply_without_a_program_the_reason_is_told_and_no_world() -> None:
+    text = view(WRITTEN, ("NoProgram", "cut-off"))
+    assert "no program: cut-off" in text
+    assert IN_WORDS["cut-off"] in text
+    assert "World 1" not in text
+
+
+def test_replies_are_text_and_bounded() -> None:
+    more = {
+        **WRITTEN.more,
+        "reasoning": HOSTILE,
+        "raw_reply": "x" * (MOST_REPLY + 7),
+        "finish_reason": HOSTILE,
+    }
+    text = view(replace(WRITTEN, more=more), with_reply=True)
+    assert SHOWN[:20] in text
+    assert "\x1b" not in text
+    assert "... 7 more characters" in text
