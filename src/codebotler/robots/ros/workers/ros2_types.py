@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import inspect
 import json
 import os
 import shutil
@@ -26,11 +25,26 @@ GENERATORS = (
     "generator_type_description",
     "generator_c",
     "typesupport_fastrtps_c",
+    "typesupport_introspection_c",
     "typesupport_c",
     "generator_py",
 )
-LIBRARIES = ("generator_c", "generator_py", "typesupport_c", "typesupport_fastrtps_c")
-RUNTIME = ("rosidl_runtime_c", "rosidl_typesupport_c", "rosidl_typesupport_fastrtps_c", "rcutils", "fastcdr")
+SUPPORTS = ("rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c")
+PRELOADS = """\
+import ctypes
+import pathlib
+
+for support in {supports}:  # found by their names, once they are loaded
+    ctypes.CDLL(str(pathlib.Path(__file__).parent / f"lib{package}__{{support}}.so"))
+"""
+LIBRARIES = (
+    "generator_c",
+    "generator_py",
+    "typesupport_c",
+    "typesupport_fastrtps_c",
+    "typesupport_introspection_c",
+)
+RUNTIME = (*SUPPORTS, "rosidl_runtime_c", "rosidl_typesupport_c", "rcutils", "fastcdr")
 COMPILERS = {".c": "cc", ".cpp": "c++"}
 Definitions = Dict[str, str]
 
@@ -115,7 +129,7 @@ def built(package: str, definitions: Definitions, tell: Callable[[str], object] 
 
     shares = {name: Path(share(name)) for name in (*NEEDED, *("rosidl_" + name for name in GENERATORS))}
     versions = [(folder / "package.xml").read_text() for folder in shares.values()]
-    parts = [package, definitions, sysconfig.get_config_var("SOABI"), versions, inspect.getsource(_Build)]
+    parts = [package, definitions, sysconfig.get_config_var("SOABI"), versions, Path(__file__).read_text()]
     key = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "codebotler" / "ros2"
     folder = home / f"{package}-{key}"
@@ -149,19 +163,27 @@ class _Build:
 
     def make(self, definitions: Definitions) -> None:
         (self.made / "action").mkdir(parents=True)
-        (self.made / "__init__.py").touch()
+        (self.made / "__init__.py").write_text(PRELOADS.format(package=self.package, supports=SUPPORTS))
         self._generate(definitions)
         module = f"{self.package}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
         objects = [self._compiled(unit) for unit in list(self._units())]
         libraries = [f"-l{name}__rosidl_{kind}" for name in NEEDED for kind in LIBRARIES]
         self._run(
-            "c++", "-shared", "-s", "-Wl,--allow-shlib-undefined", "-o", str(self.made / module), *objects,
+            "c++", "-shared", "-s", "-Wl,--allow-shlib-undefined", f"-Wl,-soname,{module}", "-o",
+            str(self.made / module), *objects,
             "-L", str(self.prefix / "lib"), *libraries, *(f"-l{name}" for name in RUNTIME)
         )  # fmt: skip
+        libraries = [f"lib{self.package}__{support}.so" for support in SUPPORTS]
+        for library in libraries:  # empty, but leads to all symbols of the module
+            self._run(
+                "c++", "-shared", f"-Wl,-soname,{library}", "-Wl,--no-as-needed", "-Wl,-rpath,$ORIGIN",
+                "-Wl,--allow-shlib-undefined", str(self.made / module), "-o", str(self.made / library)
+            )  # fmt: skip
+        kept = {module, *libraries}
         for path in sorted(self.made.rglob("*"), reverse=True):
             if path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
-            elif path.is_file() and path.suffix != ".py" and path.name != module:
+            elif path.is_file() and path.suffix != ".py" and path.name not in kept:
                 path.unlink()
 
     def _generate(self, definitions: Definitions) -> None:
@@ -171,6 +193,7 @@ class _Build:
         from rosidl_generator_type_description import generate_type_hash
         from rosidl_typesupport_c import generate_c as generate_typesupport_c
         from rosidl_typesupport_fastrtps_c import generate_typesupport_fastrtps_c
+        from rosidl_typesupport_introspection_c import generate_c as generate_introspection_c
 
         self.idls = []
         for name, text in sorted(definitions.items()):
@@ -191,9 +214,14 @@ class _Build:
             self._arguments("generator_c", type_description_tuples=hashes, ros_interface_files=sources)
         )
         generate_typesupport_fastrtps_c(self._arguments("typesupport_fastrtps_c"))
-        generate_typesupport_c(self._arguments("typesupport_c"), ["rosidl_typesupport_fastrtps_c"])
+        generate_typesupport_c(self._arguments("typesupport_c"), list(SUPPORTS))
+        generate_introspection_c(
+            self._arguments(
+                "typesupport_introspection_c", output_dir=str(self.work / "introspection" / self.package)
+            )
+        )
         generate_py(self._arguments("generator_py"), ["rosidl_typesupport_c"])
-        for generator in ("generator_c", "typesupport_fastrtps_c"):
+        for generator in ("generator_c", "typesupport_fastrtps_c", "typesupport_introspection_c"):
             self._write_visibility(f"rosidl_{generator}__visibility_control.h", self._templates(generator))
 
     def _templates(self, generator: str) -> Path:
@@ -224,6 +252,10 @@ class _Build:
 
     def _units(self) -> Iterator[Path]:
         """What is compiled: one file for all of a language, but for descriptions, whose names collide."""
+        introspection = self.work / "introspection.c"
+        files = sorted((self.work / "introspection").rglob("*.c"))
+        introspection.write_text("".join(f'#include "{path}"\n' for path in files))
+        yield introspection
         for suffix in COMPILERS:
             files = sorted(self.made.rglob("*" + suffix))
             together = [path for path in files if not path.stem.endswith("__description")]
@@ -238,6 +270,7 @@ class _Build:
         headers = self.prefix / "include"
         folders = [
             self.work / "made",
+            self.work / "introspection",
             headers,
             Path(sysconfig.get_paths()["include"]),
             Path(get_include()),
