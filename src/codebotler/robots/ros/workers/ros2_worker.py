@@ -12,6 +12,7 @@ from ros2_graph import Ros2Graph
 from ros2_types import action_types, as_in, fields_of, plain
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
+REJECTED = 1  # of action_msgs/srv/CancelGoal
 DISCOVERS = 3  # times the patience, for the first server to be discovered
 TELLS = 2.0  # seconds after which a search for servers is told
 AGAIN = 1.0  # seconds after which a result is asked for again
@@ -41,6 +42,7 @@ class Ros2Server:
         self._graph, self._request = graph, CancelGoal.Request
         self._cancels = graph.ours.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         self._heard = 0.0
+        self.has_cancelled = False
 
     @property
     def heard(self) -> float:
@@ -54,8 +56,15 @@ class Ros2Server:
         return bool(self.client.server_is_ready())
 
     def cancel(self) -> None:
-        """Cancel all goals of all clients."""
-        self._graph.soon(self._cancels.call_async, self._request())
+        """Ask to cancel all goals of all clients; `has_cancelled` tells when the server has."""
+        self._graph.soon(self._cancel_all)
+
+    def _cancel_all(self) -> None:
+        self._cancels.call_async(self._request()).add_done_callback(self._confirm)
+
+    def _confirm(self, done: Any) -> None:
+        if done.result() is not None and done.result().return_code != REJECTED:
+            self.has_cancelled = True
 
     def cancel_one(self, number: list[int]) -> Any:
         """Ask to cancel a goal; the answer will be in what is returned. For the executor's thread."""
@@ -83,6 +92,17 @@ class Ros2Worker(SkillWorker):
             self.graph.hear_statuses(server.name, self._hear)
         self.graph.spin()
         return left_behind
+
+    def cancel_all(self) -> bool:
+        """Cancel all goals of all clients; whether all servers that are there have confirmed it."""
+        there = [server for server in self.servers.values() if server.is_connected(self.silence)]
+        until = time.monotonic() + self.patience
+        while there and time.monotonic() < until:
+            for server in there:
+                server.cancel()
+            time.sleep(TICK)
+            there = [server for server in there if not server.has_cancelled]
+        return not there
 
     def missing(self) -> dict[str, str]:
         """Why servers cannot be reached, by skill; servers are discovered one after the other."""
