@@ -23,6 +23,7 @@ IN_WORDS: Mapping[NoProgram, str] = {
 }
 
 _CUT_OFF = {"length", "max_tokens", "max_output_tokens", "max_length", "model_length", "token_limit"}
+_CUT_OFF |= {"model_context_window_exceeded"}
 _BY_REASON: Mapping[str, NoProgram] = {
     **dict.fromkeys(_CUT_OFF, "cut-off"),
     **dict.fromkeys(("tool_call", "tool_calls", "tool_use", "function_call"), "tool-call"),
@@ -62,7 +63,8 @@ def why_no_program(
     Raises:
         EngineError: no isolated process can be started.
     """
-    kind = said or _BY_REASON.get((finish_reason or "").lower())
+    by_reason = _BY_REASON.get((finish_reason or "").lower())
+    kind = by_reason if by_reason == "cut-off" else said or by_reason
     is_open = kind == "cut-off" and reply is not None and _last_line(reply) == _last_line(program)
     if kind is not None and (is_open or not program.strip() or not _is_whole(program)):
         return kind

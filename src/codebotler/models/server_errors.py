@@ -18,11 +18,18 @@ MENDS = {
 }
 NO_CONNECTION = "ConnectError"  # of httpx or httpx2, whichever a provider's library has
 MOST = 300  # characters of what a server says
+FORBIDDEN = 403
 OF_PROMPT = (400, 413, 422)  # the statuses that may be about this one prompt
 FILTER = re.compile(
-    r"content[\s_-]*(?:filter|management|policy)|safety system|data_inspection", re.IGNORECASE
+    r"content[\s_-]*(?:filter|management|policy|exists risk)|safety system|data_inspection|moderation"
+    r"|flagged|usage polic|prohibited_content|敏感内容",
+    re.IGNORECASE,
 )
-MONEY = re.compile(r"\b(?:credit|billing|balance|quota|payment)", re.IGNORECASE)
+ACCOUNT = re.compile(
+    r"\b(?:credit|billing|balance|quota|payment|budget|expired|api[ _-]?key|permission|unauthori[sz]ed)",
+    re.IGNORECASE,
+)
+"""What servers say about an account, which is about no prompt."""
 PASSING = re.compile(r"rate_?limit|overload|unavailable|server_?error|internal|timeout", re.IGNORECASE)
 """Found in the types and codes of errors that may pass."""
 
@@ -75,7 +82,7 @@ def refused(
     said = f" ({text})" if (text := told(body)) else ""
     sentence = f"{name}: the server answered with status {status}{said}{MENDS.get(status, '')}"
     may_pass = not hopeless and (status >= SERVER_ERROR or status in LATER)
-    is_refusal = not hopeless and status in OF_PROMPT and not MONEY.search(said)
+    is_refusal = not hopeless and status in OF_PROMPT and not ACCOUNT.search(said)
     return ModelError(sentence, may_pass=may_pass, retry_after=retry_after, is_refusal=is_refusal)
 
 
@@ -91,7 +98,7 @@ def error_in_reply(name: str, body: object) -> ModelError:
 
 def is_filtered(status: int | None, body: object) -> bool:
     """Whether a refused request was refused by a filter of contents, by the word of the server."""
-    return status in OF_PROMPT and FILTER.search(str(body)) is not None
+    return status in {*OF_PROMPT, FORBIDDEN} and FILTER.search(str(body)) is not None
 
 
 def told(said: object) -> str:

@@ -220,7 +220,6 @@ class _Generation:
             raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=True)
         self.file.append(line)
         self.log.kept(key)
-        self._keep_refused()
         try:
             await asyncio.to_thread(self.file.sync)
         finally:  # after an interrupt, too: the file is synced when it is closed
