@@ -9,7 +9,7 @@ import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, cast, get_args
+from typing import Any, Protocol, cast, get_args
 from urllib.parse import urlsplit
 
 import openai
@@ -106,12 +106,17 @@ class ChatModel:
             chunks = None
             if isinstance(stream, OpenAIStreamedResponse):
                 chunks = stream._response = Chunks(stream._response)  # type: ignore[assignment]  # noqa: SLF001
+            hear = _marking_thoughts(heard)
             async for event in stream:
                 match event:
-                    case messages.PartStartEvent(part=messages.TextPart(content=piece)) if piece:
-                        heard(piece)
-                    case messages.PartDeltaEvent(delta=messages.TextPartDelta(content_delta=piece)) if piece:
-                        heard(piece)
+                    case messages.PartStartEvent(part=messages.TextPart() as part):
+                        hear(part.content, is_thought=False)
+                    case messages.PartDeltaEvent(delta=messages.TextPartDelta() as delta):
+                        hear(delta.content_delta, is_thought=False)
+                    case messages.PartStartEvent(part=messages.ThinkingPart() as part):
+                        hear(part.content, is_thought=True)
+                    case messages.PartDeltaEvent(delta=messages.ThinkingPartDelta() as delta):
+                        hear(delta.content_delta or "", is_thought=True)
             response = stream.get()
         # A stream that ends too early, but in good order, differs from a whole one only by what it lacks; for
         # chat completions pydantic-ai makes up a reason for the end.
@@ -156,6 +161,26 @@ class ChatModel:
                 return broken_off(self.name, begun=False)
         is_transport = isinstance(error, OSError) or type(error).__module__.split(".")[0] in TRANSPORTS
         return failure(self.name, f"{type(error).__name__}: {told(error)}", may_pass=is_transport)
+
+
+class _Hear(Protocol):
+    def __call__(self, piece: str, *, is_thought: bool) -> None: ...
+
+
+def _marking_thoughts(heard: Heard) -> _Hear:
+    """Pass pieces of a reply on, with marks around thoughts that a server sends apart from the text."""
+    was_thought = False
+
+    def hear(piece: str, *, is_thought: bool) -> None:
+        nonlocal was_thought
+        if not piece:
+            return
+        if is_thought != was_thought:
+            heard("<think>\n" if is_thought else "\n</think>\n")
+        was_thought = is_thought
+        heard(piece)
+
+    return hear
 
 
 def messages_of(conversation: tuple[Message, ...]) -> list[messages.ModelMessage]:

@@ -65,7 +65,7 @@ def why_no_program(
     """
     by_reason = _BY_REASON.get((finish_reason or "").lower())
     kind = by_reason if by_reason == "cut-off" else said or by_reason
-    is_open = kind == "cut-off" and reply is not None and _last_line(reply) == _last_line(program)
+    is_open = kind == "cut-off" and reply is not None and _ends_in_code(reply, program)
     if kind is not None and (is_open or not program.strip() or not _is_whole(program)):
         return kind
     if has_code or kind is not None:
@@ -73,8 +73,12 @@ def why_no_program(
     return "no-code" if program.strip() else "empty"
 
 
-def _last_line(text: str) -> str:
-    return composed(text).rstrip().rpartition("\n")[2].strip()
+def _ends_in_code(reply: str, program: str) -> bool:
+    """Whether a reply ends within its program, or within a fence behind it, which holds a better version."""
+    last = program.rstrip().rpartition("\n")[2].strip()
+    _, _, rest = composed(reply).rpartition(last)
+    fences = sum(line.lstrip().startswith(("```", "~~~")) for line in rest.splitlines())
+    return not rest.strip() or (fences > 0 and fences % 2 == 0)
 
 
 def _is_whole(program: str) -> bool:

@@ -235,7 +235,10 @@ def test_reply_without_a_program_says_why(
     assert (reply.no_program, reply.text) == (kind, text)
 
 
-@pytest.mark.parametrize(("after", "why"), [("```\nIt goes to", None), ("", "cut-off")])
+@pytest.mark.parametrize(
+    ("after", "why"),
+    [("```\nIt goes to", None), ("", "cut-off"), (f"```\nBetter:\n```python\n{TASK}    say('", "cut-off")],
+)
 def test_cut_off_reply_holds_a_program_if_it_goes_on_behind_it(
     server: Server, after: str, why: str | None
 ) -> None:
@@ -279,6 +282,19 @@ def test_reasoning_is_kept_apart(server: Server, field: str) -> None:
     reply = ask(CHAT, server)
     assert (reply.program, reply.reasoning, reply.text) == (TASK + BODY, thought, TASK + BODY)
     assert reply.usage == Usage(9, 30, 20)
+
+
+def test_reasoning_is_heard_between_marks(server: Server) -> None:
+    streams(server, chunk(CHAT, None, reasoning_content="Hm."), whole(CHAT), chunk(CHAT, None, "stop"), DONE)
+    heard: list[str] = []
+
+    async def asked() -> None:
+        model = open_model(CHAT, SamplingSettings(base_url=server.url))
+        await model.reply(PROMPT, number=0, heard=heard.append)
+        await model.close()
+
+    asyncio.run(asked())
+    assert "".join(heard) == f"<think>\nHm.\n</think>\n{TASK}{BODY}"
 
 
 def test_reasoning_in_tags_is_kept_apart(server: Server) -> None:
