@@ -65,8 +65,9 @@ def why_no_program(
     """
     by_reason = _BY_REASON.get((finish_reason or "").lower())
     kind = by_reason if by_reason == "cut-off" else said or by_reason
-    is_open = kind == "cut-off" and reply is not None and _ends_in_code(reply, program)
-    if kind is not None and (is_open or not program.strip() or not _is_whole(program)):
+    if kind is not None and not (program.strip() and _is_whole(program)):
+        return kind
+    if kind == "cut-off" and reply is not None and _ends_in_code(reply, program):
         return kind
     if has_code or kind is not None:
         return None

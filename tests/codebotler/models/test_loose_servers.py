@@ -235,6 +235,12 @@ def test_reply_without_a_program_says_why(
     assert (reply.no_program, reply.text) == (kind, text)
 
 
+def test_reply_that_was_cut_off_in_its_thoughts_is_cut_off(server: Server) -> None:
+    streams(server, chunk(CHAT, "<think>I should"), chunk(CHAT, None, "length"), DONE)
+    reply = ask(CHAT, server)
+    assert (reply.no_program, reply.reasoning, reply.text) == ("cut-off", "I should", "<think>I should")
+
+
 @pytest.mark.parametrize(
     ("after", "why"),
     [("```\nIt goes to", None), ("", "cut-off"), (f"```\nBetter:\n```python\n{TASK}    say('", "cut-off")],
