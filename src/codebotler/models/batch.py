@@ -26,7 +26,7 @@ EVENTS = {"content-type": "text/event-stream"}
 
 @dataclass(frozen=True)
 class BatchRequest:
-    """What a batch endpoint is to ask.
+    """A request for a batch endpoint.
 
     Args:
         url: the path of the endpoint, such as `/v1/chat/completions`.

@@ -30,12 +30,12 @@ from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import (
     broken_off,
     error_in_reply,
+    error_text,
     failure,
     is_filtered,
     model_error_in,
     refused,
     timed_out,
-    told,
     unreachable,
 )
 from codebotler.prompts import Message, PictureMessage, Prompt
@@ -160,7 +160,7 @@ class ChatModel:
             case exceptions.UnexpectedModelBehavior():
                 return broken_off(self.name, begun=False)
         is_transport = isinstance(error, OSError) or type(error).__module__.split(".")[0] in TRANSPORTS
-        return failure(self.name, f"{type(error).__name__}: {told(error)}", may_pass=is_transport)
+        return failure(self.name, f"{type(error).__name__}: {error_text(error)}", may_pass=is_transport)
 
 
 class _Hear(Protocol):
@@ -334,7 +334,7 @@ def _model(name: str, settings: SamplingSettings, http_client: object) -> Model:
         raise
     except ImportError as error:
         command = INSTALL.search(str(error))
-        mend = f"install it with: {command[0]}" if command else told(error)
+        mend = f"install it with: {command[0]}" if command else error_text(error)
         raise UserError(f"{name} needs a library that is not installed; {mend}") from None
     except Exception as error:  # noqa: BLE001 - each provider's library has errors of its own
         missing = VARIABLE.search(str(error))

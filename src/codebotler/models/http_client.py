@@ -15,7 +15,7 @@ from urllib.request import getproxies, proxy_bypass
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
 from codebotler.models.keys import redacted
-from codebotler.models.server_errors import FIRST_ERROR, error_in_reply, failure, told
+from codebotler.models.server_errors import FIRST_ERROR, error_in_reply, error_text, failure
 
 Client = TypeVar("Client", bound=Any)  # of httpx or httpx2, which share no type
 
@@ -148,4 +148,4 @@ def cannot_open(name: str, error: Exception) -> UserError:
     for variable in CERTIFICATES:
         if (path := os.environ.get(variable)) and not Path(path).exists():
             return UserError(f"{name} cannot be used: {variable} names {path}, which does not exist")
-    return UserError(f"{name} cannot be used: {told(error)}")
+    return UserError(f"{name} cannot be used: {error_text(error)}")

@@ -32,7 +32,7 @@ _BY_REASON: Mapping[str, NoProgram] = {
     **dict.fromkeys(("content_filter", "content_filtered", "safety", "recitation", "blocklist"), "filtered"),
     **dict.fromkeys(("prohibited_content", "spii", "language", "guardrail_intervened"), "filtered"),
 }
-"""What servers say about the end of a reply, in lower case."""
+"""Reasons for the end of a reply by the words of servers, in lower case."""
 
 
 def is_cut_off(finish_reason: str | None) -> bool:
