@@ -77,7 +77,7 @@ JOURNEY = ("README.md", "index.md", "tutorial.md")
 """Pages that one reader follows one after the other, in one folder; each other page has its own."""
 
 FOLLOWED = [page for page in PAGES if page not in RUN_BY]
-CODE, DATA = {"sh", "python"}, {"yaml", "json", "text"}
+CODE, DATA = {"sh", "python"}, {"yaml", "json", "text", "nginx", "caddy"}
 COMMAND = re.compile(r"^(?:\.venv/|codebotler |roboeval |python |pip |export |make |apt)", re.MULTILINE)
 MODEL = "http://localhost:8000/v1"
 

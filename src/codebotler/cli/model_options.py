@@ -119,7 +119,7 @@ def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
     """Say which settings a model does not take, so that they are not sent."""
     from codebotler.models.recorded import is_recorded
 
-    names = ("temperature", "top_p")
+    names = ("temperature", "top_p", "seed")
     unsent = [name for name in names if getattr(model.settings, name) is None is not getattr(asked, name)]
     if unsent and not is_recorded(model.name):
         note(f"{model.name} takes no {' or '.join(unsent).replace('_', '-')}; none is sent")

@@ -70,7 +70,7 @@ class Generation:
 
     @property
     def programless(self) -> ProgramlessReply | None:
-        """What there is to say about the last reply where it holds no program."""
+        """The description of the last reply, if it holds no program."""
         return self.attempts[-1].programless
 
     @property

@@ -38,7 +38,7 @@ class ProgramlessReply:
 
 
 def programless(reply: Reply, settings: SamplingSettings) -> ProgramlessReply | None:
-    """What there is to say about a reply without a program; None if it holds one.
+    """Describe a reply without a program; None if it holds one.
 
     Args:
         reply: the reply.

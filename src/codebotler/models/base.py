@@ -133,8 +133,8 @@ class Model(Protocol):
         Args:
             prompt: the request.
             number: which sample of this prompt it is, counted from 0.
-            heard: called with each piece of the text as it arrives, and from the beginning again when the
-                request is repeated after an error.
+            heard: called with each piece of the text as it arrives, and of thoughts between `<think>` and
+                `</think>`; from the beginning again when the request is repeated after an error.
 
         Raises:
             ModelError: no whole reply arrived.

@@ -26,7 +26,7 @@ EVENTS = {"content-type": "text/event-stream"}
 
 @dataclass(frozen=True)
 class BatchRequest:
-    """What a batch endpoint is to ask.
+    """A request for a batch endpoint.
 
     Args:
         url: the path of the endpoint, such as `/v1/chat/completions`.
@@ -119,14 +119,20 @@ def _response(status: int, body: Any) -> httpx2.Response:  # noqa: ANN401 - any 
     """An answer as the server would have sent it to a request for a stream."""
     if status >= FIRST_ERROR:
         return httpx2.Response(status, json=body)
-    chunk = {**body, "object": "chat.completion.chunk", "choices": [_streamed(body["choices"][0])]}
-    return httpx2.Response(200, headers=EVENTS, text=f"data: {json.dumps(chunk)}\n\ndata: [DONE]\n\n")
+    head = {name: value for name, value in body.items() if name not in {"choices", "usage"}}
+    *earlier, last = _streamed(body["choices"][0])
+    chunks = [{"choices": [choice]} for choice in earlier] + [{"choices": [last], "usage": body.get("usage")}]
+    events = [json.dumps({**head, "object": "chat.completion.chunk", **chunk}) for chunk in chunks]
+    text = "".join(f"data: {event}\n\n" for event in [*events, "[DONE]"])
+    return httpx2.Response(200, headers=EVENTS, text=text)
 
 
-def _streamed(choice: Mapping[str, Any]) -> dict[str, Any]:
-    """A choice as a stream would have it in one chunk."""
+def _streamed(choice: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The choices of a stream that make up one choice: reasoning comes before the answer."""
     message = choice.get("message")
     if not isinstance(message, Mapping):
-        return dict(choice)
-    delta = {name: value for name, value in message.items() if value is not None}
-    return {**{name: value for name, value in choice.items() if name != "message"}, "delta": delta}
+        return [dict(choice)]
+    said = {name: value for name, value in message.items() if value is not None}
+    thought = {name: said.pop(name) for name in (*said,) if name.startswith("reasoning")}
+    last = {**{name: value for name, value in choice.items() if name != "message"}, "delta": said}
+    return [*([{"index": 0, "delta": thought, "finish_reason": None}] if thought else []), last]

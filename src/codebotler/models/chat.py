@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import os
 import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any, Protocol, cast, get_args
+from urllib.parse import urlsplit
 
 import openai
 from openai.types import CompletionUsage
@@ -17,7 +19,7 @@ from pydantic_ai.direct import model_request_stream
 from pydantic_ai.models import Model, infer_model, known_model_names
 from pydantic_ai.models.openai import OpenAIChatModel, OpenAIResponsesModel, OpenAIStreamedResponse
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
-from pydantic_ai.settings import ModelSettings
+from pydantic_ai.settings import ModelSettings, ThinkingEffort
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, unheard
@@ -28,18 +30,22 @@ from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import (
     broken_off,
     error_in_reply,
+    error_text,
     failure,
     is_filtered,
     model_error_in,
     refused,
     timed_out,
-    told,
     unreachable,
 )
 from codebotler.prompts import Message, PictureMessage, Prompt
 
+BASE_URL = "OPENAI_BASE_URL"
 OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and the like
-OPENAI = "://api.openai.com/"
+NEW_LIMIT = ("api.openai.com", ".openai.azure.com")
+"""Hosts that know OpenAI's newer name for the limit of tokens."""
+EFFORTS = ("none", *get_args(ThinkingEffort))
+NO_TAGS = ("\0", "\0")  # tags of thoughts are found in the whole text, since a stream may cut them anywhere
 VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")
 KEY_VARIABLE = re.compile(r"\b[A-Z][A-Z0-9]*_[A-Z0-9_]*(?:KEY|TOKEN)[A-Z0-9_]*")
 INSTALL = re.compile(r'pip install "?[\w\[\],.-]+"?')
@@ -62,6 +68,8 @@ class ChatModel:
         provider, _, model = name.partition(":")
         if provider == "openai" and settings.base_url is not None:
             name = f"{OWN_SERVER}:{model}"
+        elif provider == OWN_SERVER and settings.base_url is None and os.environ.get(BASE_URL):
+            settings = replace(settings, base_url=os.environ[BASE_URL])
         self.name = name
         self._model = _model(name, settings, http_client)
         self.settings = taken_settings(self._model, name, settings)
@@ -98,16 +106,23 @@ class ChatModel:
             chunks = None
             if isinstance(stream, OpenAIStreamedResponse):
                 chunks = stream._response = Chunks(stream._response)  # type: ignore[assignment]  # noqa: SLF001
+            hear = _marking_thoughts(heard)
             async for event in stream:
                 match event:
-                    case messages.PartStartEvent(part=messages.TextPart(content=piece)) if piece:
-                        heard(piece)
-                    case messages.PartDeltaEvent(delta=messages.TextPartDelta(content_delta=piece)) if piece:
-                        heard(piece)
+                    case messages.PartStartEvent(part=messages.TextPart() as part):
+                        hear(part.content, is_thought=False)
+                    case messages.PartDeltaEvent(delta=messages.TextPartDelta() as delta):
+                        hear(delta.content_delta, is_thought=False)
+                    case messages.PartStartEvent(part=messages.ThinkingPart() as part):
+                        hear(part.content, is_thought=True)
+                    case messages.PartDeltaEvent(delta=messages.ThinkingPartDelta() as delta):
+                        hear(delta.content_delta or "", is_thought=True)
             response = stream.get()
         # A stream that ends too early, but in good order, differs from a whole one only by what it lacks; for
         # chat completions pydantic-ai makes up a reason for the end.
         ended = response.finish_reason is not None if chunks is None else chunks.is_whole
+        if chunks is not None and chunks.error is not None:
+            raise error_in_reply(self.name, chunks.error)
         if not ended or response.state != "complete":
             raise broken_off(self.name, begun=bool(response.parts))
         return response, chunks
@@ -145,7 +160,27 @@ class ChatModel:
             case exceptions.UnexpectedModelBehavior():
                 return broken_off(self.name, begun=False)
         is_transport = isinstance(error, OSError) or type(error).__module__.split(".")[0] in TRANSPORTS
-        return failure(self.name, f"{type(error).__name__}: {told(error)}", may_pass=is_transport)
+        return failure(self.name, f"{type(error).__name__}: {error_text(error)}", may_pass=is_transport)
+
+
+class _Hear(Protocol):
+    def __call__(self, piece: str, *, is_thought: bool) -> None: ...
+
+
+def _marking_thoughts(heard: Heard) -> _Hear:
+    """Pass pieces of a reply on, with marks around thoughts that a server sends apart from the text."""
+    was_thought = False
+
+    def hear(piece: str, *, is_thought: bool) -> None:
+        nonlocal was_thought
+        if not piece:
+            return
+        if is_thought != was_thought:
+            heard("<think>\n" if is_thought else "\n</think>\n")
+        was_thought = is_thought
+        heard(piece)
+
+    return hear
 
 
 def messages_of(conversation: tuple[Message, ...]) -> list[messages.ModelMessage]:
@@ -185,7 +220,8 @@ def _usage(response: messages.ModelResponse) -> Usage:
     usage = response.usage
     if usage.unmeasured_requests or not (usage.input_tokens or usage.output_tokens):
         return Usage()
-    return Usage(usage.input_tokens, usage.output_tokens, usage.details.get("reasoning_tokens"))
+    reasoning = usage.details.get("reasoning_tokens", usage.details.get("thoughts_tokens"))
+    return Usage(usage.input_tokens, usage.output_tokens, reasoning)
 
 
 def _usage_in_chunk(usage: CompletionUsage | None) -> Usage:
@@ -201,24 +237,38 @@ def _usage_in_chunk(usage: CompletionUsage | None) -> Usage:
 
 def taken_settings(model: Model, name: str, settings: SamplingSettings) -> SamplingSettings:
     """The settings without what a model does not take, and with the limit that its provider demands."""
-    profile: Mapping[str, Any] = model.profile
-    if model.system == "anthropic":
-        if profile.get("anthropic_disallows_sampling_settings"):
-            settings = replace(settings, temperature=None, top_p=None)
-        elif settings.temperature is not None:  # newer models refuse both together
-            settings = replace(settings, top_p=None)
-        return replace(settings, max_tokens=settings.max_tokens or DEMANDED_MAX_TOKENS)
+    if "seed" in model.unsupported_settings:
+        settings = replace(settings, seed=None)
+    if settings.extra_body is not None and "extra_body" in model.unsupported_settings:
+        raise UserError(f"{name} takes no extra body; leave it out")
     if isinstance(model, OpenAIChatModel | OpenAIResponsesModel):
-        if _reasons(profile, settings.reasoning_effort):
-            settings = replace(settings, temperature=None, top_p=None)
-        refused_settings = profile.get("openai_unsupported_model_settings", ())
-        if "temperature" in refused_settings:
-            settings = replace(settings, temperature=None)
-        if "top_p" in refused_settings:
-            settings = replace(settings, top_p=None)
-        return settings
-    if settings.reasoning_effort is not None and not profile.get("supports_thinking"):
+        return _taken_by_openai(model.profile, settings)
+    if settings.reasoning_effort is not None and not model.profile.get("supports_thinking"):
         raise UserError(f"{name} takes no reasoning effort; leave it out")
+    if settings.reasoning_effort not in {None, *EFFORTS}:
+        effort, known = settings.reasoning_effort, ", ".join(EFFORTS)
+        raise UserError(f'{name} knows no reasoning effort "{effort}"; use one of {known}')
+    return _taken_by_anthropic(model.profile, settings) if model.system == "anthropic" else settings
+
+
+def _taken_by_anthropic(profile: Mapping[str, Any], settings: SamplingSettings) -> SamplingSettings:
+    thinks = settings.reasoning_effort not in {None, "none"}
+    if thinks or profile.get("anthropic_disallows_sampling_settings"):
+        settings = replace(settings, temperature=None, top_p=None)
+    elif settings.temperature is not None:  # newer models refuse both together
+        settings = replace(settings, top_p=None)
+    # Thoughts have a budget of their own, which has to be smaller than the limit.
+    demanded = 2 * DEMANDED_MAX_TOKENS if thinks else DEMANDED_MAX_TOKENS
+    return replace(settings, max_tokens=settings.max_tokens or demanded)
+
+
+def _taken_by_openai(profile: Mapping[str, Any], settings: SamplingSettings) -> SamplingSettings:
+    refused_settings = profile.get("openai_unsupported_model_settings", ())
+    reasons = _reasons(profile, settings.reasoning_effort)
+    if reasons or "temperature" in refused_settings:
+        settings = replace(settings, temperature=None)
+    if reasons or "top_p" in refused_settings:
+        settings = replace(settings, top_p=None)
     return settings
 
 
@@ -238,11 +288,14 @@ def _reasons(profile: Mapping[str, Any], effort: str | None) -> bool:
 def _request_settings(model: Model, settings: SamplingSettings) -> ModelSettings:
     """The settings as pydantic-ai takes them; what is None is left out."""
     is_openai = isinstance(model, OpenAIChatModel | OpenAIResponsesModel)
+    effort = settings.reasoning_effort
     given: dict[str, Any] = {
         "max_tokens": settings.max_tokens,
         "temperature": settings.temperature,
         "top_p": settings.top_p,
-        "openai_reasoning_effort" if is_openai else "thinking": settings.reasoning_effort,
+        "openai_reasoning_effort" if is_openai else "thinking": False
+        if effort == "none" and not is_openai
+        else effort,
         "extra_body": None if settings.extra_body is None else dict(settings.extra_body),
         "max_retries": 0,
         "timeout": settings.timeout,
@@ -270,15 +323,18 @@ def _model(name: str, settings: SamplingSettings, http_client: object) -> Model:
                         _provider(wanted, settings.base_url, http_client), name, settings
                     ),
                 )
-            if settings.base_url is not None and isinstance(model, OpenAIChatModel):
+            model.profile["thinking_tags"] = NO_TAGS
+            if isinstance(model, OpenAIChatModel) and provider in {"openai", OWN_SERVER, "ollama"}:
                 # Own servers know `max_tokens`, and many of them ignore OpenAI's newer name for it.
-                model.profile["openai_chat_supports_max_completion_tokens"] = OPENAI in settings.base_url
+                host = urlsplit(model.base_url).hostname or ""
+                is_new = host.endswith(NEW_LIMIT) or bool(model.profile.get("openai_supports_reasoning"))
+                model.profile["openai_chat_supports_max_completion_tokens"] = is_new
             return model
     except UserError:
         raise
     except ImportError as error:
         command = INSTALL.search(str(error))
-        mend = f"install it with: {command[0]}" if command else told(error)
+        mend = f"install it with: {command[0]}" if command else error_text(error)
         raise UserError(f"{name} needs a library that is not installed; {mend}") from None
     except Exception as error:  # noqa: BLE001 - each provider's library has errors of its own
         missing = VARIABLE.search(str(error))

@@ -76,6 +76,8 @@ class CompletionsModel:
             return reply_from(failed.sentence, Usage(), latency, None, said="filtered", has_answer=False)
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             raise failure(self.name, f"the server sent invalid JSON ({error})", may_pass=True) from None
+        if chunks.error is not None:
+            raise error_in_reply(self.name, chunks.error)
         if not chunks.is_whole:
             raise broken_off(self.name, begun=bool(text))
         usage = (

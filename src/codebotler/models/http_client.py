@@ -15,14 +15,13 @@ from urllib.request import getproxies, proxy_bypass
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
 from codebotler.models.keys import redacted
-from codebotler.models.server_errors import FIRST_ERROR, error_in_reply, failure, told
+from codebotler.models.server_errors import FIRST_ERROR, error_in_reply, error_text, failure
 
 Client = TypeVar("Client", bound=Any)  # of httpx or httpx2, which share no type
 
 FLOOR = 8_000_000  # bytes
 PER_TOKEN = 4_000  # bytes; a piece of a stream holds much more than its token
 UNKNOWN_TOKENS = 100_000  # for which room is left where no limit is set
-NO_PROXY = ("NO_PROXY", "no_proxy")
 CERTIFICATES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 ENDPOINTS = ("/chat/completions", "/completions", "/responses", "/messages")
 
@@ -112,17 +111,13 @@ def without_proxy(url: str | None) -> Iterator[None]:
     if host is None or not _is_loopback(host):
         yield
         return
-    before = {name: os.environ.get(name) for name in NO_PROXY}
-    hosts = next((value for value in before.values() if value), "")
-    os.environ.update(dict.fromkeys(NO_PROXY, ",".join(filter(None, (hosts, host)))))
+    proxies = {name: value for name, value in os.environ.items() if name.lower().endswith("_proxy")}
+    for name in proxies:
+        del os.environ[name]
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        os.environ.update(proxies)
 
 
 def with_proxy(error: ModelError, url: str | None) -> ModelError:
@@ -142,9 +137,10 @@ def with_proxy(error: ModelError, url: str | None) -> ModelError:
 
 def _is_loopback(host: str) -> bool:
     try:
-        return ipaddress.ip_address(host).is_loopback
+        address = ipaddress.ip_address(host)
     except ValueError:
         return host == "localhost" or host.endswith(".localhost")
+    return address.is_loopback or address.is_unspecified
 
 
 def cannot_open(name: str, error: Exception) -> UserError:
@@ -152,4 +148,4 @@ def cannot_open(name: str, error: Exception) -> UserError:
     for variable in CERTIFICATES:
         if (path := os.environ.get(variable)) and not Path(path).exists():
             return UserError(f"{name} cannot be used: {variable} names {path}, which does not exist")
-    return UserError(f"{name} cannot be used: {told(error)}")
+    return UserError(f"{name} cannot be used: {error_text(error)}")

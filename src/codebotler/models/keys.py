@@ -98,7 +98,7 @@ _REDACTION = _Redaction()
 def guard_logs() -> None:
     """Take keys out of the logs of the libraries that talk to models, and silence their warnings.
 
-    Call it once they are imported. What a model does not take is told by ourselves.
+    Call it once they are imported. Our own notes name the settings that a model does not take.
     """
     warnings.filterwarnings("ignore", module="|".join(LOGGERS))
     known = logging.root.manager.loggerDict

@@ -18,7 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, unheard
 from codebotler.models.keys import guard_logs
 from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
-from codebotler.models.server_errors import failure, told
+from codebotler.models.server_errors import error_text, failure
 from codebotler.prompts import Message, Prompt
 from codebotler.prompts.rendering import task_end
 
@@ -80,7 +80,7 @@ class LocalModel:
             self.tokenizer = transformers.AutoTokenizer.from_pretrained(source, padding_side="left")
             model = transformers.AutoModelForCausalLM.from_pretrained(source, dtype=dtype)
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
-            raise UserError(f"{self.name} cannot be loaded: {told(error)}") from None
+            raise UserError(f"{self.name} cannot be loaded: {error_text(error)}") from None
         self.model = model.to(self.device).eval()
         if self.tokenizer.pad_token_id is None:
             self.tokenizer.pad_token = self.tokenizer.eos_token or self.tokenizer.convert_ids_to_tokens(0)

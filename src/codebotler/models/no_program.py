@@ -23,6 +23,7 @@ IN_WORDS: Mapping[NoProgram, str] = {
 }
 
 _CUT_OFF = {"length", "max_tokens", "max_output_tokens", "max_length", "model_length", "token_limit"}
+_CUT_OFF |= {"model_context_window_exceeded"}
 _BY_REASON: Mapping[str, NoProgram] = {
     **dict.fromkeys(_CUT_OFF, "cut-off"),
     **dict.fromkeys(("tool_call", "tool_calls", "tool_use", "function_call"), "tool-call"),
@@ -31,7 +32,7 @@ _BY_REASON: Mapping[str, NoProgram] = {
     **dict.fromkeys(("content_filter", "content_filtered", "safety", "recitation", "blocklist"), "filtered"),
     **dict.fromkeys(("prohibited_content", "spii", "language", "guardrail_intervened"), "filtered"),
 }
-"""What servers say about the end of a reply, in lower case."""
+"""Reasons for the end of a reply by the words of servers, in lower case."""
 
 
 def is_cut_off(finish_reason: str | None) -> bool:
@@ -62,17 +63,23 @@ def why_no_program(
     Raises:
         EngineError: no isolated process can be started.
     """
-    kind = said or _BY_REASON.get((finish_reason or "").lower())
-    is_open = kind == "cut-off" and reply is not None and _last_line(reply) == _last_line(program)
-    if kind is not None and (is_open or not program.strip() or not _is_whole(program)):
+    by_reason = _BY_REASON.get((finish_reason or "").lower())
+    kind = by_reason if by_reason == "cut-off" else said or by_reason
+    if kind is not None and not (program.strip() and _is_whole(program)):
+        return kind
+    if kind == "cut-off" and reply is not None and _ends_in_code(reply, program):
         return kind
     if has_code or kind is not None:
         return None
     return "no-code" if program.strip() else "empty"
 
 
-def _last_line(text: str) -> str:
-    return composed(text).rstrip().rpartition("\n")[2].strip()
+def _ends_in_code(reply: str, program: str) -> bool:
+    """Whether a reply ends within its program, or within a fence behind it, which holds a better version."""
+    last = program.rstrip().rpartition("\n")[2].strip()
+    _, _, rest = composed(reply).rpartition(last)
+    fences = sum(line.lstrip().startswith(("```", "~~~")) for line in rest.splitlines())
+    return not rest.strip() or (fences > 0 and fences % 2 == 0)
 
 
 def _is_whole(program: str) -> bool:

@@ -9,6 +9,8 @@ import openai
 from openai._streaming import ServerSentEvent, SSEDecoder
 
 Client = TypeVar("Client", bound=openai.AsyncOpenAI)
+ERROR = "error: "
+FAILED = {"abort", "error", "insufficient_system_resource"}  # reasons for the end that are failures
 
 
 class LenientDecoder(SSEDecoder):
@@ -18,6 +20,8 @@ class LenientDecoder(SSEDecoder):
 
     def decode(self, line: str) -> ServerSentEvent | None:
         """The event that a line completes; None if it completes none, or one without data."""
+        if line.startswith(ERROR):  # a field of llama.cpp's, which no standard has
+            line = f'data: {{"error": {line.removeprefix(ERROR)}}}'
         event = super().decode(line)
         if event is None or not event.data:
             return None
@@ -46,12 +50,17 @@ class Chunks:
         self.source = getattr(stream, "source", stream)  # which pydantic-ai closes
         self.usage: Any = None
         self.finish_reason: str | None = None
+        self.error: object = None  # what came in the place of a chunk
+        self._has_choice = False
 
     async def __aiter__(self) -> AsyncIterator[Any]:
         async for chunk in self._stream:
             self.usage = chunk.usage or self.usage
             chunk.usage = None
+            if chunk.choices is None and self.usage is None and chunk.model_extra:
+                self.error = dict(chunk.model_extra)
             for choice in chunk.choices or ():
+                self._has_choice = True
                 if choice.finish_reason is not None:
                     self.finish_reason = self.finish_reason or choice.finish_reason
             yield chunk
@@ -59,4 +68,6 @@ class Chunks:
     @property
     def is_whole(self) -> bool:
         """Whether the server said that the reply has ended, in whatever words."""
+        if not self._has_choice or self.finish_reason in FAILED:
+            return False
         return bool(self.finish_reason) or bool(getattr(self.source._decoder, "is_done", False))  # noqa: SLF001 - no public way

@@ -17,6 +17,12 @@ DEMANDED_MAX_TOKENS = 16_384
 """The limit for a chat reply where one is demanded and the user names none, in tokens."""
 
 
+OURS = frozenset(
+    ("model", "messages", "prompt", "stream", "stream_options", "temperature", "top_p", "seed", "max_tokens")
+) | {"max_completion_tokens", "reasoning_effort"}
+"""Fields of a request that no extra body may have, since they are set and recorded by themselves."""
+
+
 @dataclass(frozen=True)
 class SamplingSettings:
     """The settings of requests; what is None is not sent.
@@ -56,6 +62,8 @@ class SamplingSettings:
             raise UserError(f"the timeout is {self.timeout:g} seconds, but it must be above 0")
         if self.base_url is not None:
             _check_url(self.base_url)
+        for name in OURS.intersection(self.extra_body or ()):
+            raise UserError(f'the extra body has "{name}", which is set by itself; leave it out')
 
     def seed_of(self, number: int) -> int | None:
         """The seed for reply number `number`, counted from 0."""

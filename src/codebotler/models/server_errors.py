@@ -18,11 +18,18 @@ MENDS = {
 }
 NO_CONNECTION = "ConnectError"  # of httpx or httpx2, whichever a provider's library has
 MOST = 300  # characters of what a server says
+FORBIDDEN = 403
 OF_PROMPT = (400, 413, 422)  # the statuses that may be about this one prompt
 FILTER = re.compile(
-    r"content[\s_-]*(?:filter|management|policy)|safety system|data_inspection", re.IGNORECASE
+    r"content[\s_-]*(?:filter|management|policy|exists risk)|safety system|data_inspection|moderation"
+    r"|flagged|usage polic|prohibited_content|敏感内容",
+    re.IGNORECASE,
 )
-MONEY = re.compile(r"\b(?:credit|billing|balance|quota|payment)", re.IGNORECASE)
+ACCOUNT = re.compile(
+    r"\b(?:credit|billing|balance|quota|payment|budget|expired|api[ _-]?key|permission|unauthori[sz]ed)",
+    re.IGNORECASE,
+)
+"""Words of errors about an account rather than a prompt."""
 PASSING = re.compile(r"rate_?limit|overload|unavailable|server_?error|internal|timeout", re.IGNORECASE)
 """Found in the types and codes of errors that may pass."""
 
@@ -32,8 +39,8 @@ def failure(name: str, what: str | Exception, *, may_pass: bool) -> ModelError:
     first: BaseException | None = what if isinstance(what, Exception) else None
     while first and first.__cause__:
         first = first.__cause__
-    cause = "" if first is None or str(first) in str(what) else f" ({told(first)})"
-    return ModelError(f"{name}: {told(what)}{cause}", may_pass=may_pass)
+    cause = "" if first is None or str(first) in str(what) else f" ({error_text(first)})"
+    return ModelError(f"{name}: {error_text(what)}{cause}", may_pass=may_pass)
 
 
 def unreachable(name: str, error: Exception, url: str | None) -> ModelError | None:
@@ -42,7 +49,7 @@ def unreachable(name: str, error: Exception, url: str | None) -> ModelError | No
     if failed is None:
         return None
     mend = "check the network" if url is None else "check that the server runs, and the base URL"
-    sentence = f"{name}: no connection to {url or 'its server'} ({told(failed)}); {mend}"
+    sentence = f"{name}: no connection to {url or 'its server'} ({error_text(failed)}); {mend}"
     return ModelError(sentence, may_pass=True)
 
 
@@ -72,10 +79,10 @@ def refused(
     name: str, status: int, body: object, *, retry_after: float | None = None, hopeless: bool = False
 ) -> ModelError:
     """The error for a status of 400 or more; `hopeless` says that it will not pass, whatever the status."""
-    said = f" ({text})" if (text := told(body)) else ""
+    said = f" ({text})" if (text := error_text(body)) else ""
     sentence = f"{name}: the server answered with status {status}{said}{MENDS.get(status, '')}"
     may_pass = not hopeless and (status >= SERVER_ERROR or status in LATER)
-    is_refusal = not hopeless and status in OF_PROMPT and not MONEY.search(said)
+    is_refusal = not hopeless and status in OF_PROMPT and not ACCOUNT.search(said)
     return ModelError(sentence, may_pass=may_pass, retry_after=retry_after, is_refusal=is_refusal)
 
 
@@ -86,15 +93,15 @@ def error_in_reply(name: str, body: object) -> ModelError:
     if str(code).isdigit() and int(str(code)) > SUCCESS:
         return refused(name, int(str(code)), body)
     may_pass = bool(PASSING.search(f"{code} {said.get('type')}"))
-    return ModelError(f"{name}: the server sent an error: {told(body) or 'no text'}", may_pass=may_pass)
+    return ModelError(f"{name}: the server sent an error: {error_text(body) or 'no text'}", may_pass=may_pass)
 
 
 def is_filtered(status: int | None, body: object) -> bool:
     """Whether a refused request was refused by a filter of contents, by the word of the server."""
-    return status in OF_PROMPT and FILTER.search(str(body)) is not None
+    return status in {*OF_PROMPT, FORBIDDEN} and FILTER.search(str(body)) is not None
 
 
-def told(said: object) -> str:
+def error_text(said: object) -> str:
     """What a server or a library says, in one short line without keys."""
     text = next(_messages(said), None) or ("" if said is None else str(said))
     return brief(redacted(text), MOST).rstrip(".")

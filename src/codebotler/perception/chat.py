@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
-from codebotler.models.server_errors import told
+from codebotler.models.server_errors import error_text
 from codebotler.perception.base import PerceptionError, Sighting, checked_label
 from codebotler.perception.image import jpeg_of
 from codebotler.prompts import Message, PictureMessage, Prompt
@@ -68,7 +68,7 @@ class ChatDetector:
                 fault, said = str(error), reply.text.strip()[:LONGEST_REPLY]
             answer = [Message("assistant", said)] if said else []
             messages = (*messages[:2], *answer, Message("user", AGAIN.format(fault=fault)))
-        last = f"; it replied: {told(said)}" if said else ""
+        last = f"; it replied: {error_text(said)}" if said else ""
         raise PerceptionError(f"{self.name} gave no usable answer in {TRIES} tries: {fault}{last}")
 
     def close(self) -> None:

@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_bytes
-from codebotler.models.server_errors import told
+from codebotler.models.server_errors import error_text
 from codebotler.perception.base import Sighting
 
 FORMATS = ("JPEG", "PNG", "WEBP")
@@ -61,7 +61,7 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
     except Image.DecompressionBombError:
         raise UserError(f"{name} has more than {MAX_PIXELS:,} pixels; use a smaller one") from None
     except Exception as error:  # noqa: BLE001 - decoders fail in many ways
-        raise UserError(f"{name} cannot be read; it is broken or cut off ({told(error)})") from None
+        raise UserError(f"{name} cannot be read; it is broken or cut off ({error_text(error)})") from None
 
 
 def read_image(path: Path) -> Image.Image:

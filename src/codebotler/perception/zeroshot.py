@@ -12,7 +12,7 @@ from PIL.Image import Image
 from codebotler.core.errors import UserError
 from codebotler.models.keys import guard_logs
 from codebotler.models.local import source_of
-from codebotler.models.server_errors import told
+from codebotler.models.server_errors import error_text
 from codebotler.perception.base import PerceptionError, Sighting, checked_label
 
 TASK = "zero-shot-object-detection"
@@ -33,7 +33,9 @@ class ZeroShotDetector:
             device = 0 if torch.cuda.is_available() else "cpu"
             self._pipeline: Any = transformers.pipeline(TASK, model=source, device=device)
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
-            raise UserError(f"{self.name} cannot be loaded as a zero-shot detector: {told(error)}") from None
+            raise UserError(
+                f"{self.name} cannot be loaded as a zero-shot detector: {error_text(error)}"
+            ) from None
         guard_logs()
         if not all(bool(torch.isfinite(weight).all()) for weight in self._pipeline.model.parameters()):
             raise UserError(f"{self.name} has weights that are not numbers, so it would find nothing")
@@ -46,7 +48,7 @@ class ZeroShotDetector:
             # A list, because the pipeline would split a text at its commas.
             places = self._pipeline(image, candidate_labels=[words], threshold=0.0, top_k=1)
         except Exception as error:  # noqa: BLE001 - a model's own code
-            raise PerceptionError(f"{self.name}: {told(error)}") from None
+            raise PerceptionError(f"{self.name}: {error_text(error)}") from None
         if not places:
             return Sighting(found=False, box=None, score=0.0)
         score, box = float(places[0]["score"]), places[0]["box"]

@@ -28,7 +28,8 @@ FENCE = re.compile(
 )
 DEFINITION = re.compile(rf"^\s*(?:async\s+)?def\s+{TASK}\b", re.MULTILINE)
 NEXT_TURN = re.compile(
-    r"(?i)<(?:\|(?:im_)?start|\|start_header_id|start_of_turn)\|?>user\b|<[|\uff5c]user[|\uff5c]>|\[INST\]"
+    r"(?im)<(?:\|(?:im_)?start|\|start_header_id|start_of_turn)\|?>user\b|<[|\uff5c]user[|\uff5c]>|\[INST\]"
+    r"|^(?:user|human):"
 )
 
 Parses: TypeAlias = Callable[[Sequence[str]], bool]

@@ -58,7 +58,7 @@ class Approval(_Form):
     despite_problems: bool = False
 
 
-class Again(_Form):
+class AskAgainForm(_Form):
     """A request for another program."""
 
     repair: bool = Field(
@@ -156,7 +156,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
             return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
-    def ask_again(mission: str, again: Again) -> dict[str, Any]:
+    def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
         """Have the model write another program, which is then checked."""
         session = _at_hand(console, mission)
         with _refusing():

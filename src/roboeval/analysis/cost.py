@@ -15,10 +15,11 @@ from roboeval.evaluation.runs.table import MILLION, Price
 
 
 class Spent(NamedTuple):
-    """What completions took, in all and for each that passes; None where it was not recorded of each."""
+    """What completions took, in all and for each that passes; None where it was recorded of none."""
 
     completions: int
     passed: int
+    uncounted: int  # completions without a count of tokens, such as requests that the server refused
     input_tokens: int | None
     output_tokens: int | None
     seconds: float | None
@@ -33,17 +34,22 @@ def spent(table: pl.DataFrame, price: Price | None = None) -> Spent:
     took = completions_of(table)
     passed = passed_count(prompts_of(task_scores(table)))
     there, back = _tokens(took)
-    seconds = (not took["latency_s"].null_count() and math.fsum(took["latency_s"])) or None
+    seconds = math.fsum(took["latency_s"].drop_nulls()) or None
     tokens = None if there is None or back is None else there + back
     money = None if price is None or there is None or back is None else price.of(there, back)
     each = (_per(total, passed) for total in (tokens, seconds, money))
-    return Spent(took.height, passed, there, back, seconds, money, *each)
+    uncounted = took.height - _counted(took).height
+    return Spent(took.height, passed, uncounted, there, back, seconds, money, *each)
+
+
+def _counted(completions: pl.DataFrame) -> pl.DataFrame:
+    """The tokens of completions of which they were counted."""
+    return completions.select("input_tokens", "output_tokens").drop_nulls()
 
 
 def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
-    counts = completions.select("input_tokens", "output_tokens")
-    there, back = map(int, counts.sum().row(0))
-    return (None, None) if any(counts.null_count().row(0)) or not there + back else (there, back)
+    there, back = map(int, _counted(completions).sum().row(0))
+    return (there, back) if there + back else (None, None)
 
 
 class Budget(NamedTuple):
@@ -59,7 +65,8 @@ class Budget(NamedTuple):
 def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LIMITS) -> Iterator[Budget]:
     """What a budget gives, by limit of retries (paper, section VI); all programs were checked."""
     completions, prompts = completions_of(table), trials_by_prompt(table)
-    means = completions.group_by("task", "prompt").agg(pl.col("input_tokens", "output_tokens").mean())
+    counts = pl.col("input_tokens", "output_tokens").fill_null(0)
+    means = completions.group_by("task", "prompt").agg(counts.mean())
     tokens = {} if None in _tokens(completions) else {row[:2]: row[2:] for row in means.iter_rows()}
     each = [tokens.get((prompt.task, prompt.prompt), (0.0, 0.0)) for prompt in prompts]
     rejected = [rejected_share(prompt.trials) for prompt in prompts]

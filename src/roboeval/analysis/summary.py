@@ -147,7 +147,8 @@ def causes(tally: Tally) -> Causes:
     return Causes(
         {PASSED: tally.passed.total() / tally.judged.total(), **{one.name: one.share for one in found}},
         {one.name: {kind: count / one.count for kind, count in kinds[one.name]} for one in found},
-        {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
+        {(PASSED, ALL): tally.passed.total()}
+        | {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
     )
 
 

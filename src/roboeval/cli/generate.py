@@ -245,14 +245,18 @@ def run(
                 engine=lambda: engine_for(0),
                 complete=lambda run, plan: complete(run, plan, what.open(), what.pace),
             )
-    if not with_report:
-        return
-    folder = path / "report"
+    if with_report:
+        write_report_of(paths, suite, workers)
+
+
+def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
+    """Write the report of a run and its rounds to the folder of the run."""
+    folder = paths[0] / "report"
     try:
         report(paths, folder, suite=suite, workers=workers)
     except KeyboardInterrupt:
-        again = command("report", path, "--out", folder, suite=suite)
-        note(f"roboeval: stopped; verdicts are in {path}; `{again}` writes the report")
+        again = command("report", *paths, "--out", folder, suite=suite)
+        note(f"roboeval: stopped; verdicts are in {paths[0]}; `{again}` writes the report")
         raise SystemExit(STOPPED) from None
 
 

@@ -171,6 +171,7 @@ class _Generation:
     on_progress: Callable[[Progress], None]
     error: ModelError | None = None
     _failures_in_a_row: int = 0
+    _budget: int | None = None  # once it is spent
     _refused: dict[Key, ModelError] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -184,6 +185,8 @@ class _Generation:
                     group.create_task(self._request_each(waiting))
             if self.progress.stopped is None and self.progress.done:
                 self._keep_refused()
+            if self._budget is not None:  # requests that were under way have used more since
+                self.progress.stopped = BudgetSpentError(self._budget, self._paced.spent).sentence
         except BaseExceptionGroup as errors:
             raise errors.exceptions[0] from None
         finally:
@@ -200,7 +203,7 @@ class _Generation:
             reply = await self._paced.reply(self.plan.prompt(key), number=self.plan.sample(key))
             await self._keep(key, reply)
         except BudgetSpentError as error:
-            self.progress.stopped = error.sentence
+            self._budget, self.progress.stopped = error.budget, error.sentence
         except ModelError as error:
             self.log.failed(key)
             self.error = error
@@ -217,7 +220,6 @@ class _Generation:
             raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=True)
         self.file.append(line)
         self.log.kept(key)
-        self._keep_refused()
         try:
             await asyncio.to_thread(self.file.sync)
         finally:  # after an interrupt, too: the file is synced when it is closed

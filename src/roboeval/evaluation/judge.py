@@ -173,7 +173,7 @@ def _of_reply(completion: Completion, told: bytes) -> bytes:
     if not told.startswith(FAILED) or (kind := completion.no_program) is None:
         return told
     judgement = json.loads(told)
-    cause = {**judgement["failure"], "class": NO_PROGRAM, "kind": kind}
+    cause = {"class": NO_PROGRAM, "kind": kind, "world": judgement["failure"]["world"], "check": None}
     return to_line({**judgement, "failure": cause}).removesuffix(b"\n")
 
 

@@ -164,6 +164,16 @@ def _families(suite: Suite) -> dict[str, Any]:
     return {"families": {**asdict(suite.families), "version": suite.version, "digest": suite.digest}}
 
 
+def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
+    """The tasks of which a run.json says that completions were requested; None for all."""
+    requested: set[str] = set()
+    for batch in batches(metadata):
+        if not isinstance(batch.get("tasks"), list):
+            return None
+        requested |= {*batch["tasks"]}
+    return frozenset(requested)
+
+
 def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> None:
     before, now = ({**values, **values["settings"], "settings": None} for values in (earlier, fixed))
     for name, value in now.items():

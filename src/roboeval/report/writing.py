@@ -10,6 +10,7 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.analysis.metrics import overall
+from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
 from roboeval.report import breakdown, cost, failures, house, scores
@@ -39,7 +40,7 @@ HEAD = 4_000  # characters at the beginning of a page, among which is its genera
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     """The title of a page, and the paragraphs below it."""
-    title = runs[0].name if len(runs) == 1 else f"{len(runs)} models"
+    title = runs[0].name if len(runs) == 1 else _models(runs)
     each = [run.coverage for run in runs]
     count = Coverage(
         *(sum(counts) for counts in zip(*((c.judged, c.there, c.total) for c in each), strict=True))
@@ -95,6 +96,11 @@ def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
     return section("glance", Cards(cards), Prose(scores.leader(runs)))
 
 
+def _models(runs: Sequence[JudgedRun]) -> str:
+    models = {run.model for run in runs}
+    return str(runs[0].model) if len(models) == 1 and runs[0].model else f"{len(models)} models"
+
+
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:
     """What was judged, by what, and the command that makes the report again."""
     return section("origin", origin_sheet(runs), Prose(about_suite(runs)), Code(command))
@@ -109,7 +115,10 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         told = None
         if isinstance(settings, dict):
             told = ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
-        asked = (told, about.get("template"), about.get("codebotler"))
+        versions = dict.fromkeys(
+            str(batch["codebotler"]) for batch in batches(about) if "codebotler" in batch
+        )
+        asked = (told, about.get("template"), ", ".join(versions) or None)
         judged = (head.get(name) for name in ("codebotler", "python", "digest"))
         origin = ["not recorded" if value is None else str(value) for value in (*asked, *judged)]
         rows.append([run.name, run.folder, run.completions.height, *origin])

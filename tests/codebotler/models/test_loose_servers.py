@@ -235,7 +235,16 @@ def test_reply_without_a_program_says_why(
     assert (reply.no_program, reply.text) == (kind, text)
 
 
-@pytest.mark.parametrize(("after", "why"), [("```\nIt goes to", None), ("", "cut-off")])
+def test_reply_that_was_cut_off_in_its_thoughts_is_cut_off(server: Server) -> None:
+    streams(server, chunk(CHAT, "<think>I should"), chunk(CHAT, None, "length"), DONE)
+    reply = ask(CHAT, server)
+    assert (reply.no_program, reply.reasoning, reply.text) == ("cut-off", "I should", "<think>I should")
+
+
+@pytest.mark.parametrize(
+    ("after", "why"),
+    [("```\nIt goes to", None), ("", "cut-off"), (f"```\nBetter:\n```python\n{TASK}    say('", "cut-off")],
+)
 def test_cut_off_reply_holds_a_program_if_it_goes_on_behind_it(
     server: Server, after: str, why: str | None
 ) -> None:
@@ -279,6 +288,19 @@ def test_reasoning_is_kept_apart(server: Server, field: str) -> None:
     reply = ask(CHAT, server)
     assert (reply.program, reply.reasoning, reply.text) == (TASK + BODY, thought, TASK + BODY)
     assert reply.usage == Usage(9, 30, 20)
+
+
+def test_reasoning_is_heard_between_marks(server: Server) -> None:
+    streams(server, chunk(CHAT, None, reasoning_content="Hm."), whole(CHAT), chunk(CHAT, None, "stop"), DONE)
+    heard: list[str] = []
+
+    async def asked() -> None:
+        model = open_model(CHAT, SamplingSettings(base_url=server.url))
+        await model.reply(PROMPT, number=0, heard=heard.append)
+        await model.close()
+
+    asyncio.run(asked())
+    assert "".join(heard) == f"<think>\nHm.\n</think>\n{TASK}{BODY}"
 
 
 def test_reasoning_in_tags_is_kept_apart(server: Server) -> None:
@@ -336,3 +358,125 @@ def test_settings_say_what_is_really_sent(
         monkeypatch.setenv(key, "a key of nobody")
     settings = open_model(name, SamplingSettings()).settings
     assert (settings.temperature, settings.top_p, settings.max_tokens) == sent
+
+
+# --- as servers and accounts of today behave
+
+
+def test_thoughts_are_found_wherever_a_stream_cuts_their_tags(server: Server) -> None:
+    pieces = ["<think>", "\nOkay.", "</think>\n\n", f"```python\n{TASK}{BODY}```"]
+    streams(server, *(chunk(CHAT, piece) for piece in pieces), chunk(CHAT, None, "stop"), DONE)
+    reply = ask(CHAT, server)
+    assert (reply.program, reply.no_program, reply.reasoning) == (TASK + BODY, None, "Okay.")
+    assert reply.text == "".join(pieces)
+
+
+@both
+@pytest.mark.parametrize(
+    "event",
+    [
+        'error: {"code": 500, "message": "context shift is disabled"}\n\n',
+        'data: {"error_code": 50001, "message": "context shift is disabled"}\n\n',
+        'data: {"detail": "context shift is disabled"}\n\n',
+    ],
+)
+def test_error_in_the_place_of_a_chunk_is_told_in_the_servers_words(
+    name: str, server: Server, event: str
+) -> None:
+    streams(server, event, DONE)
+    with pytest.raises(ModelError, match="context shift is disabled"):
+        ask(name, server)
+
+
+@both
+def test_reply_that_a_server_gives_up_is_none(name: str, server: Server) -> None:
+    streams(server, whole(name), chunk(name, "", "abort"), DONE)
+    with pytest.raises(ModelError, match="cut off") as caught:
+        ask(name, server)
+    assert caught.value.may_pass
+
+
+@pytest.mark.parametrize(
+    ("status", "said"),
+    [
+        (403, "openai/gpt-4o requires moderation on this provider. Your input was flagged."),
+        (400, "Content Exists Risk"),
+        (400, "Invalid prompt: flagged as potentially violating our usage policy."),
+    ],
+)
+def test_filters_of_providers_are_filters(server: Server, status: int, said: str) -> None:
+    server.sends = lambda _request: (status, dict(JSON), json.dumps({"error": {"message": said}}).encode())
+    assert ask(CHAT, server).no_program == "filtered"
+
+
+@pytest.mark.parametrize("said", ["Budget has been exceeded!", "API key expired. Please renew it."])
+def test_account_that_runs_out_refuses_no_prompt(server: Server, said: str) -> None:
+    server.sends = lambda _request: (400, dict(JSON), json.dumps({"error": {"message": said}}).encode())
+    with pytest.raises(ModelError) as caught:
+        ask(CHAT, server)
+    assert not caught.value.is_refusal
+
+
+def test_gateways_to_reasoning_models_get_the_newer_name_of_the_limit(server: Server) -> None:
+    ask("openai-chat:gpt-5", server, max_tokens=99)
+    body = server.requests[0].body
+    assert (body.get("max_tokens"), body["max_completion_tokens"]) == (None, 99)
+
+
+def test_server_of_the_environment_is_an_own_server(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_BASE_URL", server.url)
+    monkeypatch.setenv("ALL_PROXY", "socks5://127.0.0.1:9")
+
+    async def asked() -> None:
+        model = open_model("openai-chat:some", SamplingSettings(max_tokens=99))
+        await model.reply(PROMPT, number=0)
+        await model.close()
+
+    asyncio.run(asked())
+    assert server.requests[0].body["max_tokens"] == 99
+
+
+@both
+def test_socks_proxy_is_nothing_to_a_server_on_this_machine(
+    name: str, server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ALL_PROXY", "socks5://127.0.0.1:9")
+    assert ask(name, server).program.startswith(TASK)
+
+
+@pytest.mark.parametrize("field", ["temperature", "max_tokens", "stream"])
+def test_extra_body_sets_nothing_that_has_a_setting(field: str) -> None:
+    with pytest.raises(UserError, match=field):
+        SamplingSettings(extra_body={field: 1})
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "sent"),
+    [
+        ("anthropic:claude-sonnet-4-5", {"reasoning_effort": "low"}, (None, None, 32_768, None)),
+        ("anthropic:claude-sonnet-4-5", {"seed": 5}, (0.2, None, 16_384, None)),
+        ("google:gemini-2.5-flash", {"seed": 5}, (0.2, 0.95, None, 5)),
+    ],
+)
+def test_settings_of_providers_with_effort_and_seed(
+    name: str, asked: dict[str, Any], sent: tuple[object, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for key in ("GOOGLE_API_KEY", "ANTHROPIC_API_KEY"):
+        monkeypatch.setenv(key, "a key of nobody")
+    found = open_model(name, SamplingSettings(**asked)).settings
+    assert (found.temperature, found.top_p, found.max_tokens, found.seed) == sent
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("google:gemini-2.5-flash", {"extra_body": {"labels": 1}}),
+        ("google:gemini-2.5-pro", {"reasoning_effort": "most"}),
+    ],
+)
+def test_what_a_provider_does_not_take_is_refused(
+    name: str, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GOOGLE_API_KEY", "a key of nobody")
+    with pytest.raises(UserError, match=name):
+        open_model(name, SamplingSettings(**asked))

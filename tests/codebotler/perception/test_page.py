@@ -44,7 +44,7 @@ def test_limits_are_those_of_the_code() -> None:
         f"at most {LONGEST_SIDE:,} pixels a side",
         f"at most {LONGEST_LABEL} characters",
         f"from a score of {LEAST_SCORE} on",
-        f"max_tokens={LOOKING.max_tokens}, timeout={LOOKING.timeout:g}",
+        f"temperature={LOOKING.temperature:g}, timeout={LOOKING.timeout:g}",
         f"more than {missionpictures.MOST_BYTES // 10**6} MB is left out",
         f"beyond {missionpictures.MOST_IN_ALL // 10**6} MB in one mission",
     ):

@@ -42,11 +42,15 @@ def test_where_nothing_passes_no_pass_costs_anything() -> None:
 
 
 def test_what_was_not_recorded_costs_nothing_known() -> None:
-    assert set(spent(paid(written=lambda *_: {}), Price(1, 1))[2:]) == {None}
-    half = spent(paid(written=lambda _, index: usage(1, 1, 1.0) if index else {}), Price(1, 1))
-    assert set(half[2:]) == {None}
+    nothing = spent(paid(written=lambda *_: {}), Price(1, 1))
+    assert (nothing.uncounted, set(nothing[3:])) == (10, {None})
     zeros = spent(paid(written=lambda *_: usage(0, 0, 0.0)), Price(1, 1))
-    assert set(zeros[2:]) == {None}
+    assert (zeros.uncounted, set(zeros[3:])) == (0, {None})
+
+
+def test_refused_requests_add_nothing_and_are_counted() -> None:
+    half = spent(paid(written=lambda _, index: usage(1, 1, 1.0) if index else {}), Price(1, 1))
+    assert (half.uncounted, half.input_tokens, half.output_tokens, half.seconds) == (1, 9, 9, 9.0)
 
 
 def test_sums_do_not_depend_on_the_order_of_completions() -> None:

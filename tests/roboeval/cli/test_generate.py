@@ -92,6 +92,17 @@ def test_further_tasks_are_generated_and_judged_beside_those_there(tmp_path: Pat
     assert kept == (rows.read_bytes(), verdicts.read_bytes(), (tmp_path / "run" / "run.json").read_bytes())
 
 
+def test_tasks_that_were_requested_since_are_missing_and_not_left_out(tmp_path: Path) -> None:
+    words = ["run", "--num-completions", "2", "--no-report", "--out", "run"]
+    assert roboeval(*words, "--tasks", "LunchTime", cwd=tmp_path).status == 0
+    about = tmp_path / "run" / "run.json"
+    data = json.loads(about.read_text())
+    data["batches"].append({"tasks": ["LunchTime", "SayGoodDay"], "num_completions": 2})  # and it was stopped
+    about.write_text(json.dumps(data))
+    shown = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
+    assert (shown["judged"], shown["to_judge"], shown["requested"]) == (10, 10, 20)
+
+
 def test_a_run_that_cannot_be_judged_is_refused_before_anything_is_paid(tmp_path: Path) -> None:
     words = ["run", "--no-report", "--out", "run", "--tasks", "LunchTime", "--num-completions"]
     assert roboeval(*words, "1", cwd=tmp_path).status == 0
@@ -372,13 +383,13 @@ def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> 
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:4]))
     unseal(tmp_path / "run")
     ended = roboeval("resample", "run", "--json", cwd=tmp_path)
-    assert ended.err.startswith("4 of 10 completions ")
-    assert "`roboeval evaluate run --tasks LunchTime`" in ended.err
+    assert ended.err.startswith("4 of 20 completions ")
+    assert "`roboeval evaluate run --tasks LunchTime,SayGoodDay`" in ended.err
     assert sum(prompt["completions"] for prompt in json.loads(ended.out)["prompts"]) == 4
     completions = tmp_path / "run" / "completions.jsonl"
     changed = [json.loads(line) for line in completions.read_text().splitlines()]
     changed = [row | {"program": row["program"] + "#"} for row in changed]
     completions.write_text("".join(json.dumps(row) + "\n" for row in changed))
     assert refused("resample", "run", cwd=tmp_path).commands == [
-        "roboeval evaluate run --tasks LunchTime --redo"
+        "roboeval evaluate run --tasks LunchTime,SayGoodDay --redo"
     ]

@@ -346,6 +346,12 @@ def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: 
     assert about(run)["usage"] == {"input_tokens": 3000, "output_tokens": 300}
 
 
+def test_spent_budget_counts_the_requests_that_were_under_way(tmp_path: Path, paper: Suite) -> None:
+    pace = Pace(concurrency=4, token_budget=1000)
+    progress = generated(Run(tmp_path / "run"), paper, Scripted(seconds=0.001), pace=pace)
+    assert f"{110 * progress.done:,} tokens were used" in (progress.missing or "")
+
+
 def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
     tmp_path: Path, paper: Suite
 ) -> None:

@@ -284,6 +284,7 @@ def test_reply_without_a_program_fails_by_its_cause(
         assert failed["class"] == why[0]
         assert failed["kind"].startswith(why[1])
         assert failed["world"] == 0
+        assert failed["check"] is None or failed["class"] == "TaskCompletionError"
 
 
 def test_kind_that_does_not_exist_is_refused() -> None:

@@ -38,7 +38,12 @@ def comparison_view(comparison: Comparison, runs: tuple[Compared, Compared]) -> 
         rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), told)
     table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
-        cells = (f"{task.first:.3f}", f"{task.second:.3f}", f"{task.difference:+.3f}", f"{task.share:+.3f}")
+        cells = (
+            f"{task.first:.3f}",
+            f"{task.second:.3f}",
+            f"{task.difference:+.3f}",
+            f"{round(task.share, 9):+.3f}",
+        )
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
     sentence = Text(verdict(comparison, (a, b)), "bold")
     warnings = [

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
+from roboeval.evaluation.requests import requested_tasks
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, add_or_raise, read_lines_of
@@ -40,8 +41,11 @@ class RunEvaluation:
 
     @property
     def tasks(self) -> frozenset[str] | None:
-        """The tasks that were selected; None for all."""
-        return selected_tasks(self.head)
+        """The tasks that were selected, and those that were requested since; None for all."""
+        selected, requested = selected_tasks(self.head), requested_tasks(self.about)
+        if self.is_ablated or selected is None:
+            return selected
+        return None if requested is None else selected | requested
 
     @property
     def scope(self) -> Scope:
