@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.table import RosAction, SkillTable
 from codebotler.robots.base import (
     ROS_PYTHON,
     Argument,
@@ -25,6 +24,7 @@ from codebotler.robots.base import (
     no_feedback,
 )
 from codebotler.robots.clock import Clock
+from codebotler.robots.ros.connection import Call, Connection, Values, connection_of, reason
 from codebotler.robots.ros.worker import Message, RosWorker, lacks
 
 OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
@@ -75,7 +75,9 @@ class RosRobot:
         waits: Waits | None = None,
         node: str = "codebotler",
     ) -> None:
-        self.name, self.address, self.skills = name, address, options.skills
+        self.connection = options.connection or connection_of(options.skills)
+        self.name, self.address = name, address
+        self.skills = options.skills if options.connection is None else self.connection.skills(options.skills)
         self.clock = Clock(options.speed)
         self.missing: Mapping[str, str] = {}
         self._script, self._python, self._environment = script, options.ros_python, environment
@@ -96,9 +98,9 @@ class RosRobot:
         self.disconnect()
         worker = self._start(cancel_all=self._in_doubt)
         self.missing = worker.about["missing"]
-        if self.missing and self.missing.keys() == actions_of(self.skills).keys():
+        if self.missing and self.missing.keys() == self.connection.calls.keys():
             worker.leave()
-            raise NotReadyError(f"the robot has no action servers: {next(iter(self.missing.values()))}")
+            raise NotReadyError(f"the robot offers nothing: {next(iter(self.missing.values()))}")
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
@@ -110,17 +112,21 @@ class RosRobot:
             CancelledError: it was cancelled, by us or by another client.
             RobotLostError: the server or the worker died, or does not answer.
         """
-        action = self.skills[skill].ros
-        if action is None:
+        names = (parameter.name for parameter in self.skills[skill].parameters)
+        return self._called(skill, dict(zip(names, arguments, strict=True)), feedback)
+
+    def _called(self, skill: str, values: Values, feedback: Feedback) -> Result:
+        """Perform a skill by its call, with values for the variables of that."""
+        call = self.connection.calls.get(skill)
+        if call is None:
             raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
-        with self._order:
-            if self._stopped:
-                raise CancelledError
-            assert self._worker is not None, "the robot is not connected"
-            worker = self._worker
-            self._number += 1
-            number = self._number
-            worker.send({"do": "perform", "id": number, "skill": skill, "arguments": arguments})
+        return self._result(
+            call, self._awaited({"do": "perform", "skill": skill, "fields": call.fields(values)}, feedback)
+        )
+
+    def _awaited(self, order: Message, feedback: Feedback) -> Message:
+        """Send an order, and return the worker's last message about it."""
+        worker, number = self._sent(order)
         while True:
             match worker.receive(self._waits.patience * 2):
                 case None:
@@ -137,8 +143,20 @@ class RosRobot:
                     feedback(text)
                 case {"id": int(goal), "is": "picture", "data": str(data)} if goal == number:
                     feedback(Picture(base64.b64decode(data)))
+                case {"is": "pose", "x": float(x), "y": float(y)}:
+                    feedback(f"at ({x:.2f}, {y:.2f})")
                 case {"id": int(goal)} as message if goal == number:
-                    return self._result(action, message)
+                    return message
+
+    def _sent(self, order: Message) -> tuple[RosWorker, int]:
+        """Send an order, unless the robot was stopped; to which worker, and its number."""
+        with self._order:
+            if self._stopped:
+                raise CancelledError
+            assert self._worker is not None, "the robot is not connected"
+            self._number += 1
+            self._worker.send({**order, "id": self._number})
+            return self._worker, self._number
 
     def cancel(self) -> None:
         """Have the worker cancel the goal; if it hangs, have another one cancel all goals."""
@@ -167,7 +185,8 @@ class RosRobot:
         start = {
             "address": self.address,
             "node": self._node,
-            "actions": actions_of(self.skills),
+            "calls": calls_data(self.connection),
+            "packages": self.connection.packages,
             "cancel_all": cancel_all,
             "patience": self._waits.patience,
             "silence": self._waits.silence,
@@ -175,13 +194,13 @@ class RosRobot:
         }
         return RosWorker(self._python, self._script, start, self._environment)
 
-    def _result(self, action: RosAction, message: Message) -> Result:
+    def _result(self, call: Call, message: Message) -> Result:
         match message:
-            case {"is": "result", "value": value}:
-                result: Result = value  # a mission looks whether it fits the skill
+            case {"is": "result", "values": dict(values)}:
+                result: Result = call.answer(values)
                 return result
             case {"is": "error", "text": str(text), "state": str(state)}:
-                raise error_of(action, text, state)
+                raise error_of(call, text or reason(message.get("values", {})), state)
             case {"is": "cancelled"}:
                 raise CancelledError
         self._in_doubt = self._in_doubt or message["is"] == "lost"
@@ -218,16 +237,15 @@ def ros_readiness(
     return Readiness(name, works=True, note=note)
 
 
-def actions_of(skills: SkillTable) -> Message:
-    """Type, server and definition of the action of each skill that has one, as a worker reads them."""
+def calls_data(connection: Connection) -> Message:
+    """What a worker must know of the calls of a connection, by skill."""
     return {
-        skill.name: {"type": ros.full_type, "server": ros.server, "definition": ros.definition}
-        for skill in skills.rows
-        if (ros := skill.ros) is not None
+        skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
+        for skill, call in connection.calls.items()
     }
 
 
-def error_of(action: RosAction, text: str, state: str) -> RobotError:
+def error_of(call: Call, text: str, state: str) -> RobotError:
     """The error of a goal that was rejected or aborted (`state`), in the server's words.
 
     They may begin with the kind, as in `PickInvalidObject: there is no mug`.
@@ -235,5 +253,4 @@ def error_of(action: RosAction, text: str, state: str) -> RobotError:
     named = NAMED_ERROR.fullmatch(text)
     if named is not None:
         return RobotError(named[1], named[2])
-    kind = action.failure or f"{action.type}Failed"
-    return RobotError(kind, text or f"{action.server} {state} the goal without a reason")
+    return RobotError(call.failure, text or f"{call.name} {state} the goal without a reason")
