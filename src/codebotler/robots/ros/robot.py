@@ -186,7 +186,7 @@ class RosRobot:
             "address": self.address,
             "node": self._node,
             "calls": calls_data(self.connection),
-            "packages": self.connection.packages,
+            **reports_data(self.connection),
             "cancel_all": cancel_all,
             "patience": self._waits.patience,
             "silence": self._waits.silence,
@@ -242,6 +242,16 @@ def calls_data(connection: Connection) -> Message:
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()
+    }
+
+
+def reports_data(connection: Connection) -> Message:
+    """What a worker must listen to besides."""
+    return {
+        "packages": connection.packages,
+        "pose": connection.pose and vars(connection.pose),
+        "velocity": connection.velocity and vars(connection.velocity),
+        "cameras": sorted({topic for topic, _ in connection.cameras.values()}),
     }
 
 

@@ -40,8 +40,9 @@ class Goal:
 class SkillWorker:
     """Performs skills, one at a time; `connect` and `send` belong to one kind of robot.
 
-    The first line has the `address`, the `node`, the `actions` by skill, whether to `cancel_all` goals, and
-    the seconds to wait: `patience`, `silence` and `longest`.
+    The first line has the `address`, the `node`, the `calls` by skill, folders of `packages`, the topics of
+    the `pose`, the `velocity` and the `cameras`, whether to `cancel_all` goals, and the seconds to wait:
+    `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -55,6 +56,7 @@ class SkillWorker:
         self.silence: float = start["silence"]
         self.longest: float = start["longest"]
         self.goal: Goal | None = None
+        self.cameras: dict[str, Any] = {}
         left_behind = self.connect(start)
         missing = self.missing()
         if self.graph.is_left():
@@ -67,17 +69,17 @@ class SkillWorker:
         """Set `graph` and `servers`; whether an earlier worker died without leaving."""
         raise NotImplementedError
 
-    def send(self, goal: Goal, arguments: list[Any]) -> None:
+    def send(self, goal: Goal, fields: Message) -> None:
         """Send a goal, whose lock is held."""
         raise NotImplementedError
 
-    def start(self, goal: Goal, arguments: list[Any]) -> None:
+    def start(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless it is cancelled."""
         with goal.lock:
             if goal.cancelled is not None:
                 self.end(goal, "cancelled")
             else:
-                self.send(goal, arguments)
+                self.send(goal, fields)
 
     def obey(self, line: Message) -> None:
         """Perform or cancel a skill."""
@@ -85,11 +87,14 @@ class SkillWorker:
             server = self.servers[line["skill"]]
             self.goal = goal = Goal(line["id"], server)
             if server.is_connected(self.silence):
-                self.start(goal, line["arguments"])
+                self.start(goal, line["fields"])
             else:
                 threading.Thread(
-                    target=self._wait_and_send, args=(goal, line["arguments"]), daemon=True
+                    target=self._wait_and_send, args=(goal, line["fields"]), daemon=True
                 ).start()
+        elif line["do"] == "look":
+            picture = self.cameras[line["topic"]].look(line["oldest"])
+            self.channel.send("result", id=line["id"], values=picture)
         elif line["do"] == "cancel":
             if self.goal is not None:
                 self.goal.cancel()
@@ -154,11 +159,11 @@ class SkillWorker:
         if text and not goal.is_over:
             self.channel.send("feedback", id=goal.number, text=text)
 
-    def _wait_and_send(self, goal: Goal, arguments: list[Any]) -> None:
+    def _wait_and_send(self, goal: Goal, fields: Message) -> None:
         until = time.monotonic() + self.patience + self.settles
         while time.monotonic() < until and not self.graph.is_left():
             if goal.cancelled is not None or goal.server.is_connected(self.silence):
-                self.start(goal, arguments)
+                self.start(goal, fields)
                 return
             time.sleep(0.005)
         why = self.graph.why_missing(goal.server.name, goal.server.type)
