@@ -86,6 +86,13 @@ class Ros1Graph:
         _, subscribers, _ = self._master.getSystemState()
         return [node for topic, names in subscribers if topic == server + "/goal" for node in names]
 
+    def has_service(self, name: str) -> bool:
+        """Whether a service is registered."""
+        try:
+            return bool(self._master.lookupService(name))
+        except self._rosgraph.MasterException:
+            return False
+
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with an action server."""
         if not self.is_online():
@@ -94,7 +101,7 @@ class Ros1Graph:
             return f"the ROS master at {self.uri} was restarted; connect again"
         nodes = self.nodes_of(server)
         if not nodes:
-            return f"there is no action server at {server}; start it"
+            return f"nothing offers {server}; start it"
         address = self.address_of(nodes[0])
         if address is None or not is_alive(address):
             return f"the action server at {server} (node {nodes[0]}) has died; start it again"
