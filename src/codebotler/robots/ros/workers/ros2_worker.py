@@ -9,7 +9,7 @@ from typing import Any
 from channel import Message, serve
 from goals import TICK, Goal, SkillWorker
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, as_in, fields_of, plain
+from ros2_types import action_types, as_data, fields_of, fill
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
 REJECTED = 1  # of action_msgs/srv/CancelGoal
@@ -126,9 +126,7 @@ class Ros2Worker(SkillWorker):
 
     def send(self, goal: Goal, arguments: list[Any]) -> None:
         """Have the executor's thread send a goal: elsewhere, rclpy can lose the answer."""
-        message = goal.server.spec.Goal()
-        for field, value in zip(goal.server.fields, arguments):
-            setattr(message, field, as_in(getattr(message, field), value))
+        message = fill(goal.server.spec.Goal(), dict(zip(goal.server.fields, arguments)))
         goal.handle = Ros2Goal()
         goal.sent = time.monotonic()
         goal.stop = lambda: self.graph.soon(self._cancel, goal)
@@ -207,7 +205,7 @@ class Ros2Worker(SkillWorker):
             self.end(goal, "cancelled")
         elif response.status == SUCCEEDED:
             values = [getattr(response.result, field) for field in goal.server.returns]
-            self.end(goal, "result", value=plain(values[0]) if values else None)
+            self.end(goal, "result", value=as_data(values[0]) if values else None)
         elif response.status == ABORTED:
             self.end(goal, "error", state="aborted", text="")
         else:
@@ -216,7 +214,7 @@ class Ros2Worker(SkillWorker):
             )
 
     def _feedback(self, goal: Goal, feedback: Any) -> None:
-        self.pass_on(goal, {name: getattr(feedback, name) for name in feedback.get_fields_and_field_types()})
+        self.pass_on(goal, as_data(feedback))
 
 
 if __name__ == "__main__":
