@@ -224,6 +224,22 @@ class RosRobot:
             return "another worker has cancelled all goals"
 
 
+def ros_robot(
+    name: str,
+    address: str,
+    script: str,
+    options: Options,
+    environment: Mapping[str, str],
+    waits: Waits | None,
+) -> RosRobot:
+    """A robot with the arguments of `RosRobot`; where the options have a connection, that is what it offers."""
+    if options.connection is None:
+        return RosRobot(name, address, script, options, environment, waits=waits)
+    from codebotler.robots.ros.connected import ConnectedRobot  # noqa: PLC0415 - needs much more
+
+    return ConnectedRobot(name, address, script, options, environment, waits=waits)
+
+
 def ros_readiness(
     name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
 ) -> Readiness:
