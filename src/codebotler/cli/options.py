@@ -135,7 +135,7 @@ def connected(file: Path | None, robot: str, skills: SkillTable) -> tuple[str, C
     """The kind of robot, and what it offers where a file says that."""
     if file is None:
         return robot, None
-    from codebotler.robots.ros.connection import read_connection
+    from codebotler.robots.ros.connection_file import read_connection
 
     connection = read_connection(file, skills)
     return connection.robot if robot == "sim" else robot, connection

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import cmath
 import itertools
-import itertools
 import math
-import re
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

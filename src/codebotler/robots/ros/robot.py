@@ -224,20 +224,13 @@ class RosRobot:
             return "another worker has cancelled all goals"
 
 
-def ros_robot(
-    name: str,
-    address: str,
-    script: str,
-    options: Options,
-    environment: Mapping[str, str],
-    waits: Waits | None,
-) -> RosRobot:
-    """A robot with the arguments of `RosRobot`; where the options have a connection, that is what it offers."""
+def class_for(options: Options) -> type[RosRobot]:
+    """The class of a robot that offers an action for each skill, or what the options' connection says."""
     if options.connection is None:
-        return RosRobot(name, address, script, options, environment, waits=waits)
+        return RosRobot
     from codebotler.robots.ros.connected import ConnectedRobot  # noqa: PLC0415 - needs much more
 
-    return ConnectedRobot(name, address, script, options, environment, waits=waits)
+    return ConnectedRobot
 
 
 def ros_readiness(

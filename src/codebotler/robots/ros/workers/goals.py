@@ -89,9 +89,7 @@ class SkillWorker:
             if server.is_connected(self.silence):
                 self.start(goal, line["fields"])
             else:
-                threading.Thread(
-                    target=self._wait_and_send, args=(goal, line["fields"]), daemon=True
-                ).start()
+                threading.Thread(target=self._wait_and_send, args=(goal, line["fields"]), daemon=True).start()
         elif line["do"] == "look":
             picture = self.cameras[line["topic"]].look(line["oldest"])
             self.channel.send("result", id=line["id"], values=picture)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any, Dict, Tuple
+from typing import Any
 
 from channel import Channel, Message
 
 EVERY = 0.05  # seconds between two poses, or velocities, that the tool is told
-Turn = Tuple[float, float, float]  # x, y and yaw of a frame in another
+Turn = tuple[float, float, float]  # x, y and yaw of a frame in another
 
 
 class MotionReports:
@@ -21,7 +21,7 @@ class MotionReports:
 
     def __init__(self, channel: Channel, frames: list[str] | None) -> None:
         self._channel, self._frames = channel, frames
-        self._links: Dict[str, tuple[str, Turn]] = {}  # of each frame its parent, and how it lies in that
+        self._links: dict[str, tuple[str, Turn]] = {}  # of each frame its parent, and how it lies in that
         self._told = {"pose": 0.0, "velocity": 0.0}
 
     def hear_pose(self, message: Message) -> None:

@@ -113,7 +113,9 @@ class Ros2Graph:
                 raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
             time.sleep(0.05)
         kind, durability = publishers[0].topic_type, publishers[0].qos_profile.durability
-        is_kept = durability == DurabilityPolicy.TRANSIENT_LOCAL  # the last message is sent to who comes later
+        is_kept = (
+            durability == DurabilityPolicy.TRANSIENT_LOCAL
+        )  # the last message is sent to who comes later
         qos = QoSProfile(
             depth=10,
             reliability=ReliabilityPolicy.BEST_EFFORT,

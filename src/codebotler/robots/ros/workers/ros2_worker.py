@@ -10,8 +10,8 @@ from typing import Any
 
 from channel import Message, SetupError, serve
 from goals import TICK, Goal, SkillWorker
-from ros2_graph import Ros2Graph
 from reports import MotionReports
+from ros2_graph import Ros2Graph
 from ros2_types import action_types, as_data, fill, message_types
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus

@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 
 from channel import Message
-from rosbridge_protocol import ActionProtocol, GoalUpdate, Ros1Protocol, Ros2Protocol
+from rosbridge_protocol import ActionProtocol, GoalUpdate, Ros1Protocol, Ros2Protocol, service_updates
 
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell its version of ROS; one without rosapi cannot
@@ -115,15 +115,11 @@ class Connection:
                 self._version.put(ros)
             case {"op": "service_response", "id": "version"}:
                 self._version.put(1)
-            case {"op": "service_response", "id": str(goal), "result": True, "values": dict(values)}:
-                self._hear(GoalUpdate(goal, "ended", "succeeded", values=values))
-            case {"op": "service_response", "id": str(goal), "values": why}:
-                self._hear(GoalUpdate(goal, "ended", "aborted", text=str(why)))
             case {"op": "publish", "topic": str(topic), "msg": dict(told)} if topic in self._listeners:
                 self._listeners[topic](told)
             case {"op": "status", "level": "error", "msg": str(complaint)}:
                 self.complaint = complaint
-        for update in self.protocol.updates(message):
+        for update in (*self.protocol.updates(message), *service_updates(message)):
             if update.goal:
                 self._hear(update)
             elif update.server:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 import uuid
-from typing import Any
 
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
-from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
 from reports import MotionReports
+from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
 from rosbridge_protocol import GoalUpdate
 
 AGAIN = 0.5  # seconds after which a message without any effect is sent again
@@ -69,7 +68,6 @@ class RosbridgeWorker(SkillWorker):
                 self.graph.listen(pose["topic"] + "_static", reports.hear_pose)
         if velocity is not None:
             self.graph.listen(velocity["topic"], reports.hear_velocity)
-        self.cameras = {topic: RosbridgeCamera(self.graph, topic) for topic in start["cameras"]}
         self._message: Message = {}
         self._again = 0.0
         return False
