@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -136,6 +138,31 @@ def laid_out(world: World) -> World:
         )
         rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
     return replace(world, rooms=tuple(rooms))
+
+
+_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
+
+
+def is_within(point: Point, corners: Sequence[Point]) -> bool:
+    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
+    x, y = point
+    odd = False
+    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
+    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
+            return True
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            odd = not odd
+    return odd
+
+
+def _distance(point: Point, start: Point, end: Point) -> float:
+    """How far a point is from a line between two others."""
+    (x, y), (x1, y1), (x2, y2) = point, start, end
+    dx, dy = x2 - x1, y2 - y1
+    square = dx * dx + dy * dy
+    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
+    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
 def _person_data(person: Person) -> dict[str, object]:
