@@ -13,6 +13,7 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.robots.places import Places, read_places
 from codebotler.robots.ros.connection import OF_PLACE, Call, Connection, Watched, variables_in
 
+
 def _as_topic(text: str) -> str:
     if not re.fullmatch(r"~?/?\w+(/\w+)*", text):
         raise ValueError("must be a name of ROS, such as /navigate_to_pose")
@@ -163,5 +164,3 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
             raise file.wrong(f"${variable} is unknown here{lacks}; known are: {given}", *at, SENT[kind])
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     return Call(kind, name, form.type, request, "", form.result, form.success, failure)  # type: ignore[arg-type]
-
-
