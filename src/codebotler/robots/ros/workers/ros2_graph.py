@@ -118,7 +118,7 @@ class Ros2Graph:
         )  # the last message is sent to who comes later
         qos = QoSProfile(
             depth=10,
-            reliability=ReliabilityPolicy.BEST_EFFORT,
+            reliability=ReliabilityPolicy.RELIABLE if is_kept else ReliabilityPolicy.BEST_EFFORT,
             durability=durability if is_kept else DurabilityPolicy.VOLATILE,
         )
         spec = message_types([kind], map(Path, packages))[kind]
