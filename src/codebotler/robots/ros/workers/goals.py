@@ -12,6 +12,7 @@ from channel import Channel, Message, SetupError
 TICK = 0.1  # seconds between two rounds of the watchdog
 ALIVE = 1.0  # seconds between two signs of life
 TOOL_SILENCE = 0.7  # seconds without a sign of life of the tool, after which the robot is stopped
+TELLS_AGAIN = 0.25  # seconds between two feedbacks that are passed on
 LAST_WORDS = 1.0  # seconds for a cancelled goal to end when the worker does
 
 
@@ -27,6 +28,7 @@ class Goal:
         self.is_acknowledged = self.is_over = False
         self.status_ended: float | None = None  # since then only the result is missing
         self.cancelled: float | None = None
+        self.told = 0.0  # when its last feedback was passed on
         self.ended, self.seen = threading.Event(), threading.Event()
 
     def cancel(self) -> None:
@@ -152,9 +154,12 @@ class SkillWorker:
         goal.ended.set()
 
     def pass_on(self, goal: Goal, feedback: dict[str, Any]) -> None:
-        """Report the fields of a feedback."""
-        text = ", ".join(f"{name}: {value}" for name, value in feedback.items())
-        if text and not goal.is_over:
+        """Report the fields of a feedback that hold a text or a number, but not more often than is of use."""
+        plain = {name: value for name, value in feedback.items() if not isinstance(value, (dict, list))}
+        text = ", ".join(f"{name}: {value}" for name, value in plain.items())
+        now = time.monotonic()
+        if text and not goal.is_over and now - goal.told > TELLS_AGAIN:
+            goal.told = now
             self.channel.send("feedback", id=goal.number, text=text)
 
     def _wait_and_send(self, goal: Goal, fields: Message) -> None:

@@ -19,6 +19,7 @@ from ros2_types import as_data, message_types
 DISCOVERY = 1.0  # seconds after which a node knows most others
 ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
 LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
+OFFERS = {"action": "action server", "srv": "service", "msg": "subscriber"}
 TAKEN = "another codebotler is using this robot (the node {}); stop it first"
 
 
@@ -76,10 +77,11 @@ class Ros2Graph:
         return f"the node {self.node} was shut down; connect again"
 
     def why_missing(self, server: str, type_name: str) -> str:
-        """Why there is no connection with an action server."""
-        kind = "/action/".join(parts_of(type_name))
+        """Why there is no connection with what a robot offers."""
+        whole = type_name if type_name.count("/") > 1 else "/action/".join(parts_of(type_name))
+        what = OFFERS[whole.split("/")[1]]
         return (
-            f"there is no action server of {kind} at {server}; start it, or compare "
+            f"there is no {what} of {whole} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
