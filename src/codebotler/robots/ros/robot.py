@@ -25,6 +25,7 @@ from codebotler.robots.base import (
     no_feedback,
 )
 from codebotler.robots.clock import Clock
+from codebotler.robots.reservation import file_of
 from codebotler.robots.ros.worker import Message, RosWorker, lacks
 
 OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
@@ -169,6 +170,7 @@ class RosRobot:
             "node": self._node,
             "actions": actions_of(self.skills),
             "cancel_all": cancel_all,
+            "sign": str(file_of(self.name, self.address, f"{self._node}.goal")),
             "patience": self._waits.patience,
             "silence": self._waits.silence,
             "longest": self._waits.longest,

@@ -14,7 +14,7 @@ from codebotler.robots.base import ROS_PYTHON, Options, Readiness
 from codebotler.robots.ros.robot import RosRobot, Waits, ros_readiness
 from codebotler.robots.ros.worker import lacks
 
-NEEDS = ("rclpy", "action_msgs")
+NEEDS = ("rclpy", "action_msgs", "sensor_msgs")
 INSTALL = "pip install 'codebotler[ros2]'"
 
 
@@ -22,7 +22,9 @@ def robot(options: Options, waits: Waits | None = None) -> RosRobot:
     """A robot on ROS 2; its address is a domain, by default that of ROS_DOMAIN_ID, or 0."""
     domain = domain_of(options.address)
     options = replace(options, ros_python=python_of(options.ros_python))
-    return RosRobot("ros2", domain, "ros2_worker.py", options, {"ROS_DOMAIN_ID": domain}, waits=waits)
+    # rclpy says what is wrong with the value of a field, if it is asked to look.
+    environment = {"ROS_DOMAIN_ID": domain, "ROS_PYTHON_CHECK_FIELDS": "1"}
+    return RosRobot("ros2", domain, "ros2_worker.py", options, environment, waits=waits)
 
 
 def domain_of(address: str = "") -> str:

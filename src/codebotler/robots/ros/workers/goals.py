@@ -5,14 +5,18 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from channel import Channel, Message, SetupError
+from message_types import in_base64
 
 TICK = 0.1  # seconds between two rounds of the watchdog
 ALIVE = 1.0  # seconds between two signs of life
 TOOL_SILENCE = 0.7  # seconds without a sign of life of the tool, after which the robot is stopped
 LAST_WORDS = 1.0  # seconds for a cancelled goal to end when the worker does
+LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
+LARGEST_PICTURE = 2_000_000  # bytes
 
 
 class Goal:
@@ -40,8 +44,9 @@ class Goal:
 class SkillWorker:
     """Performs skills, one at a time; `connect` and `send` belong to one kind of robot.
 
-    The first line has the `address`, the `node`, the `actions` by skill, whether to `cancel_all` goals, and
-    the seconds to wait: `patience`, `silence` and `longest`.
+    The first line has the `address`, the `node`, the `actions` by skill, whether to `cancel_all` goals, the
+    `sign`, a file that is there while a goal may go on, and the seconds to wait: `patience`, `silence` and
+    `longest`.
     """
 
     graph: Any
@@ -55,11 +60,14 @@ class SkillWorker:
         self.silence: float = start["silence"]
         self.longest: float = start["longest"]
         self.goal: Goal | None = None
-        left_behind = self.connect(start)
+        self._sign = Path(start["sign"])
+        left_behind = self.connect(start) or self._sign.exists()
         missing = self.missing()
         if self.graph.is_left():
             raise SetupError(self.graph.why_left())
         cancelled_all = (left_behind or start["cancel_all"]) and self.cancel_all()
+        if cancelled_all:
+            self._sign.unlink(missing_ok=True)
         threading.Thread(target=self._watch, daemon=True).start()
         self.channel.send("ready", missing=missing, cancelled_all=cancelled_all)
 
@@ -77,6 +85,7 @@ class SkillWorker:
             if goal.cancelled is not None:
                 self.end(goal, "cancelled")
             else:
+                self._sign.touch()
                 self.send(goal, arguments)
 
     def obey(self, line: Message) -> None:
@@ -145,6 +154,8 @@ class SkillWorker:
             goal.is_over = True
         if what == "lost":
             goal.cancel()
+        else:
+            self._sign.unlink(missing_ok=True)
         self.channel.send(what, id=goal.number, **more)
         goal.ended.set()
 
@@ -153,6 +164,30 @@ class SkillWorker:
         text = ", ".join(f"{name}: {value}" for name, value in feedback.items())
         if text and not goal.is_over:
             self.channel.send("feedback", id=goal.number, text=text)
+
+    def see(self, server: Any, data: Any) -> None:
+        """Pass on a picture that a server shows while its goal goes on."""
+        goal = self.goal
+        if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
+            return
+        if len(data) > LARGEST_PICTURE:
+            text = f"a picture of {len(data):,} bytes was left out; the limit is {LARGEST_PICTURE:,} bytes"
+            self.channel.send("feedback", id=goal.number, text=text)
+        else:
+            self.channel.send("picture", id=goal.number, data=in_base64(data))
+        goal.seen.set()
+
+    def succeed(self, goal: Goal, value: Any) -> None:
+        """End a goal, with its picture, which may come a moment after the result."""
+        if goal.seen.is_set() or not goal.server.shows_pictures():
+            self.end(goal, "result", value=value)
+            return
+
+        def wait() -> None:
+            goal.seen.wait(LAST_PICTURE)
+            self.end(goal, "result", value=value)
+
+        threading.Thread(target=wait, daemon=True).start()
 
     def _wait_and_send(self, goal: Goal, arguments: list[Any]) -> None:
         until = time.monotonic() + self.patience + self.settles

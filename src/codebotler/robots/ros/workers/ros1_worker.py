@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -11,11 +10,9 @@ from typing import Any
 from channel import Message, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
-from message_types import BUFFER, COMPRESSED, in_base64, message_types, picture_types
+from message_types import BUFFER, COMPRESSED, message_types, picture_types
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
-LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
-LARGEST_PICTURE = 2_000_000  # bytes
 
 
 class Ros1Server:
@@ -87,7 +84,7 @@ class Ros1Worker(SkillWorker):
         rospy.on_shutdown(self.stop)
         specs = message_types(list(actions.values()))
         self.servers = {
-            skill: Ros1Server(action, specs[action["type"]], self._see) for skill, action in actions.items()
+            skill: Ros1Server(action, specs[action["type"]], self.see) for skill, action in actions.items()
         }
         return left_behind
 
@@ -126,36 +123,12 @@ class Ros1Worker(SkillWorker):
         elif goal.cancelled is not None:
             self.end(goal, "cancelled")
         elif terminal == TerminalState.SUCCEEDED:
-            self._succeed(goal, next(iter(_fields(handle.get_result()).values()), None))
+            self.succeed(goal, next(iter(_fields(handle.get_result()).values()), None))
         elif terminal in (TerminalState.ABORTED, TerminalState.REJECTED):
             state_name = "rejected" if terminal == TerminalState.REJECTED else "aborted"
             self.end(goal, "error", state=state_name, text=handle.get_goal_status_text())
         else:
             self.end(goal, "cancelled")
-
-    def _see(self, server: Ros1Server, data: Any) -> None:
-        """Pass on a picture that a server shows while its goal goes on."""
-        goal = self.goal
-        if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
-            return
-        if len(data) > LARGEST_PICTURE:
-            text = f"a picture of {len(data):,} bytes was left out; the limit is {LARGEST_PICTURE:,} bytes"
-            self.channel.send("feedback", id=goal.number, text=text)
-        else:
-            self.channel.send("picture", id=goal.number, data=in_base64(data))
-        goal.seen.set()
-
-    def _succeed(self, goal: Goal, value: Any) -> None:
-        """End a goal, with its picture, which may come a moment after the result."""
-        if goal.seen.is_set() or not goal.server.shows_pictures():
-            self.end(goal, "result", value=value)
-            return
-
-        def wait() -> None:
-            goal.seen.wait(LAST_PICTURE)
-            self.end(goal, "result", value=value)
-
-        threading.Thread(target=wait, daemon=True).start()
 
 
 def _fields(message: Any) -> dict[str, Any]:

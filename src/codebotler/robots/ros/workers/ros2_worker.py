@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import uuid
+from collections.abc import Callable
 from typing import Any
 
 from channel import Message, serve
@@ -30,9 +31,10 @@ class Ros2Goal:
 class Ros2Server:
     """The action server of one skill, seen from a client."""
 
-    def __init__(self, graph: Ros2Graph, action: Message, spec: Any) -> None:
+    def __init__(self, graph: Ros2Graph, action: Message, spec: Any, see: Callable[[Any, Any], None]) -> None:
         import rclpy.action
         from action_msgs.srv import CancelGoal
+        from sensor_msgs.msg import CompressedImage
 
         self.name: str = action["server"]
         self.type: str = action["type"]
@@ -41,6 +43,9 @@ class Ros2Server:
         self.client = rclpy.action.ActionClient(graph.ours, spec, self.name)
         self._graph, self._request = graph, CancelGoal.Request
         self._cancels = graph.ours.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
+        graph.ours.create_subscription(
+            CompressedImage, f"{self.name}/picture", lambda message: see(self, message.data), 10
+        )
         self._heard = 0.0
         self.has_cancelled = False
 
@@ -54,6 +59,10 @@ class Ros2Server:
     def is_connected(self, _silence: float) -> bool:
         """Whether it is there."""
         return bool(self.client.server_is_ready())
+
+    def shows_pictures(self) -> bool:
+        """Whether anything publishes what it sees."""
+        return bool(self._graph.ours.count_publishers(f"{self.name}/picture"))
 
     def cancel(self) -> None:
         """Ask to cancel all goals of all clients; `has_cancelled` tells when the server has."""
@@ -86,7 +95,8 @@ class Ros2Worker(SkillWorker):
         self.graph = Ros2Graph(start["node"])
         left_behind = self.graph.enter()
         self.servers = {
-            skill: Ros2Server(self.graph, action, specs[action["type"]]) for skill, action in actions.items()
+            skill: Ros2Server(self.graph, action, specs[action["type"]], self.see)
+            for skill, action in actions.items()
         }
         for server in self.servers.values():
             self.graph.hear_statuses(server.name, self._hear)
@@ -125,10 +135,18 @@ class Ros2Worker(SkillWorker):
         }
 
     def send(self, goal: Goal, arguments: list[Any]) -> None:
-        """Have the executor's thread send a goal: elsewhere, rclpy can lose the answer."""
+        """Have the executor's thread send a goal, unless no message can hold it.
+
+        Elsewhere, rclpy can lose the answer.
+        """
         message = goal.server.spec.Goal()
-        for field, value in zip(goal.server.fields, arguments):
-            setattr(message, field, as_in(getattr(message, field), value))
+        try:
+            for field, value in zip(goal.server.fields, arguments):
+                setattr(message, field, as_in(getattr(message, field), value))
+            _check(message, arguments)
+        except (AssertionError, OverflowError, TypeError, ValueError) as error:
+            self.end(goal, "unsent", text=f"the goal of {goal.server.name} cannot be sent: {error}")
+            return
         goal.handle = Ros2Goal()
         goal.sent = time.monotonic()
         goal.stop = lambda: self.graph.soon(self._cancel, goal)
@@ -207,7 +225,7 @@ class Ros2Worker(SkillWorker):
             self.end(goal, "cancelled")
         elif response.status == SUCCEEDED:
             values = [getattr(response.result, field) for field in goal.server.returns]
-            self.end(goal, "result", value=plain(values[0]) if values else None)
+            self.succeed(goal, plain(values[0]) if values else None)
         elif response.status == ABORTED:
             self.end(goal, "error", state="aborted", text="")
         else:
@@ -217,6 +235,15 @@ class Ros2Worker(SkillWorker):
 
     def _feedback(self, goal: Goal, feedback: Any) -> None:
         self.pass_on(goal, {name: getattr(feedback, name) for name in feedback.get_fields_and_field_types()})
+
+
+def _check(message: Any, arguments: list[Any]) -> None:
+    """Raise an error that says why a message cannot be sent; later, it would end the executor's thread."""
+    from rclpy.serialization import serialize_message
+
+    if r"\x00" in repr(arguments).replace(r"\\", ""):  # strings of ROS 2 end there
+        raise ValueError("a text contains NUL")
+    serialize_message(message)
 
 
 if __name__ == "__main__":
