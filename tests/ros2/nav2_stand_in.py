@@ -1,7 +1,7 @@
 """A stand-in for a robot with Nav2, written from Nav2's documentation: `python nav2_stand_in.py WORKERS`.
 
-It offers /navigate_to_pose, and apart from Nav2 the topic /speech and the service /door/open. The robot takes a
-straight way where there is one, else a way around obstacles and keepout zones, at a limited speed and
+It offers /navigate_to_pose, and apart from Nav2 the topic /speech and the service /door/open. The robot takes
+a straight way where there is one, else a way around obstacles and keepout zones, at a limited speed and
 acceleration.
 
 It prints events as lists in JSON, one a line. Lines on standard input change the robot: activate, deactivate,
@@ -13,11 +13,12 @@ Nav2 of ROS 2 Kilted, as documented:
 - The loop of the behavior tree takes 10 ms; each round looks for cancels, and publishes feedback.
 - A cancelled goal ends at the next round, while the robot still brakes: controllers may cancel gracefully.
 - While the server is inactive, goals are rejected, and the one that goes on is aborted.
-- The result has the lowest error code, of the controller (1xx) or planner (2xx), and its message. Recoveries are
-  tried only where they may help: if no way was found, or if the robot makes no progress.
+- The result has the lowest error code, of the controller (1xx) or planner (2xx), and its message. Recoveries
+  are tried only where they may help: if no way was found, or if the robot makes no progress.
 - The goal checker is content 0.25 m and 0.25 rad from the goal.
 - AMCL publishes its pose, transient local, after 0.25 m or 0.2 rad.
-- Keepout filter: /costmap_filter_info names the topic of a mask; base + multiplier * value of 100 is forbidden.
+- Keepout filter: /costmap_filter_info names the topic of a mask; base + multiplier * value of 100 or more is
+  forbidden.
 """
 
 from __future__ import annotations
@@ -219,7 +220,7 @@ class Body:
 
     def left(self) -> float:
         way = [self.at(), *self.corners]
-        return sum(math.dist(*pair) for pair in pairwise(way))
+        return math.fsum(math.dist(*pair) for pair in pairwise(way))
 
     def stop(self) -> None:
         self.corners, self.yaw_at_end = [], None

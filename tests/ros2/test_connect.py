@@ -14,7 +14,8 @@ from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros.connected import ConnectedRobot
 from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.robot import Waits
-from ros2_scene import ROS2_PYTHON, SHORT, WORKERS, Scene
+from codebotler.robots.ros.worker import WORKERS
+from ros2_scene import ROS2_PYTHON, SHORT, Scene
 from ros_graph import LONG, Process, started
 
 STAND_IN = Path(__file__).with_name("nav2_stand_in.py")
@@ -95,7 +96,9 @@ def test_skills_are_what_the_file_maps(robots: Robots) -> None:
     robot.perform("go_to", ["Lab"], reported.append)
     assert told(nav2, "goal") == [2.0, 0.0, 1.57]
     assert any(str(one).startswith("at (1.") for one in reported)
-    assert robot.perform("get_current_location", [], reported.append) == "lab"  # the nearest, since none holds it
+    assert (
+        robot.perform("get_current_location", [], reported.append) == "lab"
+    )  # the nearest, since none holds it
     assert "lab, the nearest" in str(reported[-1])
     robot.perform("say", ["it is open"])
     assert told(nav2, "heard") == ["Listen: it is open"]
@@ -150,7 +153,7 @@ def test_robot_that_goes_on_after_a_stop_is_lost(robots: Robots) -> None:
 def test_poses_in_another_frame_are_refused(robots: Robots) -> None:
     robots.nav2()
     robot = robots.robot(CONNECTION.replace("/amcl_pose", "/odom"))
-    with pytest.raises(NotReadyError, match='"odom".*"map"'):
+    with pytest.raises(NotReadyError, match=r'"odom".*"map"'):
         robot.connect()
 
 

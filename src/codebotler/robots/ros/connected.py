@@ -121,9 +121,12 @@ class ConnectedRobot(RosRobot):
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
         """Look for something in a camera's last picture, unless the robot is stopped."""
-        seen = self._awaited({"do": "look", "topic": topic, "oldest": self._waits.patience}, no_feedback)
-        if "none" in seen:
-            raise RobotError("IsInRoomFailed", seen["none"])
+        until = time.monotonic() + self._waits.patience
+        order = {"do": "look", "topic": topic, "oldest": self._waits.patience}
+        while "none" in (seen := self._awaited(order, no_feedback)["values"]):
+            if time.monotonic() > until:
+                raise RobotError("IsInRoomFailed", seen["none"])
+            time.sleep(BEAT)
         found = Future[tuple[bool, bytes]]()
 
         def look() -> None:

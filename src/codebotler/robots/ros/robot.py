@@ -24,6 +24,7 @@ from codebotler.robots.base import (
     no_feedback,
 )
 from codebotler.robots.clock import Clock
+from codebotler.robots.reservation import file_of
 from codebotler.robots.ros.connection import Call, Connection, Values, connection_of, reason
 from codebotler.robots.ros.worker import Message, RosWorker, lacks
 
@@ -188,6 +189,7 @@ class RosRobot:
             "calls": calls_data(self.connection),
             **reports_data(self.connection),
             "cancel_all": cancel_all,
+            "sign": str(file_of(self.name, self.address, f"{self._node}.goal")),
             "patience": self._waits.patience,
             "silence": self._waits.silence,
             "longest": self._waits.longest,

@@ -14,7 +14,7 @@ from codebotler.robots.base import ROS_PYTHON, Options, Readiness
 from codebotler.robots.ros.robot import RosRobot, Waits, class_for, ros_readiness
 from codebotler.robots.ros.worker import lacks
 
-NEEDS = ("rclpy", "action_msgs")
+NEEDS = ("rclpy", "action_msgs", "sensor_msgs")
 INSTALL = "pip install 'codebotler[ros2]'"
 
 

@@ -5,15 +5,20 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from channel import Channel, Message, SetupError
+from message_types import in_base64
+from reports import MotionReports
 
 TICK = 0.1  # seconds between two rounds of the watchdog
 ALIVE = 1.0  # seconds between two signs of life
 TOOL_SILENCE = 0.7  # seconds without a sign of life of the tool, after which the robot is stopped
 TELLS_AGAIN = 0.25  # seconds between two feedbacks that are passed on
 LAST_WORDS = 1.0  # seconds for a cancelled goal to end when the worker does
+LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
+LARGEST_PICTURE = 2_000_000  # bytes
 
 
 class Goal:
@@ -43,8 +48,8 @@ class SkillWorker:
     """Performs skills, one at a time; `connect` and `send` belong to one kind of robot.
 
     The first line has the `address`, the `node`, the `calls` by skill, folders of `packages`, the topics of
-    the `pose`, the `velocity` and the `cameras`, whether to `cancel_all` goals, and the seconds to wait:
-    `patience`, `silence` and `longest`.
+    the `pose`, the `velocity` and the `cameras`, whether to `cancel_all` goals, the `sign`, a file that is
+    there while a goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -59,11 +64,14 @@ class SkillWorker:
         self.longest: float = start["longest"]
         self.goal: Goal | None = None
         self.cameras: dict[str, Any] = {}
-        left_behind = self.connect(start)
+        self._sign = Path(start["sign"])
+        left_behind = self.connect(start) or self._sign.exists()
         missing = self.missing()
         if self.graph.is_left():
             raise SetupError(self.graph.why_left())
         cancelled_all = (left_behind or start["cancel_all"]) and self.cancel_all()
+        if cancelled_all:
+            self._sign.unlink(missing_ok=True)
         threading.Thread(target=self._watch, daemon=True).start()
         self.channel.send("ready", missing=missing, cancelled_all=cancelled_all)
 
@@ -75,12 +83,17 @@ class SkillWorker:
         """Send a goal, whose lock is held."""
         raise NotImplementedError
 
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
+        """Call `hear` with each message of a topic as plain data; SetupError if a topic `is_needed`."""
+        raise NotImplementedError
+
     def start(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless it is cancelled."""
         with goal.lock:
             if goal.cancelled is not None:
                 self.end(goal, "cancelled")
             else:
+                self._sign.touch()
                 self.send(goal, fields)
 
     def obey(self, line: Message) -> None:
@@ -150,6 +163,8 @@ class SkillWorker:
             goal.is_over = True
         if what == "lost":
             goal.cancel()
+        else:
+            self._sign.unlink(missing_ok=True)
         self.channel.send(what, id=goal.number, **more)
         goal.ended.set()
 
@@ -161,6 +176,48 @@ class SkillWorker:
         if text and not goal.is_over and now - goal.told > TELLS_AGAIN:
             goal.told = now
             self.channel.send("feedback", id=goal.number, text=text)
+
+    def finish(self, goal: Goal, values: Message) -> None:
+        """End what cannot be cancelled, with the fields of its answer."""
+        if goal.cancelled is None:
+            self.end(goal, "result", values=values)
+        else:
+            self.end(goal, "cancelled")
+
+    def see(self, server: Any, data: Any) -> None:
+        """Pass on a picture that a server shows while its goal goes on."""
+        goal = self.goal
+        if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
+            return
+        if len(data) > LARGEST_PICTURE:
+            text = f"a picture of {len(data):,} bytes was left out; the limit is {LARGEST_PICTURE:,} bytes"
+            self.channel.send("feedback", id=goal.number, text=text)
+        else:
+            self.channel.send("picture", id=goal.number, data=in_base64(data))
+        goal.seen.set()
+
+    def succeed(self, goal: Goal, values: Message) -> None:
+        """End a goal, with its picture, which may come a moment after the result."""
+        if goal.seen.is_set() or not goal.server.shows_pictures():
+            self.end(goal, "result", values=values)
+            return
+
+        def wait() -> None:
+            goal.seen.wait(LAST_PICTURE)
+            self.end(goal, "result", values=values)
+
+        threading.Thread(target=wait, daemon=True).start()
+
+    def _listen(self, start: Message) -> None:
+        """Listen to what tells where the robot is, and how fast it moves."""
+        pose, velocity = start["pose"], start["velocity"]
+        reports = MotionReports(self.channel, pose and pose["frames"])
+        if pose is not None:
+            self.listen(pose["topic"], reports.hear_pose)
+            if pose["frames"]:
+                self.listen(pose["topic"] + "_static", reports.hear_pose, is_needed=False)
+        if velocity is not None:
+            self.listen(velocity["topic"], reports.hear_velocity)
 
     def _wait_and_send(self, goal: Goal, fields: Message) -> None:
         until = time.monotonic() + self.patience + self.settles

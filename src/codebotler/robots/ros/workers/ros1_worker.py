@@ -11,13 +11,10 @@ from typing import Any
 from channel import Message, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
-from message_types import BUFFER, COMPRESSED, as_data, in_base64, installed, message_types, picture_types
-from pictures import Camera
-from reports import MotionReports
+from message_types import BUFFER, COMPRESSED, as_data, installed, message_types, picture_types
+from pictures import Ros1Camera
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
-LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
-LARGEST_PICTURE = 2_000_000  # bytes
 
 
 class Ros1Server:
@@ -131,23 +128,6 @@ class Ros1Topic(Ros1Service):
 OTHERS = {"service": Ros1Service, "topic": Ros1Topic}
 
 
-def listen(topic: str, hear: Callable[[Any], object]) -> None:
-    """Call `hear` with each message of a topic as plain data, of the type that its publisher has."""
-    import rospy
-    from genpy.dynamic import generate_dynamic
-
-    known: dict[str, Any] = {}
-
-    def take(message: Any) -> None:
-        header = message._connection_header
-        kind = header["type"]
-        if kind not in known:
-            known[kind] = generate_dynamic(kind, header["message_definition"])[kind]
-        hear(as_data(known[kind]().deserialize(message._buff)))
-
-    rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
-
-
 class Ros1Worker(SkillWorker):
     """Performs skills over ROS 1."""
 
@@ -160,21 +140,30 @@ class Ros1Worker(SkillWorker):
         rospy.on_shutdown(self.stop)
         specs = message_types([call for call in calls.values() if call["kind"] == "action"])
         self.servers = {
-            skill: Ros1Server(call, specs[call["type"]], self._see)
+            skill: Ros1Server(call, specs[call["type"]], self.see)
             if call["kind"] == "action"
             else OTHERS[call["kind"]](graph, call)
             for skill, call in calls.items()
         }
-        pose, velocity = start["pose"], start["velocity"]
-        reports = MotionReports(self.channel, pose and pose["frames"])
-        if pose is not None:
-            listen(pose["topic"], reports.hear_pose)
-            if pose["frames"]:
-                listen(pose["topic"] + "_static", reports.hear_pose)
-        if velocity is not None:
-            listen(velocity["topic"], reports.hear_velocity)
-        self.cameras = {topic: Camera(topic) for topic in start["cameras"]}
+        self._listen(start)
+        self.cameras = {topic: Ros1Camera(topic) for topic in start["cameras"]}
         return left_behind
+
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - what is missing may come later
+        """Call `hear` with each message of a topic as plain data, of the type that its publisher has."""
+        import rospy
+        from genpy.dynamic import generate_dynamic
+
+        known: dict[str, Any] = {}
+
+        def take(message: Any) -> None:
+            header = message._connection_header
+            kind = header["type"]
+            if kind not in known:
+                known[kind] = generate_dynamic(kind, header["message_definition"])[kind]
+            hear(as_data(known[kind]().deserialize(message._buff)))
+
+        rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
 
     def send(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless no message can hold it."""
@@ -216,7 +205,7 @@ class Ros1Worker(SkillWorker):
         elif goal.cancelled is not None:
             self.end(goal, "cancelled")
         elif terminal == TerminalState.SUCCEEDED:
-            self._succeed(goal, as_data(handle.get_result()))
+            self.succeed(goal, as_data(handle.get_result()))
         elif terminal in (TerminalState.ABORTED, TerminalState.REJECTED):
             state_name = "rejected" if terminal == TerminalState.REJECTED else "aborted"
             values = as_data(handle.get_result())
@@ -224,43 +213,14 @@ class Ros1Worker(SkillWorker):
         else:
             self.end(goal, "cancelled")
 
-    def _see(self, server: Ros1Server, data: Any) -> None:
-        """Pass on a picture that a server shows while its goal goes on."""
-        goal = self.goal
-        if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
-            return
-        if len(data) > LARGEST_PICTURE:
-            text = f"a picture of {len(data):,} bytes was left out; the limit is {LARGEST_PICTURE:,} bytes"
-            self.channel.send("feedback", id=goal.number, text=text)
-        else:
-            self.channel.send("picture", id=goal.number, data=in_base64(data))
-        goal.seen.set()
-
     def _perform(self, goal: Goal, message: Any) -> None:
         """Perform what cannot be cancelled."""
         import rospy
 
         try:
-            values = goal.server.perform(message)
+            self.finish(goal, goal.server.perform(message))
         except (rospy.ServiceException, rospy.ROSException) as error:
             self.end(goal, "error", state="aborted", text=str(error))
-            return
-        if goal.cancelled is not None:
-            self.end(goal, "cancelled")
-        else:
-            self.end(goal, "result", values=values)
-
-    def _succeed(self, goal: Goal, values: Message) -> None:
-        """End a goal, with its picture, which may come a moment after the result."""
-        if goal.seen.is_set() or not goal.server.shows_pictures():
-            self.end(goal, "result", values=values)
-            return
-
-        def wait() -> None:
-            goal.seen.wait(LAST_PICTURE)
-            self.end(goal, "result", values=values)
-
-        threading.Thread(target=wait, daemon=True).start()
 
 
 if __name__ == "__main__":

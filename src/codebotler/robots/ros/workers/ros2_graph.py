@@ -58,11 +58,14 @@ class Ros2Graph:
 
         rclpy shows them to the executor before it has finished making them, which would end the thread.
         """
-        threading.Thread(target=self._spin, daemon=True).start()
+        self._spinning = threading.Thread(target=self._spin, daemon=True)
+        self._spinning.start()
 
     def leave(self) -> None:
-        """Shut our node down."""
+        """Destroy our node: others would see it until the lease is over, if it were only shut down."""
         self._rclpy.shutdown()
+        self._spinning.join(LEAVES)
+        self.ours.destroy_node()
 
     def is_left(self) -> bool:
         """Whether our node hears nothing any more, or another one of its name has come."""
@@ -133,6 +136,10 @@ class Ros2Graph:
 
         topic = f"{server}/_action/status"
         self.ours.create_subscription(GoalStatusArray, topic, lambda told: hear(server, told), qos)
+
+    def types_of(self, topic: str) -> list[str]:
+        """The types of the messages of a topic, as far as it was discovered."""
+        return [publisher.topic_type for publisher in self.ours.get_publishers_info_by_topic(topic)]
 
     def _locked(self) -> socket.socket:
         """A socket that only one process of this machine can have, for as long as it lives."""

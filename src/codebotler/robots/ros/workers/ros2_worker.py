@@ -10,7 +10,7 @@ from typing import Any
 
 from channel import Message, SetupError, serve
 from goals import TICK, Goal, SkillWorker
-from reports import MotionReports
+from ros2_camera import Ros2Camera
 from ros2_graph import Ros2Graph
 from ros2_types import action_types, as_data, fill, message_types
 
@@ -33,9 +33,10 @@ class Ros2Goal:
 class Ros2Server:
     """The action server of one skill, seen from a client."""
 
-    def __init__(self, graph: Ros2Graph, action: Message, spec: Any) -> None:
+    def __init__(self, graph: Ros2Graph, action: Message, spec: Any, see: Callable[[Any, Any], None]) -> None:
         import rclpy.action
         from action_msgs.srv import CancelGoal
+        from sensor_msgs.msg import CompressedImage
 
         self.name: str = action["server"]
         self.type: str = action["type"]
@@ -43,6 +44,9 @@ class Ros2Server:
         self.client = rclpy.action.ActionClient(graph.ours, spec, self.name)
         self._graph, self._request = graph, CancelGoal.Request
         self._cancels = graph.ours.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
+        graph.ours.create_subscription(
+            CompressedImage, f"{self.name}/picture", lambda message: see(self, message.data), 10
+        )
         self._heard = 0.0
         self.has_cancelled = False
 
@@ -56,6 +60,10 @@ class Ros2Server:
     def is_connected(self, _silence: float) -> bool:
         """Whether it is there."""
         return bool(self.client.server_is_ready())
+
+    def shows_pictures(self) -> bool:
+        """Whether anything publishes what it sees."""
+        return bool(self._graph.ours.count_publishers(f"{self.name}/picture"))
 
     def cancel(self) -> None:
         """Ask to cancel all goals of all clients; `has_cancelled` tells when the server has."""
@@ -121,7 +129,7 @@ class Ros2Topic(Ros2Service):
         end({})
 
 
-SERVERS = {"action": Ros2Server, "service": Ros2Service, "topic": Ros2Topic}
+OTHERS = {"service": Ros2Service, "topic": Ros2Topic}
 
 
 class Ros2Worker(SkillWorker):
@@ -132,21 +140,24 @@ class Ros2Worker(SkillWorker):
 
     def connect(self, start: Message) -> bool:
         """Start our node, and a client for each server; whether an earlier worker died without leaving."""
-        calls = start["calls"]
+        calls, self._packages = start["calls"], start["packages"]
         given = [call for call in calls.values() if call["definition"]]
         names = [call["type"] for call in calls.values() if not call["definition"]]
         specs = action_types(given, self._tell)
-        specs.update(message_types(names, map(Path, start["packages"]), self._tell))
+        specs.update(message_types(names, map(Path, self._packages), self._tell))
         self.graph = Ros2Graph(start["node"])
         left_behind = self.graph.enter()
         self.servers = {
-            skill: SERVERS[call["kind"]](self.graph, call, specs[call["type"]])
+            skill: Ros2Server(self.graph, call, specs[call["type"]], self.see)
+            if call["kind"] == "action"
+            else OTHERS[call["kind"]](self.graph, call, specs[call["type"]])
             for skill, call in calls.items()
         }
         for server in self.servers.values():
             if isinstance(server, Ros2Server):
                 self.graph.hear_statuses(server.name, self._hear)
         self._listen(start)
+        self.cameras = {topic: Ros2Camera(self.graph, topic) for topic in start["cameras"]}
         self.graph.spin()
         return left_behind
 
@@ -182,38 +193,28 @@ class Ros2Worker(SkillWorker):
         }
 
     def send(self, goal: Goal, fields: Message) -> None:
-        """Have the executor's thread send a goal: elsewhere, rclpy can lose the answer."""
+        """Have the executor's thread send a goal, unless no message can hold it.
+
+        Elsewhere, rclpy can lose the answer.
+        """
         try:
             message = fill(goal.server.message(), fields)
-        except SetupError as error:
-            self.end(goal, "unsent", text=f"{goal.server.name} cannot be told: {error}")
+            _check(message, fields)
+        except (SetupError, ValueError) as error:
+            self.end(goal, "unsent", text=f"the goal of {goal.server.name} cannot be sent: {error}")
             return
         goal.sent = time.monotonic()
         if not isinstance(goal.server, Ros2Server):
             goal.is_acknowledged = True
-            self.graph.soon(goal.server.perform, message, lambda values: self._answered(goal, values))
+            self.graph.soon(goal.server.perform, message, lambda values: self.finish(goal, values))
             return
         goal.handle = Ros2Goal()
         goal.stop = lambda: self.graph.soon(self._cancel, goal)
         self.graph.soon(self._send, goal, message)
 
-    def _answered(self, goal: Goal, values: Message) -> None:
-        """End what cannot be cancelled."""
-        if goal.cancelled is not None:
-            self.end(goal, "cancelled")
-        else:
-            self.end(goal, "result", values=values)
-
-    def _listen(self, start: Message) -> None:
-        """Listen to what tells where the robot is, how fast it moves, and what it sees."""
-        pose, velocity, wait = start["pose"], start["velocity"], self.patience
-        reports = MotionReports(self.channel, pose and pose["frames"])
-        if pose is not None:
-            self.graph.listen(pose["topic"], reports.hear_pose, start["packages"], wait)
-            if pose["frames"]:
-                self.graph.listen(pose["topic"] + "_static", reports.hear_pose, start["packages"], None)
-        if velocity is not None:
-            self.graph.listen(velocity["topic"], reports.hear_velocity, start["packages"], wait)
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
+        """Call `hear` with each message of a topic as plain data, of the type that its publishers have."""
+        self.graph.listen(topic, hear, self._packages, self.patience if is_needed else None)
 
     def _tell(self, text: str) -> None:
         self.channel.send("progress", text=text)
@@ -290,7 +291,7 @@ class Ros2Worker(SkillWorker):
         if goal.cancelled is not None or response.status == CANCELED:
             self.end(goal, "cancelled")
         elif response.status == SUCCEEDED:
-            self.end(goal, "result", values=as_data(response.result))
+            self.succeed(goal, as_data(response.result))
         elif response.status == ABORTED:
             self.end(goal, "error", state="aborted", text="", values=as_data(response.result))
         else:
@@ -300,6 +301,15 @@ class Ros2Worker(SkillWorker):
 
     def _feedback(self, goal: Goal, feedback: Any) -> None:
         self.pass_on(goal, as_data(feedback))
+
+
+def _check(message: Any, fields: Message) -> None:
+    """Raise an error that says why a message cannot be sent; later, it would end the executor's thread."""
+    from rclpy.serialization import serialize_message
+
+    if r"\x00" in repr(fields).replace(r"\\", ""):  # strings of ROS 2 end there
+        raise ValueError("a text contains NUL")
+    serialize_message(message)
 
 
 if __name__ == "__main__":

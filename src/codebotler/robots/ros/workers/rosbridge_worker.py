@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 import uuid
+from collections.abc import Callable
 
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
-from reports import MotionReports
 from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
 from rosbridge_protocol import GoalUpdate
 
@@ -60,17 +60,14 @@ class RosbridgeWorker(SkillWorker):
                 "or name another with --address"
             ) from None
         self.servers = {skill: RosbridgeServer(self.graph, call) for skill, call in calls.items()}
-        pose, velocity = start["pose"], start["velocity"]
-        reports = MotionReports(self.channel, pose and pose["frames"])
-        if pose is not None:
-            self.graph.listen(pose["topic"], reports.hear_pose)
-            if pose["frames"]:
-                self.graph.listen(pose["topic"] + "_static", reports.hear_pose)
-        if velocity is not None:
-            self.graph.listen(velocity["topic"], reports.hear_velocity)
+        self._listen(start)
         self._message: Message = {}
         self._again = 0.0
         return False
+
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - nobody knows whether it is there
+        """Call `hear` with each message of a topic as plain data."""
+        self.graph.listen(topic, hear)
 
     def missing(self) -> dict[str, str]:
         """Nothing: servers are seen only when their skills are performed."""
