@@ -16,7 +16,7 @@ from ros2_scene import HERE, ROS2_PYTHON
 from ros_graph import Process
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
-QUICK = ("--speed", "2", "--acceleration", "4", "--recoveries", "2", "--patience", "0.8")
+QUICK = ("--speed", "3", "--acceleration", "8", "--recoveries", "2", "--patience", "0.5")
 
 
 class Nav2:
@@ -84,20 +84,20 @@ def nav2() -> Iterator[Callable[..., Nav2]]:
 
 
 def test_drive_is_seen_in_feedback_odometry_poses_and_frames(nav2: Callable[..., Nav2]) -> None:
-    robot = nav2("--start", "1", "0", "1.57")
+    robot = nav2("--start=1,0,1.57")
     assert robot.go(1, 3, 1.57) == [SUCCEEDED, 0, ""]
-    time.sleep(0.6)  # it may still roll
+    time.sleep(0.4)  # it may still roll
     assert robot.stands_still()
     robot.go(1, 0, 0)
-    time.sleep(0.6)
+    time.sleep(0.4)
     seen = robot.look()
     left = [each["distance_remaining"] for each in seen["feedback"]]
     drives = seen["feedback"][-1]["navigation_time"]
     assert left == sorted(left, reverse=True)
-    assert len(left) > 40 * (drives["sec"] + drives["nanosec"] / 1e9)  # 100 a second, were the machine idle
+    assert len(left) > 20 * (drives["sec"] + drives["nanosec"] / 1e9)  # 100 a second, were the machine idle
     assert any(each["estimated_time_remaining"]["nanosec"] for each in seen["feedback"])
-    assert 1.5 < max(speed for _, speed in seen["speeds"]) <= 2
-    assert all(abs(b[1] - a[1]) <= 4 * 0.2 for a, b in pairwise(seen["speeds"]))
+    assert 1.5 < max(speed for _, speed in seen["speeds"]) <= 3
+    assert all(abs(b[1] - a[1]) <= 8 * (b[0] - a[0] + 0.2) for a, b in pairwise(seen["speeds"]))
     assert 5 < len(seen["poses"]) < 30  # one each 0.25 m or 0.2 rad
     assert seen["feedback"][0]["current_pose"]["header"]["frame_id"] == "map"
     outer, inner = (each["transform"] for each in seen["frames"])
@@ -109,7 +109,7 @@ def test_new_goal_preempts_the_old_one_which_is_aborted_without_a_word(nav2: Cal
     robot = nav2()
     robot.do("send", "first", 8, 0)
     until(robot.client, "accepted", "first")
-    time.sleep(0.6)
+    time.sleep(0.4)
     robot.do("send", "second", 3, 1)
     status, code, text, speed, _ = robot.result("first")
     assert (status, code, text) == (ABORTED, 0, "")
@@ -123,20 +123,20 @@ def test_cancelled_goal_ends_at_once_while_the_robot_brakes(nav2: Callable[..., 
     robot = nav2()
     robot.do("send", "goal", 8, 0)
     until(robot.client, "accepted", "goal")
-    time.sleep(0.6)
+    time.sleep(0.4)
     robot.do("cancel", "goal")
     goals, asked = until(robot.client, "cancelling")
     status, _, _, speed, ended = robot.result("goal")
     assert (status, goals) == (CANCELED, 1)
-    assert ended - asked < 0.2
+    assert ended - asked < 0.5
     assert speed > 1
-    time.sleep(0.6)
+    time.sleep(0.5)
     assert robot.stands_still()
 
 
 def test_planner_says_why_it_fails(nav2: Callable[..., Nav2]) -> None:
     walls = [f"--obstacle={area}" for area in ("2,2,5,2.4", "2,4.6,5,5", "2,2,2.4,5", "4.6,2,5,5")]
-    robot = nav2("--map=-6,-6,6,6", "--obstacle=-4,-4,-3,-3", *walls)
+    robot = nav2("--map=-6,-6,6,6", "--start=-2,-2,0", "--obstacle=-4,-4,-3,-3", *walls)
     assert robot.go(9, 0)[:2] == [ABORTED, 204]
     status, code, text = robot.go(-3.5, -3.5)
     assert (status, code, bool(text)) == (ABORTED, 206, True)
@@ -191,7 +191,7 @@ def test_keepout_zone_is_driven_around_and_no_place_for_a_goal(nav2: Callable[..
 @pytest.mark.parametrize("fault", ["--slow-cancel=0.8", "--never-stops", "--refuse-cancel"])
 def test_faults_of_a_stop(nav2: Callable[..., Nav2], fault: str) -> None:
     robot = nav2(fault)
-    robot.do("send", "goal", 5, 0)
+    robot.do("send", "goal", 5 if "refuse" in fault else 9, 0)
     until(robot.client, "accepted", "goal")
     time.sleep(0.4)
     robot.do("cancel", "goal")
@@ -200,7 +200,7 @@ def test_faults_of_a_stop(nav2: Callable[..., Nav2], fault: str) -> None:
     refuses, waits, drives = "refuse" in fault, "slow" in fault, "never" in fault
     assert (goals, status) == ((0, SUCCEEDED) if refuses else (1, CANCELED))
     assert (ended - asked > 0.7) == (refuses or waits)
-    time.sleep(0 if drives else 0.6)
+    time.sleep(0 if drives else 0.5)
     assert robot.stands_still() != drives
 
 
