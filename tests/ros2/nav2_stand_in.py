@@ -68,17 +68,18 @@ FAILED_TO_LOAD_BEHAVIOR_TREE, TF_ERROR = 9001, 9002
 Point = tuple[float, float]
 
 
-def rectangle(text: str) -> tuple[float, float, float, float]:
-    left, bottom, right, top = (float(number) for number in text.split(","))
-    return left, bottom, right, top
+def numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(number) for number in text.split(","))
 
 
 def options() -> argparse.Namespace:
     parser = argparse.ArgumentParser()
     parser.add_argument("workers", help="the folder with ros2_types.py, which builds nav2_msgs")
-    parser.add_argument("--map", type=rectangle, default=(-10.0, -10.0, 10.0, 10.0))
-    parser.add_argument("--obstacle", type=rectangle, action="append", default=[])
-    parser.add_argument("--start", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "YAW"))
+    parser.add_argument(
+        "--map", type=numbers, default=(-10.0, -10.0, 10.0, 10.0), help="left,bottom,right,top"
+    )
+    parser.add_argument("--obstacle", type=numbers, action="append", default=[])
+    parser.add_argument("--start", type=numbers, default=(0.0, 0.0, 0.0), help="x,y,yaw")
     parser.add_argument("--speed", type=float, default=0.5, help="metres a second")
     parser.add_argument(
         "--acceleration", type=float, default=1.0, help="metres a second squared, also to brake"
@@ -112,8 +113,8 @@ class NavigationError(Exception):
 class Floor:
     """Where the robot may be."""
 
-    bounds: tuple[float, float, float, float]
-    obstacles: list[tuple[float, float, float, float]]
+    bounds: tuple[float, ...]
+    obstacles: list[tuple[float, ...]]
     mask: Any = None  # nav_msgs/OccupancyGrid
     filter: Any = None  # nav2_msgs/CostmapFilterInfo
 
@@ -149,7 +150,7 @@ class Floor:
             raise NavigationError(START_OCCUPIED, f"start {start} is in an obstacle")
         if self.is_clear(start, goal):
             return [goal]
-        way = [start, *self._search(start, goal), goal]
+        way = [start, *reversed(self._search(goal, start)), goal]
         corners = []
         while len(way) > 1:  # leave out each corner that can be cut
             ahead = next(n for n in range(len(way) - 1, 0, -1) if n == 1 or self.is_clear(way[0], way[n]))
@@ -176,10 +177,10 @@ class Floor:
                 if far < cost.get(near, math.inf) and self.is_clear(_centre(cell), _centre(near)):
                     cost[near], came[near] = far, cell
                     heapq.heappush(queue, (far + math.dist(near, last), near))
-        raise NavigationError(NO_VALID_PATH, f"no way from {start} to {goal}", can_recover=True)
+        raise NavigationError(NO_VALID_PATH, f"no way between {goal} and {start}", can_recover=True)
 
 
-def _holds(area: tuple[float, float, float, float], point: Point) -> bool:
+def _holds(area: tuple[float, ...], point: Point) -> bool:
     return area[0] <= point[0] <= area[2] and area[1] <= point[1] <= area[3]
 
 

@@ -169,7 +169,7 @@ def test_topic_without_a_publisher_and_message_without_a_field_are_told(robots: 
 
 
 def test_pose_comes_from_transforms(robots: Robots) -> None:
-    robots.nav2("--start", "3", "4", "1.0")
+    robots.nav2("--start", "3,4,1.0")
     package = PACKAGE.with_name("tf2_msgs")
     text = CONNECTION.replace("{topic: /amcl_pose}", "{tf: {from: map, to: base_link}}")
     robot = robots.robot(text.replace("packages: [", f"packages: [{package}, "))
