@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TypeAlias
 
 from codebotler.core.skills.values import Scalar
@@ -136,6 +138,31 @@ def laid_out(world: World) -> World:
         )
         rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
     return replace(world, rooms=tuple(rooms))
+
+
+SHORTEST = 1e-9  # part of a way, or metres; less is an error of rounding
+
+
+def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
+    """The names of the rooms that hold each part of a straight way, from its start to its end."""
+    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST
+    edges = {}  # of each room, where the way crosses them, by the share of the way that lies before
+    for room in rooms:
+        corners = [(complex(*corner) - here) / way for corner in room.footprint or ()]
+        edges[room.name] = crossings(0.0, [(corner.real, corner.imag) for corner in corners])
+    cuts = {0.0, 1.0, *(edge for each in edges.values() for edge in each if 0 < edge < 1)}
+    for one, other in pairwise(sorted(cuts)):
+        if other - one > SHORTEST:
+            middle = (one + other) / 2
+            yield tuple(name for name, each in edges.items() if sum(edge > middle for edge in each) % 2)
+
+
+def crossings(y: float, corners: Sequence[Point]) -> list[float]:
+    """Where the edges of a polygon cross a horizontal line, from left to right."""
+    edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
+    return sorted(
+        a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)
+    )
 
 
 def _person_data(person: Person) -> dict[str, object]:
