@@ -156,14 +156,15 @@ def test_rules_about_other_events_do_not_see_poses(formula: str) -> None:
 def test_a_skill_of_a_user_drives_through_rooms_too(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(
         "from codebotler import Simulation, skill\n@skill\ndef tour(sim: Simulation) -> None:\n"
-        "    'Tour.'\n    for n in '13': sim.drive(f'printer room {n}')\n    sim.look('mug')\n"
+        "    'Tour.'\n    for n in '13': sim.drive(f'printer room {n}')\n"
+        "    sim.drive('start_loc')\n    sim.look('mug')\n"
     )
     skills = skills_from(tmp_path / "own.py")
     one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP.plan))
     with pytest.raises(RuleViolationError):
         one.perform("tour", [])
-    looks = rule('not tr.Exists(check("mug")) or tr.Count(inside(".*"), 4)')  # start, 1, 2 and 3; each once
-    SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([looks], MAP.plan)).perform("tour", [])
+    all_rooms = rule('not tr.Exists(check("mug")) or tr.Count(inside(".*"), 6)')  # judged before and after
+    SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([all_rooms], MAP.plan)).perform("tour", [])
 
 
 # --- while the robot moves
@@ -185,6 +186,12 @@ def test_a_robot_is_stopped_where_its_pose_enters_a_forbidden_room(
         "location": "printer room 3"
     }
     assert all(event.kind == "goto" for event in mission.trace)
+
+
+def test_the_first_drive_is_judged_from_where_the_robot_stands(tmp_path: Path) -> None:
+    program = "def task_program():\n    go_to('printer room 3')\n"
+    mission, _ = ran(tmp_path, Simulated(WORLD, speed=None), program, NEVER)
+    assert mission.state is State.STOPPED
 
 
 def test_a_robot_that_goes_around_is_not_stopped(tmp_path: Path) -> None:
