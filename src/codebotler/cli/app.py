@@ -98,6 +98,7 @@ def check(
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
+    from codebotler.simulator.sampled_robot import RoomMap
 
     table = skills_from(*(skills or ()))
     known = None if world is None else World.read(world, table)
@@ -106,8 +107,7 @@ def check(
     with busy("checking"):
         found = check.check(
             source,
-            rooms=None if known is None else [room.name for room in known.rooms],
-            start=None if known is None else known.robot,
+            room_map=None if known is None else RoomMap.of(known),
             samples=samples,
             seed=seed,
             strict=strict,
@@ -135,7 +135,7 @@ def rules(
     """
     from codebotler.checking.rule_review import reviewed
     from codebotler.checking.rules import read_rules
-    from codebotler.cli.rules import note_evasions, review_data, review_view
+    from codebotler.cli.rules import note_destinations, note_evasions, review_data, review_view
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
@@ -144,6 +144,7 @@ def rules(
     house_rules = read_rules(file, table)
     known = None if world is None else World.read(world, table)
     note_evasions(house_rules, known, table)
+    note_destinations(house_rules)
     with busy("looking for examples"):
         found = reviewed(house_rules, known)
     if json:

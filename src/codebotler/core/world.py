@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TypeAlias
 
 from codebotler.core.skills.values import Scalar
@@ -163,6 +164,31 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     square = dx * dx + dy * dy
     along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
     return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
+
+
+SHORTEST = 1e-9  # part of a way, or metres; less is an error of rounding
+
+
+def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
+    """The names of the rooms that hold each part of a straight way, from its start to its end."""
+    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST
+    edges = {}  # of each room, where the way crosses them, by the share of the way that lies before
+    for room in rooms:
+        corners = [(complex(*corner) - here) / way for corner in room.footprint or ()]
+        edges[room.name] = crossings(0.0, [(corner.real, corner.imag) for corner in corners])
+    cuts = {0.0, 1.0, *(edge for each in edges.values() for edge in each if 0 < edge < 1)}
+    for one, other in pairwise(sorted(cuts)):
+        if other - one > SHORTEST:
+            middle = (one + other) / 2
+            yield tuple(name for name, each in edges.items() if sum(edge > middle for edge in each) % 2)
+
+
+def crossings(y: float, corners: Sequence[Point]) -> list[float]:
+    """Where the edges of a polygon cross a horizontal line, from left to right."""
+    edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
+    return sorted(
+        a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)
+    )
 
 
 def _person_data(person: Person) -> dict[str, object]:

@@ -23,6 +23,7 @@ from codebotler.generation.generate import Generation, write_program
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
+    expect_poses,
     missing_skills,
     preflight,
     rooms_to_check,
@@ -245,7 +246,7 @@ class MissionSession:
                 mission.stop(self._stopped_by or "")
                 return
             try:
-                room_map, place = preflight(self._robot, self._remark)
+                room_map, place = preflight(self._robot, self._remark, self._world)
             except NotReadyError:
                 if self._is_stopped():
                     return
@@ -254,6 +255,7 @@ class MissionSession:
             rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
             regexes = () if room_map is None or room_map.plain else rooms
             expect_rooms(rules, rooms)
+            expect_poses(rules, self._robot, room_map)
             for sentence in evasions(rules, regexes, self._robot.skills):
                 self._remark(sentence)
             if order.has_program:

@@ -68,6 +68,10 @@ class Robot(Protocol):
         """Whether the rooms that it lists are regexes, as world files write them, and not plain names."""
 
     @property
+    def has_pose(self) -> bool:
+        """Whether its feedback says where it is while it moves, as in `at (3.1, 2.0)`, in metres."""
+
+    @property
     def skills(self) -> SkillTable:
         """The skills it may be asked to perform."""
 

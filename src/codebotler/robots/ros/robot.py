@@ -63,7 +63,7 @@ class RosRobot:
     """
 
     if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
-    rooms_are_regexes = False
+    rooms_are_regexes = has_pose = False
 
     def __init__(
         self,
