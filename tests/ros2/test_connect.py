@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+import os
+import re
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
 
+from codebotler.checking.rules import read_rules
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
-from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.missions.progress import AT
+from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
 from codebotler.robots.ros.connected import ConnectedRobot
 from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.robot import Waits
@@ -36,6 +42,8 @@ frame: map
 places:
   dock: {x: 0, y: 0, polygon: [[-1, -1], [1, -1], [1, 1], [-1, 1]]}
   lab: {x: 2, y: 0, yaw: 1.57}
+  cellar: {polygon: [[3, -1.5], [5, -1.5], [5, 1.5], [3, 1.5]]}
+  hall: {x: 7, y: 0}
   shaft: {x: 5, y: 5}
   moon: {x: 9, y: -9}
 """
@@ -90,9 +98,9 @@ def test_skills_are_what_the_file_maps(robots: Robots) -> None:
     robot.connect()
     assert [*robot.skills] == ["get_current_location", "get_all_rooms", "go_to", "say", "open_door"]
     assert robot.missing == {}
-    assert robot.perform("get_all_rooms", []) == ["dock", "lab", "shaft", "moon"]
+    assert robot.perform("get_all_rooms", []) == ["dock", "lab", "cellar", "hall", "shaft", "moon"]
     assert robot.perform("get_current_location", []) == "dock"
-    reported: list[object] = []
+    reported: list[str | Picture] = []
     robot.perform("go_to", ["Lab"], reported.append)
     assert told(nav2, "goal") == [2.0, 0.0, 1.57]
     assert any(str(one).startswith("at (1.") for one in reported)
@@ -177,3 +185,58 @@ def test_pose_comes_from_transforms(robots: Robots) -> None:
     pose = robot._pose()
     assert pose is not None
     assert math.dist((pose.x, pose.y, pose.yaw), (3, 4, 1.0)) < 0.01
+
+
+KEEPOUT = "keepout: {mask: /keepout_mask, info: /costmap_filter_info}\nskills:"
+RULE = """\
+rules:
+  - name: not-the-cellar
+    says: Never be in the cellar.
+    always: not tr.Exists(inside("cellar"))
+"""
+
+
+def test_planner_keeps_out_of_rooms_that_rules_forbid(robots: Robots) -> None:
+    nav2 = robots.nav2("--speed", "3", "--acceleration", "9")
+    robot = robots.robot(CONNECTION.replace("skills:", KEEPOUT))
+    (robots.folder / "rules.yaml").write_text(RULE)
+    robot.connect()
+    robot.keep_out(read_rules(robots.folder / "rules.yaml"))
+    width, height, cells = told(nav2, "mask")
+    assert [width, height, cells] == [40, 60, 40 * 60]  # 2 m by 3 m
+    reported: list[str | Picture] = []
+    robot.perform("go_to", ["hall"], reported.append)
+    way = [tuple(map(float, match)) for one in reported for match in re.findall(AT, str(one))]
+    assert len(way) > 5
+    assert not [(x, y) for x, y in way if 3 < x < 5 and -1.5 < y < 1.5]
+    robot.keep_out(())
+    assert told(nav2, "mask") == [1, 1, 0]
+
+
+def test_mission_ends_where_the_robot_enters_a_forbidden_room(robots: Robots) -> None:
+    nav2 = robots.nav2("--speed", "2", "--acceleration", "9")
+    robots.robot()
+    (robots.folder / "rules.yaml").write_text(RULE)
+    (robots.folder / "drive.py").write_text("def task_program():\n    go_to('hall')\n    say('there')\n")
+    files = [str(robots.folder / name) for name in ("robot.yaml", "door.py", "rules.yaml", "drive.py")]
+    command = ["run", files[3], "--connect", files[0], "--skills", files[1], "--rules", files[2], "--yes"]
+    environment = {**os.environ, "CODEBOTLER_HOME": str(robots.folder / "home")}
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "codebotler",
+            *command,
+            "--despite-problems",
+            "--ros-python",
+            str(ROS2_PYTHON),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+    )
+    assert done.returncode == 1, done.stderr
+    assert "not-the-cellar" in done.stdout + done.stderr
+    told(nav2, "goal")
+    told(nav2, "cancel")

@@ -115,18 +115,23 @@ class World:
 
 
 ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
+SQUARE = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
 
 
 def laid_out(world: World) -> World:
     """The world with a footprint and a standing point for every room: a grid on both sides of a hallway.
 
-    Rooms with a footprint keep it; the others are placed to the right of them.
+    Rooms with a footprint keep it; around a mere standing point it is a square of a metre, and other rooms
+    are placed to the right.
     """
     taken = [x for room in world.rooms for x, _ in room.footprint or ()]
     start = max(taken, default=0.0) + (HALLWAY if taken else 0.0)
     rooms, placed = [], 0
     for room in world.rooms:
         footprint = room.footprint
+        if footprint is None and room.stand_at is not None:
+            x, y = room.stand_at
+            footprint = tuple((x + dx, y + dy) for dx, dy in SQUARE)
         if footprint is None:
             left = start + placed // 2 * ROOM_WIDTH
             low = 0.0 if placed % 2 == 0 else ROOM_DEPTH + HALLWAY

@@ -17,7 +17,6 @@ from codebotler.core.world_file import Corner, Metres, Name, Value
 from codebotler.core.yaml_files import YamlFile
 
 EACH = "*"  # in a path: every entry
-SQUARE = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))  # metres
 SIZES = (2, 3, 7)  # of points, of poses with a yaw, and of poses with a quaternion
 
 Steps: TypeAlias = tuple[str | int, ...]
@@ -43,10 +42,8 @@ class Places:
     places: tuple[Place, ...]
 
     def world(self, robot: str = "") -> World:
-        """A world for maps, with the robot in a room; places without a polygon are squares of a metre."""
-        squares = (tuple((one.x + x, one.y + y) for x, y in SQUARE) for one in self.places)
-        pairs = zip(self.places, squares, strict=True)
-        rooms = (Room(p.name, footprint=p.polygon or square, stand_at=(p.x, p.y)) for p, square in pairs)
+        """A world for maps, with the robot in a room."""
+        rooms = (Room(one.name, footprint=one.polygon, stand_at=(one.x, one.y)) for one in self.places)
         return World(tuple(rooms), robot)
 
     def room_at(self, x: float, y: float) -> Place | None:

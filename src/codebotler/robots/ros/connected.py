@@ -23,8 +23,10 @@ from codebotler.robots.base import (
     no_feedback,
 )
 from codebotler.robots.places import Place, Places
+from codebotler.robots.ros.keepout import keepout
 from codebotler.robots.ros.motion import Pose
 from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.simulator.rule_guard import Rule
 
 BEAT = 0.05  # seconds between two looks at what it reports
 BY_HAND = "STOP THE ROBOT BY HAND"
@@ -92,6 +94,15 @@ class ConnectedRobot(RosRobot):
         except CancelledError:
             self._confirm_standing(feedback)
             raise
+
+    def keep_out(self, rules: Sequence[Rule]) -> None:
+        """Have the robot's planner keep out of rooms that rules forbid, if its connection says how."""
+        places, topics = self.connection.places, self.connection.keepout
+        if places is None or topics is None:
+            return
+        messages = keepout(rules, places.world().rooms, places.frame, topics[0])
+        for topic, message in zip(topics, messages, strict=True):
+            self._sent({"do": "publish", "topic": topic, "fields": message})
 
     @property
     def _topic(self) -> str:

@@ -124,6 +124,8 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
     for number, folder in enumerate(folders):
         if not Path(folder).is_dir():
             raise file.wrong(f"there is no folder {folder}", "packages", number)
+    if form.keepout is not None and (form.robot != "ros2" or places is None):
+        raise file.wrong("keepout needs places and Nav2, so robot: ros2", "keepout")
     return Connection(
         calls,
         form.robot,

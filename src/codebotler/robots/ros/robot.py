@@ -262,6 +262,7 @@ def reports_data(connection: Connection) -> Message:
         "packages": connection.packages,
         "pose": connection.pose and vars(connection.pose),
         "velocity": connection.velocity and vars(connection.velocity),
+        "keepout": connection.keepout or [],
         "cameras": sorted({topic for topic, _ in connection.cameras.values()}),
     }
 

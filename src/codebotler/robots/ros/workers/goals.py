@@ -48,8 +48,8 @@ class SkillWorker:
     """Performs skills, one at a time; `connect` and `send` belong to one kind of robot.
 
     The first line has the `address`, the `node`, the `calls` by skill, folders of `packages`, the topics of
-    the `pose`, the `velocity` and the `cameras`, whether to `cancel_all` goals, the `sign`, a file that is
-    there while a goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
+    the `pose`, the `velocity`, the `cameras` and `keepout`, whether to `cancel_all` goals, the `sign`, a file
+    that is there while a goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -87,6 +87,10 @@ class SkillWorker:
         """Call `hear` with each message of a topic as plain data; SetupError if a topic `is_needed`."""
         raise NotImplementedError
 
+    def publish(self, topic: str, fields: Message) -> None:
+        """Publish the last message of a topic of `keepout`, also for those who come later."""
+        raise NotImplementedError
+
     def start(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless it is cancelled."""
         with goal.lock:
@@ -108,6 +112,8 @@ class SkillWorker:
         elif line["do"] == "look":
             picture = self.cameras[line["topic"]].look(line["oldest"])
             self.channel.send("result", id=line["id"], values=picture)
+        elif line["do"] == "publish":
+            self.publish(line["topic"], line["fields"])
         elif line["do"] == "cancel":
             if self.goal is not None:
                 self.goal.cancel()

@@ -101,7 +101,7 @@ class Ros1Graph:
             return f"the ROS master at {self.uri} was restarted; connect again"
         nodes = self.nodes_of(server)
         if not nodes:
-            return f"nothing offers {server}; start it"
+            return f"there is no action server at {server}; start it"
         address = self.address_of(nodes[0])
         if address is None or not is_alive(address):
             return f"the action server at {server} (node {nodes[0]}) has died; start it again"

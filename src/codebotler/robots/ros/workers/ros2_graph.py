@@ -129,6 +129,14 @@ class Ros2Graph:
         spec = message_types([kind], map(Path, packages))[kind]
         self.ours.create_subscription(spec, topic, lambda message: hear(as_data(message)), qos)
 
+    def latched(self, spec: Any, topic: str) -> Any:
+        """A publisher whose last message also those get who come later."""
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
+        return self.ours.create_publisher(
+            spec, topic, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        )
+
     def hear_statuses(self, server: str, hear: Callable[[str, Any], None]) -> None:
         """Call `hear` with an action server's name and each list of statuses that it publishes."""
         from action_msgs.msg import GoalStatusArray

@@ -15,6 +15,7 @@ from ros2_graph import Ros2Graph
 from ros2_types import action_types, as_data, fill, message_types
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
+KEEPOUT = ("nav_msgs/msg/OccupancyGrid", "nav2_msgs/msg/CostmapFilterInfo")
 REJECTED = 1  # of action_msgs/srv/CancelGoal
 DISCOVERS = 3  # times the patience, for the first server to be discovered
 TELLS = 2.0  # seconds after which a search for servers is told
@@ -142,7 +143,8 @@ class Ros2Worker(SkillWorker):
         """Start our node, and a client for each server; whether an earlier worker died without leaving."""
         calls, self._packages = start["calls"], start["packages"]
         given = [call for call in calls.values() if call["definition"]]
-        names = [call["type"] for call in calls.values() if not call["definition"]]
+        latched = dict(zip(start["keepout"], KEEPOUT))
+        names = [call["type"] for call in calls.values() if not call["definition"]] + list(latched.values())
         specs = action_types(given, self._tell)
         specs.update(message_types(names, map(Path, self._packages), self._tell))
         self.graph = Ros2Graph(start["node"])
@@ -157,9 +159,17 @@ class Ros2Worker(SkillWorker):
             if isinstance(server, Ros2Server):
                 self.graph.hear_statuses(server.name, self._hear)
         self._listen(start)
+        self._latched = {
+            topic: (self.graph.latched(specs[kind], topic), specs[kind]) for topic, kind in latched.items()
+        }
         self.cameras = {topic: Ros2Camera(self.graph, topic) for topic in start["cameras"]}
         self.graph.spin()
         return left_behind
+
+    def publish(self, topic: str, fields: Message) -> None:
+        """Publish the last message of a topic, also for those who come later."""
+        publisher, spec = self._latched[topic]
+        self.graph.soon(publisher.publish, fill(spec(), fields))
 
     def cancel_all(self) -> bool:
         """Cancel all goals of all clients; whether all servers that are there have confirmed it."""
