@@ -144,7 +144,7 @@ def connect(
     from codebotler.robots.ros.discovery import first_connection, offers_of
 
     if not discover:
-        raise UserError("add --discover, which looks at the robot and writes a first file for --connect")
+        raise UserError("add --discover: it looks at the robot, and writes a first file for --connect")
     with busy("looking at the robot"):
         text = first_connection(robot, offers_of(robot, address, ros_python))
     if out is None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
+from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.ros.discovery import first_connection
+from codebotler.robots.base import ROS_PYTHON
+from codebotler.robots.ros.discovery import first_connection, offers_of
 
 NAV2 = "action /navigate_to_pose nav2_msgs/action/NavigateToPose"
 
@@ -38,7 +42,6 @@ def test_drive_of_nav2_waits_for_places() -> None:
         "goal": {"pose": "$place"},
     }
     assert "places: " in comments(NAV2)
-    assert in_comment("packages", NAV2) == ["nav2_msgs"]
 
 
 def test_move_base_of_ros_1_is_a_drive() -> None:
@@ -46,7 +49,6 @@ def test_move_base_of_ros_1_is_a_drive() -> None:
     assert yaml.safe_load(text)["robot"] == "ros1"
     goal = "# go_to: {action: /move_base, type: move_base_msgs/MoveBase, goal: {target_pose: $place}}"
     assert goal in text
-    assert "# packages:" not in text
 
 
 def test_own_actions_are_written_with_arguments_and_results() -> None:
@@ -112,6 +114,13 @@ def test_pose_is_that_of_amcl_else_of_tf() -> None:
     assert written(ODOM)["velocity"] == {"topic": "/odom"}
 
 
+def test_services_of_unknown_type_are_listed() -> None:
+    offers = ("service /door/open unknown", "service /robot/get_loggers unknown")
+    text = comments(*offers, robot="ros1")
+    assert "/door/open unknown" in text
+    assert "get_loggers" not in text
+
+
 def test_only_the_first_of_several_is_written() -> None:
     offers = [f"hears /{name} std_msgs/msg/String" for name in ("tts", "say")]
     assert written(*offers)["skills"]["say"]["topic"] == "/say"
@@ -138,11 +147,10 @@ def test_the_rest_is_listed_once_without_what_every_graph_has() -> None:
 
 def test_head_names_what_is_missing() -> None:
     text = comments("hears /say std_msgs/msg/String")
-    head = text.partition("robot:")[0]
-    assert "pose" in head
-    assert "places" in head
-    assert "go_to" in head
-    assert " say" not in head
+    (missing,) = re.findall("Missing: (.*)", text)
+    assert [what.split()[0] for what in missing.split(", ")] == [
+        *("places", "pose", "is_in_room", "go_to", "ask", "pick", "place")
+    ]
 
 
 def test_hostile_names_stay_out_of_the_file() -> None:
@@ -150,3 +158,23 @@ def test_hostile_names_stay_out_of_the_file() -> None:
         written("hears /x\nskills:\n/say std_msgs/msg/String", "hears /{say std_msgs/msg/String")["skills"]
         is None
     )
+
+
+@pytest.mark.parametrize("robot", ["sim", "rosbridge"])
+def test_other_robots_cannot_be_looked_at(robot: str) -> None:
+    with pytest.raises(UserError, match=robot):
+        offers_of(robot, "", ROS_PYTHON)
+
+
+def test_example_of_the_guide() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "ros.md").read_text()
+    offers = (
+        NAV2,
+        AMCL,
+        ODOM,
+        "hears /speech std_msgs/msg/String",
+        "service /door/open std_srvs/srv/Trigger",
+        "sends /camera/image_raw sensor_msgs/msg/Image",
+        "sends /scan sensor_msgs/msg/LaserScan",
+    )
+    assert f"```yaml\n{first_connection('ros2', offers)}```" in page

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import os
-import socket
 import time
 from contextlib import suppress
 from typing import Any, Iterator, Tuple
-from urllib.parse import urlsplit
 
 from channel import Channel, Message, SetupError, serve
 
-QUIET, FIRST = 2.0, 10.0  # seconds without anything new, after which discovery has ended; without anything at all
-ANSWERS = 1.0  # seconds for a service of ROS 1 to name its type
+QUIET = 2.0  # seconds without anything new, after which discovery has ended
+LONGEST = 10.0  # seconds for that, also where nothing or always something new comes
 Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), a name and a type
 
 
@@ -35,8 +32,8 @@ def offers_on_ros2() -> set[Offer]:
     rclpy.init(args=None)
     node = rclpy.create_node(f"codebotler_discovers_{os.getpid()}")
     offers: set[Offer] = set()
-    changed = now = time.monotonic()
-    while now - changed < (QUIET if offers else FIRST):
+    begun = changed = now = time.monotonic()
+    while now - begun < LONGEST and (now - changed < QUIET or not offers):
         time.sleep(0.1)
         now, before = time.monotonic(), len(offers)
         offers.update(_offers_of_others(node))
@@ -60,7 +57,7 @@ def _offers_of_others(node: Any) -> Iterator[Offer]:
 
 
 def offers_on_ros1() -> Iterator[Offer]:
-    """All offers that the master knows."""
+    """All offers that the master knows; it does not know the types of services."""
     import rosgraph
 
     from graph import Ros1Graph, no_master
@@ -70,26 +67,12 @@ def offers_on_ros1() -> Iterator[Offer]:
         raise SetupError(no_master(graph.uri))
     master = rosgraph.Master(graph.node)
     types = dict(master.getTopicTypes())
-    sent, heard, services = master.getSystemState()
-    yield from (("sends", name, types.get(name, "*")) for name, _ in sent)
-    for name, _ in heard:
-        yield "hears", name, types.get(name, "*")
-        if name.endswith("/goal") and types.get(name, "*").endswith("ActionGoal"):
-            yield "action", name[: -len("/goal")], types[name][: -len("ActionGoal")]
-    yield from (("service", name, _type_of(master, name)) for name, _ in services)
-
-
-def _type_of(master: Any, service: str) -> str:
-    """The type that a service of ROS 1 answers with; * if it does not answer."""
-    from rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
-
-    probe = {"probe": "1", "md5sum": "*", "callerid": "/codebotler_discovers", "service": service}
-    with suppress(Exception):  # rosgraph has several errors for a node that has died
-        address = urlsplit(master.lookupService(service))
-        with socket.create_connection((address.hostname, address.port), ANSWERS) as stream:
-            write_ros_handshake_header(stream, probe)
-            return str(read_ros_handshake_header(stream, io.BytesIO(), 2048)["type"])
-    return "*"
+    for kind, names in zip(("sends", "hears", "service"), master.getSystemState()):
+        for name, _ in names:
+            of = types.get(name, "unknown")
+            yield kind, name, of
+            if kind == "hears" and name.endswith("/goal") and of.endswith("ActionGoal"):
+                yield "action", name[: -len("/goal")], of[: -len("ActionGoal")]
 
 
 if __name__ == "__main__":
