@@ -29,6 +29,8 @@ def test_file_has_what_robots_offer(graph: Graph) -> None:
             "say": {"topic": "/speech", "type": "std_msgs/String", "message": {"data": "$message"}},
         },
     }
+    assert "# go_to: {action: /move_base, type: move_base_msgs/MoveBase, " in text
+    assert "/elsewhere" not in text
     assert text.partition("# Not mapped:")[2].splitlines() == ["", "#   /battery std_msgs/String"]
 
 
