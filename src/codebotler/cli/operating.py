@@ -1,4 +1,4 @@
-"""The commands that operate a robot: run, missions, robots, serve, virtual-robot."""
+"""The commands that operate a robot: run, missions, robots, connect, serve, virtual-robot."""
 
 from __future__ import annotations
 
@@ -126,6 +126,35 @@ def robots(
         print_json([asdict(kind) for kind in found])
     else:
         print_rich(robots_view(found))
+
+
+def connect(
+    discover: Annotated[
+        bool, typer.Option("--discover", help="Look at what the robot's nodes offer.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Write to this new file.", metavar="FILE")] = None,
+    robot: Annotated[str, typer.Option(help="The robot's ROS: ros2 or ros1.")] = "ros2",
+    address: options.AddressOption = "",
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
+) -> None:
+    """Write a first file for --connect, from what a robot offers.
+
+    Comments in it say what is missing, and what else the robot offers.
+    """
+    from codebotler.cli.skills import write_new
+    from codebotler.core.errors import UserError
+    from codebotler.core.terminal import busy, print_source
+    from codebotler.robots.ros.discovery import first_connection, offers_of
+
+    if not discover:
+        raise UserError("add --discover: it looks at the robot, and writes a first file for --connect")
+    with busy("looking at the robot"):
+        text = first_connection(robot, offers_of(robot, address, ros_python))
+    if out is None:
+        print_source(text)
+    else:
+        write_new(out, text)
+        note(f"{out} is written; read it, and add what its first lines say is missing")
 
 
 @with_options_of(model_settings)
