@@ -128,6 +128,7 @@ class RosRobot:
     def _awaited(self, order: Message, feedback: Feedback) -> Message:
         """Send an order, and return the worker's last message about it."""
         worker, number = self._sent(order)
+        at = ""
         while True:
             match worker.receive(self._waits.patience * 2):
                 case None:
@@ -145,7 +146,9 @@ class RosRobot:
                 case {"id": int(goal), "is": "picture", "data": str(data)} if goal == number:
                     feedback(Picture(base64.b64decode(data)))
                 case {"is": "pose", "x": float(x), "y": float(y)}:
-                    feedback(f"at ({x:.2f}, {y:.2f})")
+                    before, at = at, f"at ({x:.2f}, {y:.2f})"
+                    if at != before:
+                        feedback(at)
                 case {"id": int(goal)} as message if goal == number:
                     return message
 

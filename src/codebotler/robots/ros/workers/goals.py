@@ -15,7 +15,7 @@ from reports import MotionReports
 TICK = 0.1  # seconds between two rounds of the watchdog
 ALIVE = 1.0  # seconds between two signs of life
 TOOL_SILENCE = 0.7  # seconds without a sign of life of the tool, after which the robot is stopped
-TELLS_AGAIN = 0.25  # seconds between two feedbacks that are passed on
+TELLS_AGAIN = 0.5  # seconds between two feedbacks that are passed on
 LAST_WORDS = 1.0  # seconds for a cancelled goal to end when the worker does
 LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
 LARGEST_PICTURE = 2_000_000  # bytes
@@ -177,7 +177,10 @@ class SkillWorker:
     def pass_on(self, goal: Goal, feedback: dict[str, Any]) -> None:
         """Report the fields of a feedback that hold a text or a number, but not more often than is of use."""
         plain = {name: value for name, value in feedback.items() if not isinstance(value, (dict, list))}
-        text = ", ".join(f"{name}: {value}" for name, value in plain.items())
+        text = ", ".join(
+            f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}"
+            for name, value in plain.items()
+        )
         now = time.monotonic()
         if text and not goal.is_over and now - goal.told > TELLS_AGAIN:
             goal.told = now
