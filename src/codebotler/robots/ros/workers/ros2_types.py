@@ -39,16 +39,13 @@ import pathlib
 for support in {supports}:  # found by their names, once they are loaded
     ctypes.CDLL(str(pathlib.Path(__file__).parent / f"lib{package}__{{support}}.so"))
 """
-LIBRARIES = GENERATORS[1:]
 COMPILERS = {".c": "cc", ".cpp": "c++"}
 USES = re.compile(r"^\s*(?:(\w+)/)?([A-Z]\w*)", re.MULTILINE)
 Tell = Callable[[str], object]
 Definitions = Dict[str, str]  # by kind and name, such as action/GoTo
 
 
-def message_types(
-    names: Iterable[str], folders: Iterable[Path] = (), tell: Tell = lambda _: None
-) -> dict[str, Any]:
+def message_types(names: list[str], folders: Iterable[Path], tell: Tell = lambda _: None) -> dict[str, Any]:
     """Return the Python class of each message, service and action, by names such as std_msgs/msg/String.
 
     Args:
@@ -73,9 +70,7 @@ def message_types(
                     f"the ROS 2 package {package} is not installed; source it, or list its folder in packages"
                 )
             _install(package, _definitions(sources[package], kinds), tell)
-    return {
-        f"{package}/{kind}": _class(f"{package}/{kind}") for package in wanted for kind in wanted[package]
-    }
+    return {name: _class(name) for name in names}
 
 
 def action_types(actions: list[Message], tell: Tell = lambda _: None) -> dict[str, Any]:
@@ -236,7 +231,7 @@ def built(package: str, definitions: Definitions, tell: Tell = lambda _: None) -
     with tempfile.TemporaryDirectory(dir=str(home)) as temporary:
         _Build(package, Path(temporary), shares, needed).make(definitions)
         try:
-            (Path(temporary) / "made").rename(folder)
+            (Path(temporary) / "kept").rename(folder)
         except OSError:  # another worker was faster
             if not folder.exists():
                 raise
@@ -257,7 +252,7 @@ class _Build:
         self._generate(definitions)
         module = f"{self.package}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
         objects = [self._compiled(unit) for unit in list(self._units())]
-        libraries = [f"-l{name}__rosidl_{kind}" for name in self.needed for kind in LIBRARIES]
+        libraries = [f"-l{name}__rosidl_{kind}" for name in self.needed for kind in GENERATORS[1:]]
         self._run(
             "c++", "-shared", "-s", "-Wl,--allow-shlib-undefined", f"-Wl,-soname,{module}", "-o",
             str(self.made / module), *objects, "-Wl,--no-as-needed",
@@ -269,12 +264,8 @@ class _Build:
                 "c++", "-shared", f"-Wl,-soname,{library}", "-Wl,--no-as-needed", "-Wl,-rpath,$ORIGIN",
                 "-Wl,--allow-shlib-undefined", str(self.made / module), "-o", str(self.made / library)
             )  # fmt: skip
-        kept = {module, *libraries}
-        for path in sorted(self.made.rglob("*"), reverse=True):
-            if path.is_dir() and not any(path.iterdir()):
-                path.rmdir()
-            elif path.is_file() and path.suffix != ".py" and path.name not in kept:
-                path.unlink()
+        sources = shutil.ignore_patterns("detail", "*.[ch]", "*.idl", "*.json")
+        shutil.copytree(str(self.made), str(self.work / "kept" / self.package), ignore=sources)
 
     def _generate(self, definitions: Definitions) -> None:
         from rosidl_adapter import convert_to_idl
@@ -312,17 +303,19 @@ class _Build:
         )
         generate_py(self._arguments("generator_py"), ["rosidl_typesupport_c"])
         for generator in ("generator_c", "typesupport_fastrtps_c", "typesupport_introspection_c"):
-            self._write_visibility(f"rosidl_{generator}__visibility_control.h", self._templates(generator))
-
-    def _templates(self, generator: str) -> Path:
-        return self.shares["rosidl_" + generator] / "resource"
+            header = f"rosidl_{generator}__visibility_control.h"
+            text = (self.shares["rosidl_" + generator] / "resource" / f"{header}.in").read_text()
+            text = text.replace("@PROJECT_NAME@", self.package)
+            (self.made / "msg" / header).write_text(
+                text.replace("@PROJECT_NAME_UPPER@", self.package.upper())
+            )
 
     def _arguments(self, generator: str, **more: Any) -> str:
         """A file of arguments, as the generators read them."""
         arguments = {
             "package_name": self.package,
             "output_dir": str(self.made),
-            "template_dir": str(self._templates(generator)),
+            "template_dir": str(self.shares["rosidl_" + generator] / "resource"),
             "idl_tuples": [f"{self.made}:{name}.idl" for name in self.names],
             "target_dependencies": [],
             **more,
@@ -331,20 +324,10 @@ class _Build:
         path.write_text(json.dumps(arguments))
         return str(path)
 
-    def _write_visibility(self, header: str, templates: Path) -> None:
-        text = (templates / f"{header}.in").read_text()
-        text = text.replace("@PROJECT_NAME@", self.package)
-        text = text.replace("@PROJECT_NAME_UPPER@", self.package.upper())
-        (self.made / "msg" / header).write_text(text)
-
     def _units(self) -> Iterator[Path]:
         """What is compiled: one file for all of a language, but for descriptions, whose names collide."""
-        introspection = self.work / "introspection.c"
-        files = sorted((self.work / "introspection").rglob("*.c"))
-        introspection.write_text("".join(f'#include "{path}"\n' for path in files))
-        yield introspection
         for suffix in COMPILERS:
-            files = sorted(self.made.rglob("*" + suffix))
+            files = sorted(self.work.rglob("*" + suffix))
             together = [path for path in files if not path.stem.endswith("__description")]
             unit = self.work / ("all" + suffix)
             unit.write_text("".join(f'#include "{path}"\n' for path in together))
