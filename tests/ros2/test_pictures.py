@@ -17,9 +17,12 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import Picture
+from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.worker import WORKERS
+from halves import encoded, has_frame, rows, sees
 from ros2_scene import ROS2_PYTHON, Scene
 from ros_graph import LONG, Process
+from server import Server
 
 HERE = Path(__file__).parent
 LOOK = SKILLS["is_in_room"]
@@ -115,6 +118,32 @@ def seen_at_last(looker: Process) -> dict[str, Any]:
         assert time.monotonic() < until
         time.sleep(0.1)
     return seen
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("Image", {"encoding": "bgr8", "width": 64, "height": 32, "step": 200, "data": [*rows("BGR", 8)]}),
+        ("CompressedImage", {"format": "jpeg", "data": [*encoded("JPEG")]}),
+    ],
+)
+def test_connected_camera_becomes_an_answer_and_a_picture(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, fields: dict[str, Any]
+) -> None:
+    process(scene, HERE / "ros2_camera.py", TOPIC, kind, json.dumps(fields)).expect("ready")
+    path = tmp_path / "robot.yaml"
+    path.write_text(f'skills: {{is_in_room: {{detector: "openai-chat:eyes", image: {TOPIC}}}}}')
+    with Server(answer=sees) as model:
+        monkeypatch.setenv("OPENAI_BASE_URL", model.url)
+        robot = scene.robot(skills=SkillTable((LOOK,)), connection=read_connection(path, SKILLS))
+        robot.connect()
+        shown: list[str | Picture] = []
+        assert robot.perform("is_in_room", ["mug"], shown.append) is True
+        (picture,) = shown
+        assert isinstance(picture, Picture)
+        assert has_frame(picture.data)
+        assert robot.perform("is_in_room", ["cat"]) is False
+        robot.disconnect()
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,11 @@
-"""Pictures on a graph: the last one of a camera, and on ROS 1 a topic that shows what a server saw."""
+"""The last picture of a camera, on ROS 1 and behind a rosbridge."""
 
 from __future__ import annotations
 
-import base64
 import time
 from typing import Any
 
-from message_types import BUFFER, COMPRESSED, in_base64, picture_types
+from message_types import BUFFER, in_base64, picture_types
 
 FIELDS = ("height", "width", "encoding", "is_bigendian", "step", "format")  # of both types of pictures
 
@@ -34,6 +33,10 @@ class Camera:
         if age > oldest:
             late = f"the last picture on {self.topic} came {age:.0f} s ago"
             return {"none": f"{late}; has the camera's node stopped?"}
+        return self.fields(message)
+
+    def fields(self, message: Any) -> dict[str, Any]:
+        """The fields of a message, as JSON has them."""
         picture = self.unpacked(message)
         fields = {name: getattr(picture, name) for name in FIELDS if hasattr(picture, name)}
         return {**fields, "data": in_base64(picture.data)}
@@ -66,19 +69,24 @@ class Ros1Camera(Camera):
         return self.types[message._connection_header["type"]]().deserialize(message._buff)
 
 
-class PictureTopic:
-    """The topic on which an action server shows what it sees: `SERVER/picture`."""
+class RosbridgeCamera(Camera):
+    """A camera behind a rosbridge, which sends pictures only while one is awaited, since they are large."""
 
-    def __init__(self, server: str) -> None:
-        import rospy
+    def __init__(self, connection: Any, topic: str) -> None:
+        super().__init__(topic, {})
+        self._connection, self._is_awaited = connection, False
 
-        self._type = picture_types()[COMPRESSED]
-        self._publisher = rospy.Publisher(f"{rospy.remap_name(server)}/picture", self._type, queue_size=4)
+    def look(self, oldest: float) -> dict[str, Any]:
+        """The next picture as fields of its message, or `none` with the reason why there is none."""
+        if not self._is_awaited:
+            self._last, self._is_awaited = None, True
+            self._connection.listen(self.topic, self.keep)
+        seen = super().look(oldest)
+        if "none" not in seen:
+            self._connection.ignore(self.topic)
+            self._is_awaited = False
+        return seen
 
-    def show(self, picture: str) -> None:
-        """Publish a JPEG file in base64."""
-        import rospy
-
-        message = self._type(format="jpeg", data=base64.b64decode(picture))
-        message.header.stamp = rospy.Time.now()
-        self._publisher.publish(message)
+    def fields(self, message: Any) -> dict[str, Any]:
+        """The fields of a message, as they are."""
+        return {name: message[name] for name in (*FIELDS, "data") if name in message}
