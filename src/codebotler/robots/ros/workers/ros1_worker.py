@@ -8,10 +8,19 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from channel import Message, serve
+from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
-from message_types import BUFFER, COMPRESSED, as_data, installed, message_types, picture_types
+from message_types import (
+    BUFFER,
+    COMPRESSED,
+    as_data,
+    installed,
+    message_types,
+    parts_of,
+    picture_types,
+    type_of_sender,
+)
 from pictures import Ros1Camera
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
@@ -79,7 +88,7 @@ class Ros1Service:
 
     def __init__(self, graph: Ros1Graph, call: Message) -> None:
         self.graph, self.name, self.type = graph, call["server"], call["type"]
-        self._open(self.type.partition("/")[0], self.type.rpartition("/")[2])
+        self._open(*parts_of(self.type))
 
     def _open(self, package: str, name: str) -> None:
         import rospy
@@ -149,18 +158,19 @@ class Ros1Worker(SkillWorker):
         self.cameras = {topic: Ros1Camera(topic) for topic in start["cameras"]}
         return left_behind
 
-    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - what is missing may come later
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
         """Call `hear` with each message of a topic as plain data, of the type that its publisher has."""
         import rospy
-        from genpy.dynamic import generate_dynamic
 
+        if is_needed and not self.graph.has_publisher(topic):
+            raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
         known: dict[str, Any] = {}
 
         def take(message: Any) -> None:
             header = message._connection_header
             kind = header["type"]
             if kind not in known:
-                known[kind] = generate_dynamic(kind, header["message_definition"])[kind]
+                known[kind] = type_of_sender(kind, header["message_definition"])
             hear(as_data(known[kind]().deserialize(message._buff)))
 
         rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
@@ -219,8 +229,11 @@ class Ros1Worker(SkillWorker):
 
         try:
             self.finish(goal, goal.server.perform(message))
-        except (rospy.ServiceException, rospy.ROSException) as error:
-            self.end(goal, "error", state="aborted", text=str(error))
+        except rospy.ServiceException as error:
+            if "responded with an error" in str(error):
+                self.end(goal, "error", state="aborted", text=str(error))
+            else:
+                self.end(goal, "lost", text=f"the service {goal.server.name} has died: {error}")
 
 
 if __name__ == "__main__":

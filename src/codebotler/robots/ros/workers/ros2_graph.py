@@ -13,13 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from channel import SetupError
-from message_types import parts_of
+from message_types import offer_of, parts_of
 from ros2_types import as_data, message_types
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
 LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
-OFFERS = {"action": "action server", "srv": "service", "msg": "subscriber"}
 TAKEN = "another codebotler is using this robot (the node {}); stop it first"
 
 
@@ -82,9 +81,8 @@ class Ros2Graph:
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with what a robot offers."""
         whole = type_name if type_name.count("/") > 1 else "/action/".join(parts_of(type_name))
-        what = OFFERS[whole.split("/")[1]]
         return (
-            f"there is no {what} of {whole} at {server}; start it, or compare "
+            f"there is no {offer_of(whole)} of {whole} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
