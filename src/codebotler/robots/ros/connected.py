@@ -127,7 +127,7 @@ class ConnectedRobot(RosRobot):
             return within
         nearest = places.nearest(pose.x, pose.y)
         away = math.dist((pose.x, pose.y), (nearest.x, nearest.y))
-        feedback(f"{away:.1f} m from {nearest.name}, the nearest place")
+        feedback(f"the robot is {away:.1f} m from {nearest.name}, the nearest place")
         return nearest
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
