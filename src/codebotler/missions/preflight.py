@@ -14,7 +14,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import answered
 from codebotler.models.recorded import UnknownInstructionError, closest_to, recorded_model
-from codebotler.robots.base import CancelledError, NotReadyError, Picture, Result, Robot, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
 from codebotler.rtl.wording import quoted
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
@@ -36,15 +36,11 @@ def preflight(
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
-    def hear(what: str | Picture) -> None:
-        if isinstance(what, str):
-            remark(visible(what))
-
     def told(skill: str, what: str) -> Result:
         if skill not in can:
             return None
         try:
-            return answered(robot.skills[skill], robot.perform(skill, (), hear))
+            return answered(robot.skills[skill], robot.perform(skill, ()))
         except RobotError as error:
             remark(f"the robot did not report {what}: {visible(str(error))}")
             return None
