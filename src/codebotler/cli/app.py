@@ -10,7 +10,7 @@ import typer
 from codebotler.cli import options
 from codebotler.cli.ending import obey
 from codebotler.cli.model_options import model_settings, with_options_of
-from codebotler.cli.operating import missions, robots, run, serve_page, virtual_robot
+from codebotler.cli.operating import connect, missions, robots, run, serve_page, virtual_robot
 from codebotler.core.terminal import note, noting_all
 
 
@@ -175,13 +175,13 @@ def skills(
 
     Each example is called in 40 imagined worlds.
     """
-    from codebotler.cli.skills import data, view, write_new
+    from codebotler.cli.skills import NEW, data, view, write_new
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.ros_package import write_ros_packages
     from codebotler.core.terminal import print_json, print_rich
 
     if new is not None:
-        write_new(new)
+        write_new(new, NEW.format(name=new))
         note(f"{new} is written; `codebotler skills {new}` shows what is in it")
         return
     table = skills_from(*([] if file is None else [file]))
@@ -218,7 +218,7 @@ def models(
 app = options.command_line(
     "codebotler", "Turn instructions into robot programs, check them, and run them on robots."
 )
-for command in (generate, check, rules, skills, run, missions, models, robots):
+for command in (generate, check, rules, skills, run, missions, models, robots, connect):
     app.command()(command)
 app.command("serve")(serve_page)
 app.command("virtual-robot")(virtual_robot)

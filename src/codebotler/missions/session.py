@@ -35,7 +35,7 @@ from codebotler.models.base import Model, ModelError
 from codebotler.models.open import open_model
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import prompt_for
-from codebotler.robots.base import NotReadyError, Robot
+from codebotler.robots.base import CancelledError, NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
@@ -265,9 +265,19 @@ class MissionSession:
             while mission.state.is_open:
                 self._wait_for_a_person(mission)
             if mission.state is State.APPROVED:
-                self._note_warnings(mission)
-                with suppress(MissionError):  # it was stopped before it could run
-                    mission.run(reserved, place, rules=self._view.rules_in_force, room_map=room_map)
+                self._run_approved(mission, reserved, place, room_map)
+
+    def _run_approved(
+        self, mission: Mission, reserved: Reservation, place: str, room_map: RoomMap | None
+    ) -> None:
+        """Run the approved program."""
+        self._note_warnings(mission)
+        rules = self._view.rules_in_force
+        keep_out = getattr(self._robot, "keep_out", None)  # which robots with a planner have
+        with suppress(MissionError, CancelledError):  # it was stopped before it could run
+            if keep_out is not None:
+                keep_out(rules)
+            mission.run(reserved, place, rules=rules, room_map=room_map)
 
     def _note_warnings(self, mission: Mission) -> None:
         """Log what speaks against the approved program; drafts before it had warnings of their own."""

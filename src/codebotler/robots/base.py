@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar
 from codebotler.core.world import World
 from codebotler.robots.clock import Clock
+
+if TYPE_CHECKING:
+    from codebotler.robots.ros.connection import Connection
 
 Argument: TypeAlias = Scalar | tuple[Scalar, ...]
 """An argument of a skill: a text or another value, a list of these, or the options of a question."""
@@ -171,6 +174,7 @@ class Options:
         address: of the robot, such as the URI of a ROS master or rosbridge; empty for the default.
         ros_python: the interpreter that the robot's ROS belongs to.
         skills: the skills it may be asked to perform.
+        connection: what a robot on ROS offers, where that is not an action for each skill.
     """
 
     world: World | None = None
@@ -178,3 +182,4 @@ class Options:
     address: str = ""
     ros_python: Path = ROS_PYTHON
     skills: SkillTable = SKILLS
+    connection: Connection | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from html import escape
 
 from codebotler.core.terminal import shortened
-from codebotler.core.world import Point, Room, World, laid_out, rooms_along
+from codebotler.core.world import Point, Room, World, is_within, laid_out
 
 MARGIN = 0.6
 MOST_ROOMS = 100
@@ -87,7 +87,7 @@ def floorplan(world: World, state: MapState) -> str:
 
 def room_at(rooms: Iterable[Room], at: Point) -> str:
     """The name of the room whose footprint a point is in; empty if there is none."""
-    return next(iter(next(rooms_along(rooms, at, at))), "")
+    return next((one.name for one in rooms if one.footprint and is_within(at, one.footprint)), "")
 
 
 def _joined(points: Iterable[Point]) -> str:

@@ -12,12 +12,13 @@ from codebotler.rtl import And, EventPattern, Exists, Formula, Not
 from codebotler.simulator.rule_guard import Rule
 
 RESOLUTION = 0.05  # metres
+NOWHERE = ((0.0, 0.0), (RESOLUTION, RESOLUTION))  # what an empty mask covers, which replaces an earlier one
 
 
 def keepout(
     rules: Sequence[Rule], rooms: Sequence[Room], frame: str = "map", topic: str = "/keepout_filter_mask"
-) -> tuple[dict[str, Any], dict[str, Any]] | None:
-    """A nav_msgs/OccupancyGrid and a nav2_msgs/CostmapFilterInfo; None if no rule forbids a known room.
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A nav_msgs/OccupancyGrid and a nav2_msgs/CostmapFilterInfo.
 
     Args:
         rules: the rules in force; those of the form `always: not tr.Exists(inside(...))` count.
@@ -29,9 +30,7 @@ def keepout(
     zones = [
         room.footprint for room in rooms if room.footprint and any(e.text.matches(room.name) for e in never)
     ]
-    if not zones:
-        return None
-    xs, ys = zip(*(corner for zone in zones for corner in zone), strict=True)
+    xs, ys = zip(*(corner for zone in zones or [NOWHERE] for corner in zone), strict=True)
     left, bottom = (math.floor(min(each) / RESOLUTION) * RESOLUTION for each in (xs, ys))
     width, height = (math.ceil((max(each) - low) / RESOLUTION) for each, low in ((xs, left), (ys, bottom)))
     cells = [0] * (width * height)
