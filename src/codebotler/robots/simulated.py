@@ -50,9 +50,8 @@ class Simulated:
         UserError: the speed is out of range.
     """
 
-    name, address = "simulated", ""
+    name, address, has_pose = "simulated", "", True
     if_tool_dies, rooms_are_regexes = "the simulated robot ended with the tool", True
-    has_pose = True
     missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(

@@ -13,7 +13,6 @@ from codebotler.simulator.rule_guard import Rule
 
 RESOLUTION = 0.05  # metres
 NOWHERE = ((0.0, 0.0), (RESOLUTION, RESOLUTION))  # what an empty mask covers, which replaces an earlier one
-NO_TURN = dict.fromkeys("xyz", 0.0) | {"w": 1.0}
 
 
 def keepout(
@@ -41,7 +40,7 @@ def keepout(
             columns = [round((edge - left) / RESOLUTION) for edge in edges]
             for first, end in zip(columns[::2], columns[1::2], strict=True):
                 cells[row * width + first : row * width + end] = [100] * (end - first)
-    origin = {"position": {"x": left, "y": bottom, "z": 0.0}, "orientation": NO_TURN}
+    origin = {"position": {"x": left, "y": bottom, "z": 0.0}, "orientation": {"w": 1.0}}
     info = {"resolution": RESOLUTION, "width": width, "height": height, "origin": origin}
     header = {"frame_id": frame}
     about = {"header": header, "type": 0, "filter_mask_topic": topic, "base": 0.0, "multiplier": 1.0}
