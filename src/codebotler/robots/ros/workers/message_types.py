@@ -61,7 +61,7 @@ def as_data(value: Any) -> Any:
 
 
 def parts_of(kind: str) -> tuple[str, str]:
-    """The package and the name of a type, which may name its kind between them; without one, it is in ours."""
+    """The package and the name of a type, without its kind; without a package, it is in ours."""
     *package, name = kind.split("/")
     return package[0] if package else PACKAGE, name
 
