@@ -164,7 +164,7 @@ class ConnectedRobot(RosRobot):
         if worker is None or (self.connection.pose is None and self.connection.velocity is None):
             return
         motion, until = worker.motion, time.monotonic() + self._waits.patience
-        while not motion.is_still and time.monotonic() < until:
+        while not motion.is_still and not motion.is_silent and time.monotonic() < until:
             time.sleep(BEAT)
         if motion.is_moving:
             raise RobotLostError(f"its goal was cancelled, but the robot goes on moving: {BY_HAND}")
