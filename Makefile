@@ -43,6 +43,7 @@ INSTRUCTION = Look into every printer room for a stapler. To each printer room t
 from the supply room.
 # As in the extra of this name.
 ROS2 = "ros-rclpy>=9.1.2" ros-rmw-fastrtps-cpp ros-rosidl-generator-py ros-rosidl-typesupport-c
+ROS2_MESSAGES = ros-geometry-msgs ros-std-msgs ros-std-srvs # that tests exchange
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
@@ -191,7 +192,7 @@ $(ROS2_VENV)/made:
 	@echo "making an environment with ROS 2 in $(ROS2_VENV), which takes a minute"
 	@$(PYTHON) -m venv --clear $(ROS2_VENV)
 	@$(ROS2_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(ROS2_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile $(ROS2) | { $(DOTS); }
+	@$(ROS2_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile $(ROS2) $(ROS2_MESSAGES) | { $(DOTS); }
 	@touch $@
 
 # Of what is installed here, most is never imported: --no-compile saves minutes.

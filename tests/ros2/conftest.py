@@ -14,7 +14,7 @@ from codebotler.robots.ros.worker import lacks
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
 
 HERE = Path(__file__).parent
-DOMAIN = 40  # and the number of the test process: each has a graph of its own
+DOMAIN = 10 + os.getpid() % 90  # each test process has a graph of its own
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -28,9 +28,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(DOMAIN + number))
+        patch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
         # The profile keeps all traffic on loopback; LOCALHOST would add sockets on other addresses to it.
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
         patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros2")))

@@ -18,7 +18,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.robot import Waits
+from codebotler.robots.ros.robot import RosRobot, Waits
 from codebotler.robots.ros.worker import WORKERS
 from ros2_scene import ROS2_PYTHON, Scene, installed
 from ros_graph import GO_TO, SAY, started
@@ -219,6 +219,54 @@ def test_killed_tool_leaves_no_moving_robot(scene: Scene) -> None:
         assert time.monotonic() - killed < 2
 
 
+def test_goals_of_a_worker_that_was_killed_with_its_tool_are_cancelled_by_the_next(scene: Scene) -> None:
+    server = scene.serve(GO_TO)
+    with begun_tool() as tool:
+        server.expect("goal", "never")
+        (worker,) = children(tool.pid)
+        os.kill(worker, signal.SIGSTOP)  # so that it does not notice that it is alone
+        tool.kill()
+        os.kill(worker, signal.SIGKILL)
+    time.sleep(5)  # the worker has left the graph, and its lock is free
+    robot = scene.robot()
+    robot.connect()
+    server.expect("cancel", "never")
+    robot.disconnect()
+    with started(lambda: perform_as_somebody_else(scene)) as ended:
+        server.expect("goal", "never")
+        robot.connect()
+        robot.perform("go_to", ["the hall"])
+        server.expect("goal", "the hall")  # nothing is left behind any more
+        scene.robots[-1].cancel()
+    assert isinstance(ended["error"], CancelledError)
+
+
+def test_connection_after_another_finds_nothing_left_behind(scene: Scene) -> None:
+    scene.serve(GO_TO)
+    robot = scene.robot()
+    for _ in range(2):
+        robot.connect()
+        assert robot._worker is not None
+        assert robot._worker.about["cancelled_all"] is False
+        robot.perform("go_to", ["the hall"])
+
+
+def children(process: int) -> list[int]:
+    return [int(pid) for pid in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+def perform_as_somebody_else(scene: Scene) -> None:
+    environment = {"ROS_DOMAIN_ID": os.environ["ROS_DOMAIN_ID"]}
+    skills = SkillTable((GO_TO,))
+    options = Options(ros_python=ROS2_PYTHON, skills=skills)
+    other = RosRobot(
+        "ros2", environment["ROS_DOMAIN_ID"], "ros2_worker.py", options, environment, node="somebody"
+    )
+    scene.robots.append(other)
+    other.connect()
+    other.perform("go_to", ["never"])
+
+
 def test_suspended_tool_stops_the_robot(scene: Scene) -> None:
     server = scene.serve(GO_TO)
     with begun_tool() as tool:
@@ -240,6 +288,17 @@ def test_installed_package_is_preferred_and_its_feedback_is_told(
     told: list[str | Picture] = []
     robot.perform("go_to", ["feedback"], told.append)
     assert told == ["near: the hall"]
+
+
+@pytest.mark.parametrize("text", ["\ud800", "half\0of it"])
+def test_text_that_no_message_can_hold_is_said(scene: Scene, text: str) -> None:
+    server = scene.serve(SAY)
+    robot = scene.robot()
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"/say_server cannot be sent.*(surrogates|NUL)"):
+        robot.perform("say", [text])
+    robot.perform("say", [r"a \x00 and \0"])
+    server.expect("goal", r"a \x00 and \0")
 
 
 def test_many_goals_in_a_row_and_none_is_lost(scene: Scene) -> None:

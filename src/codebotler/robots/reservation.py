@@ -80,8 +80,7 @@ class Reservation:
 
     def _path(self) -> Path:
         if self.robot.address:
-            digest = sha256(endpoint(self.robot.address).encode(errors="surrogatepass")).hexdigest()
-            return lock_folder() / f"{self.robot.name} {digest}.lock"
+            return file_of(self.robot.name, self.robot.address, "lock")
         folder = self._home / "robots"
         make_folder(folder)
         return folder / f"{self.robot.name}.lock"
@@ -104,6 +103,17 @@ class Reservation:
             return f"another tool (process {holder['process']}, since {holder['since']})"
         except ValueError:  # it is being written
             return "another tool"
+
+
+def file_of(robot: str, address: str, kind: str) -> Path:
+    """A file of this user on this machine about the robot at an address.
+
+    Raises:
+        NotReadyError: others could write there.
+        OSError: its folder cannot be created.
+    """
+    digest = sha256(endpoint(address).encode(errors="surrogatepass")).hexdigest()
+    return lock_folder() / f"{robot} {digest}.{kind}"
 
 
 def lock_folder() -> Path:

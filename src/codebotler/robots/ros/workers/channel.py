@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import signal
 import sys
 import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import IO, Any, Dict
 
 Message = Dict[str, Any]
+WRITES = 1.0  # seconds for the tool to read the last lines
 
 
 class SetupError(Exception):
@@ -26,17 +29,20 @@ class Channel:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
         os.dup2(2, 1)
         self._in: IO[str] = os.fdopen(os.dup(0), "r", encoding="utf-8")
-        self._lock = threading.Lock()
+        # A tool that is suspended reads nothing: who stops the robot then must not wait for it.
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._writer = threading.Thread(target=self._write, daemon=True)
+        self._writer.start()
         self.heard = float("inf")  # when the tool last sent something; infinite while a worker acts upon it
 
     def send(self, what: str, **more: Any) -> None:
-        """Write one line; a tool that is gone is noticed at the end of the input."""
-        with self._lock:
-            try:
-                self._out.write(json.dumps({"is": what, **more}, default=str) + "\n")
-                self._out.flush()
-            except (OSError, ValueError):
-                return
+        """Have a line written; a tool that is gone is noticed at the end of the input."""
+        self._lines.put(json.dumps({"is": what, **more}, default=str) + "\n")
+
+    def finish(self) -> None:
+        """Wait a moment until all is written."""
+        self._lines.put(None)
+        self._writer.join(WRITES)
 
     def lines(self) -> Iterator[Message]:
         """Incoming messages but for signs of life, until the tool closes its end or dies."""
@@ -46,6 +52,12 @@ class Channel:
                 self.heard = float("inf")
                 yield message
             self.heard = time.monotonic()
+
+    def _write(self) -> None:
+        for line in iter(self._lines.get, None):
+            with suppress(OSError, ValueError):
+                self._out.write(line)
+                self._out.flush()
 
 
 def serve(make_worker: Callable[[Channel, Message], Any]) -> None:
@@ -75,5 +87,6 @@ def serve(make_worker: Callable[[Channel, Message], Any]) -> None:
     finally:
         if worker is not None:
             worker.leave()
+        channel.finish()
         sys.stderr.flush()
         os._exit(status)  # rospy's threads would go on

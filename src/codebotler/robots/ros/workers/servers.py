@@ -13,7 +13,7 @@ from typing import Any
 from channel import Channel, Message, SetupError, serve
 from graph import Ros1Graph, no_master
 from message_types import message_types
-from pictures import Camera, PictureTopic
+from pictures import PictureTopic, Ros1Camera
 
 
 class ActionServers:
@@ -33,7 +33,7 @@ class ActionServers:
         self.graph.enter()
         self.handles: dict[str, Any] = {}
         self.topics: dict[str, PictureTopic] = {}
-        self.camera = Camera(start["camera"]) if start.get("camera") else None
+        self.camera = Ros1Camera(start["camera"]) if start.get("camera") else None
         self.lock = threading.Lock()
         specs = message_types(list(start["actions"].values()))
         self.servers: list[Any] = []
