@@ -43,7 +43,7 @@ INSTRUCTION = Look into every printer room for a stapler. To each printer room t
 from the supply room.
 # As in the extra of this name.
 ROS2 = "ros-rclpy>=9.1.2" ros-rmw-fastrtps-cpp ros-rosidl-generator-py ros-rosidl-typesupport-c
-ROS2_MESSAGES = ros-geometry-msgs ros-std-msgs ros-std-srvs # that tests exchange
+ROS2_MESSAGES = ros-geometry-msgs ros-nav-msgs ros-std-msgs ros-std-srvs # that tests exchange
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
