@@ -24,6 +24,7 @@ from ros2_scene import ROS2_PYTHON, Scene, installed
 from ros_graph import GO_TO, SAY, started
 
 
+@pytest.mark.smoke
 def test_goal_is_executed_and_the_result_comes_back(scene: Scene) -> None:
     server = scene.serve(*SKILLS.rows)
     robot = scene.robot()
@@ -37,6 +38,7 @@ def test_goal_is_executed_and_the_result_comes_back(scene: Scene) -> None:
     assert robot.perform("ask", ["ann", "Tea, „ann”?", ("yes", "no")]) == ""
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("state", ["abort", "reject"])
 def test_rejected_or_aborted_goal_is_a_robot_error(scene: Scene, state: str) -> None:
     scene.serve(GO_TO)
@@ -49,6 +51,7 @@ def test_rejected_or_aborted_goal_is_a_robot_error(scene: Scene, state: str) -> 
     robot.perform("go_to", ["the hall"])
 
 
+@pytest.mark.smoke
 def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_connect(scene: Scene) -> None:
     server = scene.serve(GO_TO)
     robot = scene.robot()

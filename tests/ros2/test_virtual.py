@@ -121,6 +121,7 @@ def test_own_values_of_every_type_go_there_and_back(scene: Scene, tmp_path: Path
     virtual.stop()
 
 
+@pytest.mark.smoke
 def test_commands_of_the_guide(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(WORLD.to_yaml())
     (tmp_path / "mug.py").write_text(PROGRAM)
