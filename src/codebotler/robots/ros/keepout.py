@@ -27,9 +27,7 @@ def keepout(
         topic: on which the grid will be published, latched.
     """
     never = [element for rule in rules if rule.when == "always" for element in _never(rule.formula)]
-    zones = [
-        room.footprint for room in rooms if room.footprint and any(e.text.matches(room.name) for e in never)
-    ]
+    zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in never)]
     xs, ys = zip(*(corner for zone in zones or [NOWHERE] for corner in zone), strict=True)
     left, bottom = (math.floor(min(each) / RESOLUTION) * RESOLUTION for each in (xs, ys))
     width, height = (math.ceil((max(each) - low) / RESOLUTION) for each, low in ((xs, left), (ys, bottom)))
