@@ -111,7 +111,6 @@ def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("time.monotonic", lambda: now)
     seen = Motion()
     states = [(seen.is_still, seen.is_moving)]  # it has said nothing
-    assert seen.is_silent
     pose = {"is": "pose", "x": 1.0, "y": 0.0, "yaw": math.pi, "frame": "map"}
     for later, said in (
         (0.0, pose),
@@ -123,7 +122,7 @@ def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None
         now += later
         seen.take(said)
         states.append((seen.is_still, seen.is_moving))
-    assert not seen.is_silent
     now += 1.5
     states.append((seen.is_still, seen.is_moving))  # it says no more
+    assert seen.is_silent
     assert states == [(False, False), *[(False, True)] * 3, (True, False), (False, True), (False, False)]

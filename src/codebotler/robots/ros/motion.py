@@ -49,7 +49,7 @@ class Motion:
 
     @property
     def is_silent(self) -> bool:
-        """Whether it has reported nothing for a while; AMCL publishes no pose of a robot that stands still."""
+        """Whether it has reported nothing for a while, as AMCL does where a robot stands still."""
         return self._heard < time.monotonic() - 2 * STILL
 
     @property
