@@ -31,7 +31,7 @@ ON_TOP = {
         "pyproject.toml",
     ),
     *(path.name for path in ROOT.glob("constraints*.txt")),
-    *(".ci", "bench", "environments", "docs", "examples", "packaging", "src", "tests", "website"),
+    *(".ci", "bench", "environments", "docs", "examples", "packaging", "ros", "src", "tests", "website"),
 }
 """Of what a source archive is made."""
 

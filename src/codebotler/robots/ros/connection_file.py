@@ -79,6 +79,7 @@ class SkillForm(_Form):
     message: dict[str, Any] = {}
     result: str = ""
     success: str = ""
+    reason: str = ""
     detector: str | None = None
     image: Topic | None = None
 
@@ -169,9 +170,9 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
             raise file.wrong(f"${variable} is unknown here{lacks}; known are: {given}", *at, SENT[kind])
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _whole(kind, form.type), skill.ros
-    is_own = ros is not None and whole == f"{ros.package}/action/{ros.type}"
-    definition = ros.definition if ros is not None and is_own else ""
-    return Call(kind, name, whole, request, definition, form.result, form.success, failure)  # type: ignore[arg-type]
+    is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
+    definition = ros.definition if ros is not None and is_ours else ""
+    return Call(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]
 
 
 def _whole(kind: str, text: str) -> str:

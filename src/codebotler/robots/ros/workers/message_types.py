@@ -64,9 +64,9 @@ def as_data(value: Any) -> Any:
 
 
 def parts_of(kind: str) -> tuple[str, str]:
-    """The package and the name of a type, with or without msg, srv or action; ours is the default package."""
-    *packages, name = kind.split("/")
-    return (packages or [PACKAGE])[0], name
+    """The package and the name of a type, without its kind; without a package, it is in ours."""
+    *package, name = kind.split("/")
+    return package[0] if package else PACKAGE, name
 
 
 def offer_of(kind: str) -> str:
