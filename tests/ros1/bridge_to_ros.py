@@ -17,7 +17,7 @@ import genpy.message
 import rospy
 
 from channel import SetupError
-from message_types import as_data, installed, message_types, picture_types
+from message_types import as_data, installed, message_types
 
 LOCK = threading.Lock()
 SUBSCRIBED: dict[str, Any] = {}
@@ -38,8 +38,8 @@ def known_types() -> dict[str, Any]:
 
 
 def type_of(kind: str, types: dict[str, Any], folder: str = "msg") -> Any:
-    if kind in types or kind in picture_types():
-        return types.get(kind) or picture_types()[kind]
+    if kind in types:
+        return types[kind]
     try:
         return installed(kind.partition("/")[0], folder, kind.partition("/")[2])
     except SetupError:
@@ -77,7 +77,8 @@ def obey(message: dict[str, Any], types: dict[str, Any], published: dict[str, An
                 topic, spec, lambda heard: tell(op="publish", topic=topic, msg=as_data(heard))
             )
     elif operation == "unsubscribe":
-        SUBSCRIBED.pop(topic).unregister()
+        if topic in SUBSCRIBED:
+            SUBSCRIBED.pop(topic).unregister()
     elif operation == "publish" and topic in published:
         made = published[topic].data_class()
         genpy.message.fill_message_args(made, [message["msg"]])

@@ -154,13 +154,14 @@ class ConnectedRobot(RosRobot):
         return nearest
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
-        """Look for something in a camera's last picture, unless the robot is stopped."""
+        """Look for something in a camera's next picture, unless the robot is stopped."""
         until = time.monotonic() + self._waits.patience
-        order = {"do": "look", "topic": topic, "oldest": self._waits.patience}
+        order = {"do": "look", "topic": topic, "is_new": True}
         while "none" in (seen := self._awaited(order, no_feedback)["values"]):
             if time.monotonic() > until:
                 raise RobotError("IsInRoomFailed", seen["none"])
             time.sleep(BEAT)
+            order["is_new"] = False
         found, detector = Future[tuple[bool, bytes]](), self._detectors[model]
 
         def look() -> None:

@@ -11,17 +11,7 @@ from typing import Any
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
-from message_types import (
-    BUFFER,
-    COMPRESSED,
-    as_data,
-    installed,
-    message_types,
-    parts_of,
-    picture_types,
-    type_of_sender,
-)
-from pictures import Ros1Camera
+from message_types import as_data, installed, message_types, parts_of, type_of_sender
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
 
@@ -44,12 +34,7 @@ class Ros1Server:
         self._since = 0.0
         topic = rospy.remap_name(self.name)
         self._status = rospy.Subscriber(f"{topic}/status", actionlib_msgs.msg.GoalStatusArray, self._hear)
-        self._pictures = rospy.Subscriber(
-            f"{topic}/picture",
-            picture_types()[COMPRESSED],
-            lambda message: see(self, message.data),
-            buff_size=BUFFER,
-        )
+        self._pictures = subscribed(f"{topic}/picture", lambda message: see(self, message["data"]))
 
     def shows_pictures(self) -> bool:
         """Whether anything publishes what it sees."""
@@ -134,6 +119,22 @@ class Ros1Topic(Ros1Service):
         return {}
 
 
+def subscribed(topic: str, hear: Callable[[Message], object]) -> Any:
+    """A subscriber that calls `hear` with each message as plain data, of the type that its publisher has."""
+    import rospy
+
+    known: dict[str, Any] = {}
+
+    def take(message: Any) -> None:
+        header = message._connection_header
+        kind = header["type"]
+        if kind not in known:
+            known[kind] = type_of_sender(kind, header["message_definition"])
+        hear(as_data(known[kind]().deserialize(message._buff)))
+
+    return rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
+
+
 OTHERS = {"service": Ros1Service, "topic": Ros1Topic}
 
 
@@ -155,25 +156,16 @@ class Ros1Worker(SkillWorker):
             for skill, call in calls.items()
         }
         self._listen(start)
-        self.cameras = {topic: Ros1Camera(topic) for topic in start["cameras"]}
         return left_behind
 
-    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
-        """Call `hear` with each message of a topic as plain data, of the type that its publisher has."""
-        import rospy
-
+    def listen(
+        self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True
+    ) -> Callable[[], object]:
+        """Call `hear` with each message of a topic as plain data; what ends that."""
         if is_needed and not self.graph.has_publisher(topic):
             raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
-        known: dict[str, Any] = {}
-
-        def take(message: Any) -> None:
-            header = message._connection_header
-            kind = header["type"]
-            if kind not in known:
-                known[kind] = type_of_sender(kind, header["message_definition"])
-            hear(as_data(known[kind]().deserialize(message._buff)))
-
-        rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
+        end: Callable[[], object] = subscribed(topic, hear).unregister
+        return end
 
     def send(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless no message can hold it."""

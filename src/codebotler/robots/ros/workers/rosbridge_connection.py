@@ -58,16 +58,17 @@ class Connection:
         with suppress(ConnectionClosed):
             self._socket.send(json.dumps(message))
 
-    def listen(self, topic: str, hear: Callable[[Message], object]) -> None:
-        """Call `hear` with each message of a topic."""
+    def listen(self, topic: str, hear: Callable[[Message], object]) -> Callable[[], None]:
+        """Call `hear` with each message of a topic; what ends that for all who listen to it."""
         if topic not in self._listeners:
             self.send({"op": "subscribe", "topic": topic})
         self._listeners[topic] = (*self._listeners.get(topic, ()), hear)
 
-    def ignore(self, topic: str) -> None:
-        """Hear no more of a topic."""
-        del self._listeners[topic]
-        self.send({"op": "unsubscribe", "topic": topic})
+        def ignore() -> None:
+            del self._listeners[topic]
+            self.send({"op": "unsubscribe", "topic": topic})
+
+        return ignore
 
     def insist(self, message: Message) -> bool:
         """Send a message over another connection, again and again for a while; whether that was possible."""

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
 from message_types import parts_of
-from pictures import RosbridgeCamera
 from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
 from rosbridge_protocol import GoalUpdate
 
@@ -69,14 +68,16 @@ class RosbridgeWorker(SkillWorker):
             ) from None
         self.servers = {skill: RosbridgeServer(self.graph, call) for skill, call in calls.items()}
         self._listen(start)
-        self.cameras = {topic: RosbridgeCamera(self.graph, topic) for topic in start["cameras"]}
         self._message: Message = {}
         self._again = 0.0
         return False
 
-    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - nobody knows whether it is there
-        """Call `hear` with each message of a topic as plain data."""
-        self.graph.listen(topic, hear)
+    def listen(
+        self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True
+    ) -> Callable[[], object]:
+        """Call `hear` with each message of a topic as plain data; what ends that."""
+        del is_needed  # nobody knows whether it is there
+        return self.graph.listen(topic, hear)
 
     def missing(self) -> dict[str, str]:
         """Nothing: servers are seen only when their skills are performed."""
