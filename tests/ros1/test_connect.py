@@ -47,6 +47,7 @@ from codebotler import Simulation, skill
 def open_door(sim: Simulation) -> None:
     \"\"\"Open the door.\"\"\"
 """
+SAY = "skills: {say: {topic: /speech, type: std_msgs/String, message: {data: $message}}}"
 WAITS = Waits(patience=3.0, silence=1.5, longest=20.0)
 BOTH = pytest.mark.parametrize("kind", ["ros1", "rosbridge"])
 
@@ -234,6 +235,16 @@ def test_what_is_missing_is_said(robots: Robots) -> None:
         robot = robots.robot(text=CONNECTION.replace(before, after))
         with pytest.raises(NotReadyError, match=named):
             robot.connect()
+
+
+@BOTH
+def test_message_is_not_lost_right_after_the_connection(robots: Robots, kind: str) -> None:
+    robot_itself = robots.move_base()
+    robot = robots.robot(kind, CONNECTION[: CONNECTION.index("places:")] + SAY)
+    robot.connect()
+    assert robot.missing == {}
+    robot.perform("say", ["hello"])
+    assert told(robot_itself, "heard") == ["hello"]
 
 
 def test_message_without_a_field_is_said(robots: Robots) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import pytest
 from mcap.reader import make_reader
@@ -28,7 +29,7 @@ from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot, Waits
 from codebotler.robots.ros.worker import WORKERS
 from halves import encoded, has_frame, rows, sees
-from ros_graph import HERE, Graph, Process, started
+from ros_graph import HERE, LONG, Graph, Process, started
 from server import Fault, Server
 
 SRC = HERE.parents[1] / "src"
@@ -92,6 +93,13 @@ def camera(graph: Graph, kind: str, fields: dict[str, Any], topic: str = TOPIC) 
     return process
 
 
+def listened_to(graph: Graph) -> list[str]:
+    """The topics to which anybody listens."""
+    with ServerProxy(graph.uri) as master:
+        answer: Any = master.getSystemState("/test")
+    return [topic for topic, _ in answer[2][1]]
+
+
 @BOTH
 @pytest.mark.parametrize(
     ("message", "fields"),
@@ -115,6 +123,10 @@ def test_camera_becomes_an_answer_and_a_picture(
     assert has_frame(picture.data)
     assert robot.perform("is_in_room", ["cat"]) is False
     assert len(model.requests) == 2
+    until = time.monotonic() + LONG
+    while TOPIC in listened_to(eyes.graph):
+        assert time.monotonic() < until, "pictures go on to arrive"
+        time.sleep(0.05)
 
 
 @pytest.mark.usefixtures("model")

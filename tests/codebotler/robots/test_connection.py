@@ -66,6 +66,28 @@ def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, line: in
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("kind", "text", "whole"),
+    [
+        ("action", "move_base_msgs/MoveBase", "move_base_msgs/action/MoveBase"),
+        ("action", "move_base_msgs/MoveBaseAction", "move_base_msgs/action/MoveBase"),
+        ("action", "move_base_msgs/msg/MoveBaseAction", "move_base_msgs/action/MoveBase"),
+        ("action", "lab_msgs/action/TakeAction", "lab_msgs/action/TakeAction"),
+        ("service", "std_srvs/Trigger", "std_srvs/srv/Trigger"),
+        ("service", "std_srvs/srv/Trigger", "std_srvs/srv/Trigger"),
+        ("topic", "std_msgs/String", "std_msgs/msg/String"),
+    ],
+)
+def test_types_are_written_as_on_ros_1_or_2(tmp_path: Path, kind: str, text: str, whole: str) -> None:
+    assert read(tmp_path, f"skills:\n  say: {{{kind}: /a, type: {text}}}\n").calls["say"].type == whole
+
+
+def test_actions_of_ours_need_no_package(tmp_path: Path) -> None:
+    for text in ("robot_actions_pkg/Say", "robot_actions_pkg/action/Say"):
+        call = read(tmp_path, f"skills:\n  say: {{action: /a, type: {text}}}\n").calls["say"]
+        assert call.definition == "string message\n---\n---\n"
+
+
 def test_fields_are_filled_from_arguments() -> None:
     request = {"pose.x": "$place.x", "pose.y": 2, "names": ["$who", "to $who"], "plain": {"who": "$who"}}
     fields = Call("topic", "/a", "a/msg/B", request).fields({"who": "ann", "place.x": 1.5})
