@@ -30,7 +30,8 @@ from codebotler.perception import (
     read_image,
 )
 from codebotler.robots.base import NotReadyError
-from codebotler.robots.ros.robot import actions_of
+from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.ros.robot import calls_data
 from codebotler.robots.ros.ros1 import master_uri
 from codebotler.robots.ros.worker import RosWorker
 
@@ -55,7 +56,7 @@ class Server:
     ) -> None:
         self.detector, self.file, self.topic, self.oldest = detector, file, topic, oldest
         address = master_uri()
-        actions = actions_of(SkillTable((SKILLS[SKILL],)))
+        actions = calls_data(connection_of(SkillTable((SKILLS[SKILL],))))
         start = {"node": f"{SKILL}_server", "actions": actions, "port": None, "camera": topic, "show": True}
         self.worker = RosWorker(python, "servers.py", start, {"ROS_MASTER_URI": address})
         print(f"at {address}; ready, Ctrl-C ends it", flush=True)

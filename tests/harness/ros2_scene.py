@@ -32,8 +32,9 @@ print("at", built(sys.argv[2], json.loads(sys.argv[3])))
 
 def installed(package: str, definitions: dict[str, str]) -> str:
     """Build a package unless that was done before; what is on the path if it is installed."""
+    actions = {f"action/{name}": text for name, text in definitions.items()}
     done = subprocess.run(
-        [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS), package, json.dumps(definitions)],
+        [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS), package, json.dumps(actions)],
         capture_output=True,
         text=True,
         check=True,

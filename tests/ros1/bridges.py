@@ -17,7 +17,8 @@ from websockets.sync.server import ServerConnection, serve
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros.robot import actions_of
+from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.ros.robot import calls_data
 from codebotler.robots.ros.worker import WORKERS
 
 ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
@@ -72,7 +73,7 @@ def over_ros(
         skills: whose messages it knows.
         table: all of them.
     """
-    actions = [action for skill, action in actions_of(table).items() if skill in skills]
+    actions = [action for skill, action in calls_data(connection_of(table)).items() if skill in skills]
 
     def handle(connection: ServerConnection) -> None:
         with subprocess.Popen(

@@ -17,7 +17,8 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import rosbridge
-from codebotler.robots.ros.robot import RosRobot, Waits, actions_of
+from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.ros.robot import RosRobot, Waits, calls_data
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.ros.worker import WORKERS
 from ros_graph import Graph
@@ -85,7 +86,11 @@ def test_values_of_every_type_go_there_and_back(robot: RosRobot) -> None:
 
 
 def test_messages_belong_to_the_package_that_a_skill_names(table: SkillTable) -> None:
-    actions = [action for name, action in actions_of(table).items() if name in {"mix", "sum_up", "say"}]
+    actions = [
+        action
+        for name, action in calls_data(connection_of(table)).items()
+        if name in {"mix", "sum_up", "say"}
+    ]
     said = subprocess.run(
         [str(ROS_PYTHON), "-c", TYPES, str(WORKERS), json.dumps(actions)],
         capture_output=True,

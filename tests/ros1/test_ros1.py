@@ -87,7 +87,7 @@ def test_no_rospy_is_said_with_the_mend(graph: Graph) -> None:
 
 
 def test_robot_without_any_server_is_not_ready(graph: Graph) -> None:
-    with pytest.raises(NotReadyError, match=r"no action server .*/"):
+    with pytest.raises(NotReadyError, match=r"offers nothing: .*/"):
         graph.robot().connect()
 
 

@@ -34,8 +34,9 @@ def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
     """A sentence for each room that a rule names and a house lacks; none where no room is known."""
     if rule.any_room or not rooms:
         return
+    poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
     for pattern in dict.fromkeys(room_patterns(rule)):
-        if not may_mean(pattern, rooms):
+        if not may_mean(pattern, rooms) or (pattern in poses and not any(map(Regex(pattern).matches, rooms))):
             yield (
                 f'the rule "{rule.name}" names the room "{pattern}", which is not there'
                 f'{closest_room(pattern, rooms)}; correct it, or add "any: true"'

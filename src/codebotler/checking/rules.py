@@ -10,6 +10,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from codebotler.checking.rule_rooms import unknown_rooms_in
+from codebotler.core.skills.declaration import POSE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import brief
@@ -115,7 +116,7 @@ def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (
 
 def _parsed(text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula:
     try:
-        formula = parse(text, skills=skills)
+        formula = parse(text, skills=skills.with_skill(POSE))
     except RtlSyntaxError as error:
         there = brief(text[error.column - 1 :], MOST_QUOTED)
         where = f"column {error.column} of it" + (f", at {there}" if there else "")

@@ -71,7 +71,7 @@ class SampledRuns:
 
     def _new_robot(self, number: int) -> SampledRobot:
         how = self._settings
-        guard = RuleGuard(how.house_rules) if how.house_rules else None
+        guard = RuleGuard(how.house_rules, self._room_map.plan) if how.house_rules else None
         sampler = self._samplers[number]
         robot = SampledRobot(self._room_map, sampler, how.rules, how.skills, guard=guard)
         self._robots[number] = robot

@@ -10,7 +10,7 @@ import typer
 from codebotler.cli import options
 from codebotler.cli.ending import obey
 from codebotler.cli.model_options import model_settings, with_options_of
-from codebotler.cli.operating import missions, robots, run, serve_page, virtual_robot
+from codebotler.cli.operating import connect, missions, robots, run, serve_page, virtual_robot
 from codebotler.core.terminal import note, noting_all
 
 
@@ -98,6 +98,7 @@ def check(
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
+    from codebotler.simulator.sampled_robot import RoomMap
 
     table = skills_from(*(skills or ()))
     known = None if world is None else World.read(world, table)
@@ -106,8 +107,7 @@ def check(
     with busy("checking"):
         found = check.check(
             source,
-            rooms=None if known is None else [room.name for room in known.rooms],
-            start=None if known is None else known.robot,
+            room_map=None if known is None else RoomMap.of(known),
             samples=samples,
             seed=seed,
             strict=strict,
@@ -135,7 +135,7 @@ def rules(
     """
     from codebotler.checking.rule_review import reviewed
     from codebotler.checking.rules import read_rules
-    from codebotler.cli.rules import note_evasions, review_data, review_view
+    from codebotler.cli.rules import note_destinations, note_evasions, review_data, review_view
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
@@ -144,6 +144,7 @@ def rules(
     house_rules = read_rules(file, table)
     known = None if world is None else World.read(world, table)
     note_evasions(house_rules, known, table)
+    note_destinations(house_rules)
     with busy("looking for examples"):
         found = reviewed(house_rules, known)
     if json:
@@ -173,13 +174,13 @@ def skills(
 
     Each example is called in 40 imagined worlds.
     """
-    from codebotler.cli.skills import data, view, write_new
+    from codebotler.cli.skills import NEW, data, view, write_new
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.ros_package import write_ros_packages
     from codebotler.core.terminal import print_json, print_rich
 
     if new is not None:
-        write_new(new)
+        write_new(new, NEW.format(name=new))
         note(f"{new} is written; `codebotler skills {new}` shows what is in it")
         return
     table = skills_from(*([] if file is None else [file]))
@@ -216,7 +217,7 @@ def models(
 app = options.command_line(
     "codebotler", "Turn instructions into robot programs, check them, and run them on robots."
 )
-for command in (generate, check, rules, skills, run, missions, models, robots):
+for command in (generate, check, rules, skills, run, missions, models, robots, connect):
     app.command()(command)
 app.command("serve")(serve_page)
 app.command("virtual-robot")(virtual_robot)

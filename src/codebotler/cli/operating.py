@@ -1,4 +1,4 @@
-"""The commands that operate a robot: run, missions, robots, serve, virtual-robot."""
+"""The commands that operate a robot: run, missions, robots, connect, serve, virtual-robot."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ def run(
     ] = False,
     shows_all: options.AllOption = False,
     speed: options.SpeedOption = 1.0,
+    connect: options.ConnectOption = None,
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
     rules: options.RulesOption = None,
@@ -56,7 +57,8 @@ def run(
 
     chosen = chosen_model(model, base_url)
     table = skills_from(*(skills or ()))
-    known = options.world_or_office(robot, world, table)
+    robot, connection = options.connected(connect, robot, table)
+    known = options.world_or_office(robot, world, table, connection)
     house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
     request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
     asked = chosen.with_its_server(model_settings(**sampling))
@@ -67,6 +69,7 @@ def run(
         address=address,
         ros_python=ros_python,
         skills=table,
+        connection=connection,
     )
     body = open_robot(robot, settings)
     raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
@@ -125,6 +128,35 @@ def robots(
         print_rich(robots_view(found))
 
 
+def connect(
+    discover: Annotated[
+        bool, typer.Option("--discover", help="Look at what the robot's nodes offer.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Write to this new file.", metavar="FILE")] = None,
+    robot: Annotated[str, typer.Option(help="The robot's ROS: ros2 or ros1.")] = "ros2",
+    address: options.AddressOption = "",
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
+) -> None:
+    """Write a first file for --connect, from what a robot offers.
+
+    Comments in it say what is missing, and what else the robot offers.
+    """
+    from codebotler.cli.skills import write_new
+    from codebotler.core.errors import UserError
+    from codebotler.core.terminal import busy, print_source
+    from codebotler.robots.ros.discovery import first_connection, offers_of
+
+    if not discover:
+        raise UserError("add --discover: it looks at the robot, and writes a first file for --connect")
+    with busy("looking at the robot"):
+        text = first_connection(robot, offers_of(robot, address, ros_python))
+    if out is None:
+        print_source(text)
+    else:
+        write_new(out, text)
+        note(f"{out} is written; read it, and add what its first lines say is missing")
+
+
 @with_options_of(model_settings)
 def serve_page(
     host: options.HostOption = "127.0.0.1",
@@ -138,6 +170,7 @@ def serve_page(
     model: options.ModelsOption = None,
     base_url: options.BaseUrlOption = None,
     speed: options.SpeedOption = 1.0,
+    connect: options.ConnectOption = None,
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
     face: Annotated[
@@ -176,13 +209,14 @@ def serve_page(
     from codebotler.web.server import serve
 
     table = skills_from(*(skills or ()))
-    known = options.world_or_office(robot, world, table)
+    robot, connection = options.connected(connect, robot, table)
+    known = options.world_or_office(robot, world, table, connection)
     house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
     place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
     options.note_office(robot, world)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
-    settings = Options(known, speed or None, address, ros_python, table)
+    settings = Options(known, speed or None, address, ros_python, table, connection)
     shown = Face(face_timeout) if face else None
     opened = opener(models, base_url, model_settings(**sampling))
     body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)

@@ -13,6 +13,7 @@ from codebotler.core.terminal import note, print_text
 if TYPE_CHECKING:
     from codebotler.core.skills.table import SkillTable
     from codebotler.core.world import World
+    from codebotler.robots.ros.connection import Connection
 
 
 def robot_names(incomplete: str) -> list[str]:
@@ -94,6 +95,13 @@ SpeedOption = Annotated[
         min=0, help="The speed of the robot's clock as a multiple of real time, such as 20; 0 for no delays."
     ),
 ]
+ConnectOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="A file that says what a robot on ROS offers for each skill; --robot is then that of the file.",
+        metavar="FILE",
+    ),
+]
 AddressOption = Annotated[str, typer.Option(help="The robot's address, if not the default.")]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
@@ -123,10 +131,25 @@ NoTokenOption = Annotated[
 ]
 
 
-def world_or_office(robot: str, file: Path | None, skills: SkillTable) -> World | None:
-    """The world in the file that is named, or else an office for the simulated robot."""
+def connected(file: Path | None, robot: str, skills: SkillTable) -> tuple[str, Connection | None]:
+    """The kind of robot, and what it offers where a file says that."""
+    if file is None:
+        return robot, None
+    from codebotler.robots.ros.connection_file import read_connection
+
+    connection = read_connection(file, skills)
+    return connection.robot if robot == "sim" else robot, connection
+
+
+def world_or_office(
+    robot: str, file: Path | None, skills: SkillTable, connection: Connection | None = None
+) -> World | None:
+    """The world in the file that is named, or else a robot's places, or an office for the simulated robot."""
     from codebotler.core.world import World
     from codebotler.robots.simulated import OFFICE
+
+    if file is None and connection is not None:
+        return None if connection.places is None else connection.places.world()
 
     file = OFFICE if file is None and robot == "sim" else file
     return None if file is None else World.read(file, skills)

@@ -64,11 +64,11 @@ class Trial:
     event: Event | None
 
 
-def write_new(path: Path) -> None:
-    """Write a commented start of a file of skills; a UserError if there is such a file."""
+def write_new(path: Path, text: str) -> None:
+    """Write a file; a UserError if there is such a file."""
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(NEW.format(name=path))
+            file.write(text)
     except FileExistsError:
         raise UserError("it is there already; choose another name", file=path) from None
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TypeAlias
 
 from codebotler.core.skills.values import Scalar
@@ -112,18 +115,23 @@ class World:
 
 
 ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
+SQUARE = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
 
 
 def laid_out(world: World) -> World:
     """The world with a footprint and a standing point for every room: a grid on both sides of a hallway.
 
-    Rooms with a footprint keep it; the others are placed to the right of them.
+    Rooms with a footprint keep it; around a mere standing point it is a square of a metre, and other rooms
+    are placed to the right.
     """
     taken = [x for room in world.rooms for x, _ in room.footprint or ()]
     start = max(taken, default=0.0) + (HALLWAY if taken else 0.0)
     rooms, placed = [], 0
     for room in world.rooms:
         footprint = room.footprint
+        if footprint is None and room.stand_at is not None:
+            x, y = room.stand_at
+            footprint = tuple((x + dx, y + dy) for dx, dy in SQUARE)
         if footprint is None:
             left = start + placed // 2 * ROOM_WIDTH
             low = 0.0 if placed % 2 == 0 else ROOM_DEPTH + HALLWAY
@@ -136,6 +144,56 @@ def laid_out(world: World) -> World:
         )
         rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
     return replace(world, rooms=tuple(rooms))
+
+
+_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
+
+
+def is_within(point: Point, corners: Sequence[Point]) -> bool:
+    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
+    x, y = point
+    odd = False
+    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
+    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
+            return True
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            odd = not odd
+    return odd
+
+
+def _distance(point: Point, start: Point, end: Point) -> float:
+    """How far a point is from a line between two others."""
+    (x, y), (x1, y1), (x2, y2) = point, start, end
+    dx, dy = x2 - x1, y2 - y1
+    square = dx * dx + dy * dy
+    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
+    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
+
+
+SHORTEST = 1e-9  # part of a way, or metres; less is an error of rounding
+
+
+def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
+    """The names of the rooms that hold each part of a straight way, from its start to its end."""
+    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST
+    edges = {}  # of each room, where the way crosses them, by the share of the way that lies before
+    for room in rooms:
+        corners = [(complex(*corner) - here) / way for corner in room.footprint or ()]
+        edges[room.name] = crossings(0.0, [(corner.real, corner.imag) for corner in corners])
+    cuts = {0.0, 1.0, *(edge for each in edges.values() for edge in each if 0 < edge < 1)}
+    for one, other in pairwise(sorted(cuts)):
+        if other - one > SHORTEST:
+            middle = (one + other) / 2
+            yield tuple(name for name, each in edges.items() if sum(edge > middle for edge in each) % 2)
+
+
+def crossings(y: float, corners: Sequence[Point]) -> list[float]:
+    """Where the edges of a polygon cross a horizontal line, from left to right."""
+    edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
+    return sorted(
+        a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)
+    )
 
 
 def _person_data(person: Person) -> dict[str, object]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import math
 import re
 from collections.abc import Iterator
 from contextlib import suppress
@@ -32,7 +31,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar, plain, written_call
 from codebotler.core.words import listed
-from codebotler.core.world import Answer, Person, Point, Room, World
+from codebotler.core.world import Answer, Person, Room, World, is_within
 from codebotler.core.yaml_files import Place, YamlFile
 
 
@@ -147,7 +146,7 @@ class WorldFile(_Form):
                     sentence = f'the rooms "{other}" and "{room.name}" differ in capitals only; rename one'
                 raise file.wrong(sentence, *at, "rooms", index)
             names[room.name.lower()] = room.name
-            if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
+            if room.stand_at and room.footprint and not is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
                 raise file.wrong(f"{sentence}; move one of them", *at, "rooms", index, "stand_at")
@@ -220,28 +219,3 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
         return
     returned = [] if row.returns.base is None else [row.returns.words]
     raise ValueError(f"{name} cannot come to {value!r}; write {listed([*returned, *kinds], 'or')}")
-
-
-_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
-
-
-def _is_within(point: Point, corners: list[Point]) -> bool:
-    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
-    x, y = point
-    odd = False
-    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
-    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
-            return True
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
-            odd = not odd
-    return odd
-
-
-def _distance(point: Point, start: Point, end: Point) -> float:
-    """How far a point is from a line between two others."""
-    (x, y), (x1, y1), (x2, y2) = point, start, end
-    dx, dy = x2 - x1, y2 - y1
-    square = dx * dx + dy * dy
-    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
-    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Protocol
@@ -13,6 +14,8 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
+from codebotler.core.world import Point
+from codebotler.missions.progress import AT
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
@@ -61,6 +64,7 @@ class LiveRobot:
         self.line: int | None = None  # of the program, which calls a skill there
         self._place, self._held = place, ""
         self._here = [place]  # where the robot may be, as rules name it
+        self._at: Point | None = None  # where the robot said it is
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
@@ -181,6 +185,19 @@ class LiveRobot:
             self._end_by(broken)
             raise
 
+    def _moved(self, feedback: str) -> None:
+        """Tell the guard which rooms the robot has entered, as if it drove straight between its reports."""
+        found = AT.search(feedback)
+        if found is None or self._guard is None or self._stopped.is_set():
+            return
+        at = float(found[1]), float(found[2])
+        before, self._at = self._at or at, at
+        try:
+            self._guard.moved(before, at, self._held)
+        except RuleViolationError as broken:
+            with suppress(StoppedError):  # this may be a thread of the robot
+                self._end_by(broken)
+
     def _end_by(self, broken: RuleViolationError) -> None:
         """Stop the robot, and only then log which rule was broken, unless the program may go on."""
         if broken.ends_run:
@@ -260,6 +277,7 @@ class LiveRobot:
                 if isinstance(what, Picture):
                     self._note("picture", **which, picture=what.data)
                 else:
+                    self._moved(what)
                     self._note("feedback", **which, text=what)
             except OSError as error:  # on a thread of the robot, where it would be lost
                 self._fault = error

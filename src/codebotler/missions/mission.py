@@ -230,7 +230,7 @@ class Mission:
             NotReadyError: the robot is on another mission, or was.
             OSError: an event could not be written or printed, so the robot was stopped.
         """
-        guard = RuleGuard(rules) if rules else None
+        guard = RuleGuard(rules, () if room_map is None else room_map.plan) if rules else None
         live = LiveRobot(reserved.robot, self._write, place=place, guard=guard, room_map=room_map)
 
         def on_broken(broken: RuleViolationError) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from codebotler.checking.problems import no_room
 from codebotler.checking.room_names import named_rooms
@@ -11,17 +11,22 @@ from codebotler.core.program import called_skills, tree_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
+from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import answered
 from codebotler.models.recorded import UnknownInstructionError, closest_to, recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
+from codebotler.rtl.wording import quoted
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 MOST_ROOMS = 1_000
 """Of a robot, for a check, which compares each drive with all of them."""
 
 
-def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms and for its own room; each likely mistake is a remark.
+def preflight(
+    robot: Robot, remark: Callable[[str], None], world: World | None = None
+) -> tuple[RoomMap | None, str]:
+    """Ask a connected robot for its rooms, which a map may place, and for its own; mistakes are remarks.
 
     Returns:
         the rooms, None if it does not list them; and the room it is in, empty if it does not say.
@@ -53,7 +58,30 @@ def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | No
         remark(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
     listed = list(map(str, rooms))
     names = dict.fromkeys([*listed, place] if place else listed)
-    return RoomMap(tuple(names), place or listed[0], plain=not robot.rooms_are_regexes), place
+    plan = () if world is None else _plan(robot, world)
+    return RoomMap(tuple(names), place or listed[0], plain=not robot.rooms_are_regexes, plan=plan), place
+
+
+def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
+    """The rooms of a map; one without a footprint has that of the grid only where the robot lives in it."""
+    rooms = laid_out(world).rooms if robot.rooms_are_regexes else world.rooms
+    is_straight = robot.name == "simulated"
+    return tuple(Room(r.name, (), (), r.footprint, r.stand_at if is_straight else None) for r in rooms)
+
+
+def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) -> None:
+    """Raise NotReadyError if a rule is about where the robot is, and that or a footprint is not known."""
+    known = room_map or RoomMap((), "")
+    outlined = {room.name for room in known.plan if room.footprint is not None}
+    for rule, element in ((one, element) for one in rules for element in one.inside):
+        lacks = [room for room in known.rooms if room not in outlined and element.text.matches(room)]
+        if not robot.has_pose:
+            why = f"needs the robot's position, which {robot.name} does not report; leave the rule out"
+        elif lacks or room_map is None:
+            why = f"needs the footprint of {quoted(lacks[0]) if lacks else 'each room'}; add it to the map"
+        else:
+            continue
+        raise NotReadyError(f'the rule "{rule.name}" {why}')
 
 
 def rooms_to_check(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:

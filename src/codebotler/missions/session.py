@@ -23,6 +23,7 @@ from codebotler.generation.generate import Generation, write_program
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
+    expect_poses,
     missing_skills,
     preflight,
     rooms_to_check,
@@ -34,7 +35,7 @@ from codebotler.models.base import Model, ModelError
 from codebotler.models.open import open_model
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import prompt_for
-from codebotler.robots.base import NotReadyError, Robot
+from codebotler.robots.base import CancelledError, NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
@@ -245,7 +246,7 @@ class MissionSession:
                 mission.stop(self._stopped_by or "")
                 return
             try:
-                room_map, place = preflight(self._robot, self._remark)
+                room_map, place = preflight(self._robot, self._remark, self._world)
             except NotReadyError:
                 if self._is_stopped():
                     return
@@ -254,6 +255,7 @@ class MissionSession:
             rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
             regexes = () if room_map is None or room_map.plain else rooms
             expect_rooms(rules, rooms)
+            expect_poses(rules, self._robot, room_map)
             for sentence in evasions(rules, regexes, self._robot.skills):
                 self._remark(sentence)
             if order.has_program:
@@ -263,9 +265,19 @@ class MissionSession:
             while mission.state.is_open:
                 self._wait_for_a_person(mission)
             if mission.state is State.APPROVED:
-                self._note_warnings(mission)
-                with suppress(MissionError):  # it was stopped before it could run
-                    mission.run(reserved, place, rules=self._view.rules_in_force, room_map=room_map)
+                self._run_approved(mission, reserved, place, room_map)
+
+    def _run_approved(
+        self, mission: Mission, reserved: Reservation, place: str, room_map: RoomMap | None
+    ) -> None:
+        """Run the approved program."""
+        self._note_warnings(mission)
+        rules = self._view.rules_in_force
+        keep_out = getattr(self._robot, "keep_out", None)  # which robots with a planner have
+        with suppress(MissionError, CancelledError):  # it was stopped before it could run
+            if keep_out is not None:
+                keep_out(rules)
+            mission.run(reserved, place, rules=rules, room_map=room_map)
 
     def _note_warnings(self, mission: Mission) -> None:
         """Log what speaks against the approved program; drafts before it had warnings of their own."""

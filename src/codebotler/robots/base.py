@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar
 from codebotler.core.world import World
 from codebotler.robots.clock import Clock
+
+if TYPE_CHECKING:
+    from codebotler.robots.ros.connection import Connection
 
 Argument: TypeAlias = Scalar | tuple[Scalar, ...]
 """An argument of a skill: a text or another value, a list of these, or the options of a question."""
@@ -63,6 +66,10 @@ class Robot(Protocol):
     @property
     def rooms_are_regexes(self) -> bool:
         """Whether the rooms that it lists are regexes, as world files write them, and not plain names."""
+
+    @property
+    def has_pose(self) -> bool:
+        """Whether its feedback says where it is while it moves, as in `at (3.1, 2.0)`, in metres."""
 
     @property
     def skills(self) -> SkillTable:
@@ -167,6 +174,7 @@ class Options:
         address: of the robot, such as the URI of a ROS master or rosbridge; empty for the default.
         ros_python: the interpreter that the robot's ROS belongs to.
         skills: the skills it may be asked to perform.
+        connection: what a robot on ROS offers, where that is not an action for each skill.
     """
 
     world: World | None = None
@@ -174,3 +182,4 @@ class Options:
     address: str = ""
     ros_python: Path = ROS_PYTHON
     skills: SkillTable = SKILLS
+    connection: Connection | None = None

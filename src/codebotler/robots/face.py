@@ -180,7 +180,7 @@ class RobotWithFace:
     def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
         self._robot, self._face, self.skills = robot, face, skills
         self.name, self.address, self.if_tool_dies = robot.name, robot.address, robot.if_tool_dies
-        self.rooms_are_regexes = robot.rooms_are_regexes
+        self.rooms_are_regexes, self.has_pose = robot.rooms_are_regexes, robot.has_pose
 
     @property
     def missing(self) -> Mapping[str, str]:

@@ -50,7 +50,8 @@ def _spelling(robot: Robot) -> Robot:
 def open_with_face(name: str, options: Options, face: Face) -> Robot:
     """The same with a face, so that the robot itself needs neither `say` nor `ask`."""
     silent = open_robot(name, replace(options, skills=without_speech(options.skills)))
-    return RobotWithFace(silent, face, options.skills)
+    lacking = without_speech(options.skills).without(silent.skills)
+    return RobotWithFace(silent, face, options.skills.without(lacking))
 
 
 def all_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:

@@ -59,7 +59,7 @@ class OwnRobot:
     """
 
     if_tool_dies = "nothing stops the robot unless its class sees to that"
-    rooms_are_regexes = False
+    rooms_are_regexes = has_pose = False
 
     def __init__(self, name: str, options: Options) -> None:
         path, _, kind = name.rpartition(":")

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import get_args
 
 from codebotler.core.program import parse_expression
+from codebotler.core.skills.declaration import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import TRUTH, ValueType, as_text
@@ -340,7 +341,9 @@ class _Parser:
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
         close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
-        if what == "element" and not close:
+        if name == INSIDE:
+            hint = "only house rules have it, since traces hold no poses"
+        elif what == "element" and not close:
             hint += ", or a skill of your own, whose file --skills or a suite names"
         return self.error(at, f"unknown {what} {name}; {hint}")
 

@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Literal, TypeAlias
 
 from codebotler.core import words
-from codebotler.core.skills.declaration import by_event, verb_for
+from codebotler.core.skills.declaration import INSIDE, by_event, verb_for
 from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
@@ -118,7 +118,7 @@ def _part(text: Text, thing: str) -> str:
 def _wanted(element: EventPattern, thing: str) -> str:
     if not element.has_text:
         return ""
-    if element.kind == "goto":
+    if element.kind in {"goto", INSIDE}:
         return room(element.text, "any" if thing == "anything" else "a")
     named = "" if is_spoken(element.kind) else _named(element.text)
     return named or _like(element.text, thing)
@@ -148,7 +148,7 @@ def happening(event: Event, element: EventPattern) -> str:
     elif takes_nothing(event.kind):
         thing = ""
     else:
-        thing = room_name(event.text) if event.kind == "goto" else quoted(event.text)
+        thing = room_name(event.text) if event.kind in {"goto", INSIDE} else quoted(event.text)
     thing += _offered(event, element)
     if element.answer is not None:
         thing += (

@@ -8,11 +8,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
+from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import VIOLATION, RobotError
+from codebotler.core.skills.declaration import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Names, attempted
-from codebotler.rtl import Formula, Inconclusive, Monitor
+from codebotler.core.world import Point, Room, rooms_along
+from codebotler.rtl import EventPattern, Formula, Inconclusive, Monitor
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.wording import event_words
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot, Thing
@@ -41,6 +44,11 @@ class Rule:
     when: Literal["always", "finally"] = "always"
     refuse: bool = False
     any_room: bool = False
+
+    @cached_property
+    def inside(self) -> tuple[EventPattern, ...]:
+        """Its elements that are about the rooms which the robot's pose enters."""
+        return tuple(element for element in elements(self.formula) if element.kind == INSIDE)
 
 
 class RuleViolationError(RobotError):
@@ -77,10 +85,12 @@ class RuleGuard:
 
     Args:
         rules: the rules in force.
+        rooms: the rooms with their footprints, as far as they are known.
     """
 
-    def __init__(self, rules: Sequence[Rule]) -> None:
-        self.rules = tuple(rules)
+    def __init__(self, rules: Sequence[Rule], rooms: Sequence[Room] = ()) -> None:
+        self.rules, self._rooms = tuple(rules), rooms
+        self._inside: Sequence[str] = ()  # the rooms that hold the robot's pose
         self._watch([(rule, Monitor(rule.formula), _depends_on(rule)) for rule in rules])
         self._unjudged: set[str] = set()  # names of rules that had to compare an option that is no text
         self._here = ""  # the room, as rules name it
@@ -131,7 +141,7 @@ class RuleGuard:
         if self._call is None:
             return
         row, before, thing, attempt = self._call
-        here, watched = self._here, [*self._always, *self._finally]
+        here, inside, watched = self._here, self._inside, [*self._always, *self._finally]
         self._watch([(rule, copy(monitor), depends) for rule, monitor, depends in watched])
         try:
             events = [*robot.events[before:], event]
@@ -143,7 +153,7 @@ class RuleGuard:
             self._prevented.append(broken)
             raise
         finally:  # what has happened is taken in for good when the call has ended, with its result
-            self._here = here
+            self._here, self._inside = here, inside
             self._watch(watched)
 
     def _named(
@@ -168,13 +178,32 @@ class RuleGuard:
             is_drive = event.kind == DRIVE or (event is own and row.is_drive)
             if is_drive and not (failed and (event is own or number == len(events))):
                 later = (each.place for each in events[number:] if event is not own and each is not own)
-                self._here = text = names_of(next(later, robot.room), asked)
+                left, self._here = self._here, names_of(next(later, robot.room), asked)
+                text = self._here
+                yield from self._entered(self._way(left, text), holding)
             elif moved is not None and event.kind in MOVES:
                 text = names_of(moved.label, asked)
             if text is event.text and place is event.place and holding is event.holding:
                 yield event
             else:
                 yield replace(event, text=text, place=place, holding=holding)
+
+    def moved(self, start: Point, end: Point, holding: str) -> None:
+        """Take a straight way that the robot's pose has gone; RuleViolationError if that broke a rule."""
+        for event in self._entered(rooms_along(self._rooms, start, end), holding):
+            self.happened(event)
+
+    def _way(self, start: str, end: str) -> Iterable[Sequence[str]]:
+        """The rooms that hold each part of a simulated drive; only its ends where no map is known."""
+        stops = {room.name: room.stand_at for room in self._rooms}
+        one, other = stops.get(start), stops.get(end)
+        return [(start,), (end,)] if one is None or other is None else rooms_along(self._rooms, one, other)
+
+    def _entered(self, way: Iterable[Sequence[str]], holding: str) -> Iterator[Event]:
+        """An event for each room that a way enters, if a rule is about that."""
+        for here in way if any(rule.inside for rule in self.rules) else ():
+            before, self._inside = self._inside, here
+            yield from (Event(INSIDE, r, place=r, holding=holding) for r in here if r not in before)
 
     def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
@@ -203,6 +232,8 @@ class RuleGuard:
                 do so whichever it was.
         """
         watched = [*self._always, *self._finally]
+        if possible[0].kind == INSIDE:  # it would be the last event, for example, for other rules as well
+            watched = [each for each in watched if each[0].inside]
         possible, late = tuple(map(_trimmed, possible)), None
         for event in possible[1:]:
             apart = [(rule, copy(monitor), depends) for rule, monitor, depends in watched]

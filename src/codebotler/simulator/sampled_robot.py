@@ -16,7 +16,7 @@ from codebotler.core.skills.values import as_text
 from codebotler.core.trace import options_of
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
-from codebotler.core.world import Room, World
+from codebotler.core.world import Room, World, laid_out
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.robot import SimulatedRobot, Thing, no_room, own_skills
 from codebotler.simulator.rules import Rules, finds
@@ -46,6 +46,7 @@ class RoomMap:
     start: str
     guessed: bool = False  # nobody said which rooms there are: driving to any other place finds it, too
     plain: bool = False  # names are plain texts, as robots and guesses have them, and no regexes
+    plan: tuple[Room, ...] = ()  # footprints; and where the robot stops, if it drives straight between rooms
 
     def __post_init__(self) -> None:
         compose_fields(self)
@@ -53,7 +54,8 @@ class RoomMap:
     @classmethod
     def of(cls, world: World) -> RoomMap:
         """The rooms of a world, and where the robot starts in it."""
-        return cls(tuple(room.name for room in world.rooms), world.robot)
+        plan = [Room(room.name, (), (), room.footprint, room.stand_at) for room in laid_out(world).rooms]
+        return cls(tuple(room.name for room in world.rooms), world.robot, plan=tuple(plan))
 
     def room(self, request: str) -> str | None:
         """The room that a request finds; None if there is no such room."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from html import escape
 
 from codebotler.core.terminal import shortened
-from codebotler.core.world import Point, Room, World, laid_out
+from codebotler.core.world import Point, Room, World, is_within, laid_out
 
 MARGIN = 0.6
 MOST_ROOMS = 100
@@ -87,17 +87,7 @@ def floorplan(world: World, state: MapState) -> str:
 
 def room_at(rooms: Iterable[Room], at: Point) -> str:
     """The name of the room whose footprint a point is in; empty if there is none."""
-    return next((one.name for one in rooms if _is_within(at, one.footprint or ())), "")
-
-
-def _is_within(at: Point, corners: Sequence[Point]) -> bool:
-    """Whether a ray from a point to the right crosses an odd number of edges."""
-    x, y = at
-    edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
-    crossings = [
-        a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)
-    ]
-    return sum(crossing > x for crossing in crossings) % 2 == 1
+    return next((one.name for one in rooms if one.footprint and is_within(at, one.footprint)), "")
 
 
 def _joined(points: Iterable[Point]) -> str:

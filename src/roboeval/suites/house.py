@@ -30,6 +30,11 @@ class HouseRules:
     rules: tuple[Rule, ...]
     digest: str
 
+    def __post_init__(self) -> None:
+        for rule in self.rules:
+            if rule.inside:
+                raise UserError(f'the rule "{rule.name}" uses inside, which the benchmark cannot judge')
+
     @classmethod
     def of_suite(cls, path: Path, skills: SkillTable, rooms: Sequence[str]) -> HouseRules:
         """Read the rules that a suite with these rooms brings."""

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import command_line
+from codebotler.robots.simulated import OFFICE
 from command_line import Ended, command
 
 RULES = """
@@ -149,3 +150,41 @@ def test_a_skill_inside_which_rules_do_not_see_is_named(files: Path) -> None:
         ended = codebotler(files, *arguments, *own)
         assert ended.status == 0, ended
         assert 'do not see inside the skill "tour"' in " ".join(ended.err.split())
+
+
+THROUGH = "def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n"
+NEVER_INSIDE = """
+rules:
+  - name: printer
+    says: Never be in printer room 2.
+    always: not tr.Exists(inside("printer room 2"))
+"""
+
+
+def test_a_rule_about_where_the_robot_is_holds_on_the_way(files: Path) -> None:
+    (files / "inside.yaml").write_text(NEVER_INSIDE)
+    (files / "through.py").write_text(THROUGH)
+    (files / "office.yaml").write_text(OFFICE.read_text())
+    given = ("--world", "office.yaml", "--rules", "inside.yaml")
+    found = json.loads(codebotler(files, "check", "through.py", "--json", *given).out)
+    assert [(one["kind"], one["line"]) for one in found["problems"]] == [("RuleViolation", 3)]
+    ended = codebotler(files, "run", "through.py", "--yes", "--despite-problems", "--speed", "0", *given)
+    assert ended.status == 1
+    assert "stopped by rule printer in line 3" in ended.out
+
+
+def test_goto_is_said_to_be_about_destinations_until_a_rule_is_about_poses(files: Path) -> None:
+    (files / "inside.yaml").write_text(NEVER_INSIDE)
+    assert "destinations" in codebotler(files, "rules", "rules.yaml").err
+    shown = codebotler(files, "rules", "inside.yaml", "--json")
+    assert "destinations" not in shown.err
+    assert json.loads(shown.out)[0]["breaks"] == [{"step": 1, "kind": "inside", "text": "printer room 2"}]
+
+
+@pytest.mark.parametrize("room", ["printer room 9", "^lab$", "lab 3"])
+def test_a_pose_counts_by_the_name_that_the_world_has(files: Path, room: str) -> None:
+    (files / "inside.yaml").write_text(NEVER_INSIDE.replace('"printer room 2"', f'"{room}"'))
+    (files / "labs.yaml").write_text("robot: hall\nrooms: [hall, 'lab [0-9]']\n")
+    ended = codebotler(files, "check", "sly.py", "--world", "labs.yaml", "--rules", "inside.yaml")
+    assert ended.status == 2
+    assert re.search("inside.yaml, line 5: the rule", ended.err)

@@ -11,7 +11,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills.declaration import RTL_WORDS, by_name
+from codebotler.core.skills.declaration import INSIDE, RTL_WORDS, by_name
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
@@ -188,7 +188,7 @@ def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: 
 
 
 def test_names_that_formulas_use_otherwise_are_refused() -> None:
-    assert {*AROUND, *LOOKS, *QUESTIONS, *TEXTS, "tr"} == RTL_WORDS
+    assert {*AROUND, *LOOKS, *QUESTIONS, *TEXTS, INSIDE, "tr"} == RTL_WORDS
 
 
 def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:

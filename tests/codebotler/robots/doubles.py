@@ -18,7 +18,7 @@ class Answering:
     """
 
     name, address, if_tool_dies = "answering", "", "it ended with the tool"
-    rooms_are_regexes = False
+    rooms_are_regexes = has_pose = False
     missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, answer: Callable[[str, str], Result] = lambda *_: None) -> None:

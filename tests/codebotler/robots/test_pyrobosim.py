@@ -17,18 +17,24 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.checking.check import check
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.declaration import POSE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.missions.live import LiveRobot
+from codebotler.missions.log import State
+from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, Picture
 from codebotler.robots.open import all_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, ROBOT_RULES
+from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, OFFICE, ROBOT_RULES
+from codebotler.rtl import parse
 from codebotler.simulator.engine import run
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
 
@@ -492,3 +498,22 @@ def test_rooms_are_regexes_for_the_check_as_in_its_world() -> None:
     plan, place = preflight(connected(World((Room("hall"), Room("kitchen|cafe")), "hall")), print)
     assert plan is not None
     assert (plan.room("the cafe"), place) == ("kitchen|cafe", "hall")
+
+
+@pytest.mark.parametrize(("room", "is_stopped"), [("printer room 2", False), ("printer room 3", True)])
+def test_rules_about_where_it_is_hold_along_its_own_way(
+    tmp_path: Path, room: str, *, is_stopped: bool
+) -> None:
+    world = World.read(OFFICE)
+    robot = Pyrobosim(world, speed=None)
+    formula = parse(f'not tr.Exists(inside("{room}"))', skills=SKILLS.with_skill(POSE))
+    mission = Mission(tmp_path, robot.name)
+    mission.draft("def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n")
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, tmp_path) as reserved, mission:
+        room_map, place = preflight(robot, mission.note, world)
+        rules = [Rule("never", "Never be there.", formula)]
+        assert not check(mission.summary.program, room_map=room_map, house_rules=rules).problems or is_stopped
+        mission.run(reserved, place, rules=rules, room_map=room_map)
+    assert mission.state is (State.STOPPED if is_stopped else State.DONE)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
+from codebotler.core.skills.declaration import POSE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
 from codebotler.core.skills.values import NOTHING
@@ -293,3 +294,11 @@ def test_the_time_grows_with_the_trace_and_no_faster(text: str) -> None:
     short = sum(seconds(formula, day * 30) for day in days)
     long = sum(seconds(formula, day * 30 * times) for day in days)
     assert long < 4 * times * short  # were it quadratic, it would be 16 * times
+
+
+def test_where_the_robot_was_is_explained_by_the_room() -> None:
+    formula = parse('not tr.Exists(inside("server room"))', skills=SKILLS.with_skill(POSE))
+    found = explain(formula, (Event("goto", "hall"), Event("inside", "server room")))
+    assert found is not None
+    assert found.event == 1
+    assert "was inside the server room" in found.sentence

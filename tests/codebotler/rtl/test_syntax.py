@@ -8,6 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
+from codebotler.core.skills.declaration import POSE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
 from codebotler.core.skills.values import NOTHING
@@ -232,3 +233,25 @@ def test_errors_and_formulas_travel_between_processes() -> None:
     formula = parse('tr.ActAtSome("a", say("b"))')
     holds(formula, (Event("goto", "a"),))
     assert pickle.loads(pickle.dumps(formula)) == formula
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'not tr.Exists(inside("lab"))',
+        'tr.BeforeLast(inside(without("lab"))).Last(inside("hall"))',
+        'not tr.Exists(holding("glass", inside("lab")))',
+    ],
+)
+def test_house_rules_may_be_about_where_the_robot_is(text: str) -> None:
+    formula = parse(text, skills=SKILLS.with_skill(POSE))
+    assert str(formula) == text
+    assert parse(str(formula), skills=SKILLS.with_skill(POSE)) == formula
+    with pytest.raises(RtlSyntaxError, match="only house rules"):
+        parse(text)
+
+
+@pytest.mark.parametrize("wrong", ['returned(True, inside("a"))', 'to("a", inside("b"))', 'inside("a", "b")'])
+def test_what_a_pose_cannot_have_is_refused(wrong: str) -> None:
+    with pytest.raises(RtlSyntaxError):
+        parse(f"tr.Exists({wrong})", skills=SKILLS.with_skill(POSE))

@@ -2,12 +2,15 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 import rules
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Event
 from codebotler.simulator.rule_guard import RuleGuard
+from roboeval.suites.house import HouseRules
 from rules import ALL, Effect, Measuring, errand_of, houses
 
 HASTY = """
@@ -84,3 +87,10 @@ def test_an_errand_costs_more_with_rules(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(rules, "ROUNDS", 1)
     assert len(errand_of(1)) > 30
     assert rules.costs()[0][0] > 0
+
+
+def test_the_benchmark_refuses_rules_about_where_a_robot_is(tmp_path: Path) -> None:
+    path = tmp_path / "house.yaml"
+    path.write_text("rules:\n- {name: lab, says: Never., always: 'not tr.Exists(inside(\"lab\"))'}\n")
+    with pytest.raises(UserError, match='the rule "lab" uses inside'):
+        HouseRules.read(path)

@@ -69,6 +69,7 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("says(what)", '"says(what, what)"', 6, 'two parameters "what"'),
         ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is not a valid formula'),
         ("goto(", "gote(", 5, 'the check "goes" is not a valid formula'),
+        ("goto(", "inside(", 5, "only house rules have it"),
         ("goes: {", "goes: {means: {go: there}, ", 5, 'no element is called "go"'),
         ("goes: {", "goes: {means: 'that {it} is', ", 5, '"it" is no parameter'),
         ("[goes,", "[gose,", 11, 'no check "gose"'),

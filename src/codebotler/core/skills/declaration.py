@@ -17,10 +17,19 @@ from codebotler.core.skills.values import NOTHING, TEXT, ValueType, plain, value
 from codebotler.core.skills.verbs import Verb, verb_of
 
 TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"})
+INSIDE = "inside"
+POSE = Skill(
+    "inside a room",
+    (Parameter("room"),),
+    NOTHING,
+    "Not a skill: house rules see this event when the robot's pose enters a room.",
+    Recording(INSIDE, "room", names="room"),
+    verb=Verb("be inside", "is inside", "was inside", "being inside", "was in a room"),
+)
 RTL_WORDS = frozenset(
     {
         *("at", "holding", "to", "options", "found", "missed", "mention", "answered", "returned", "tr"),
-        *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies"),
+        *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies", INSIDE),
     }
 )
 """What formulas call other things by than events."""
@@ -52,7 +61,8 @@ def forget(module: str) -> None:
 
 def by_event(kind: str) -> Skill | None:
     """The skill declared in this process that leaves events of a kind, which is all that these say of it."""
-    return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), None)
+    other = POSE if kind == INSIDE else None
+    return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 
 
 def verb_for(kind: str) -> Verb | None:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.table import RosAction, SkillTable
 from codebotler.robots.base import (
     ROS_PYTHON,
     Argument,
@@ -26,6 +25,7 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import file_of
+from codebotler.robots.ros.connection import Call, Connection, Values, connection_of, reason
 from codebotler.robots.ros.worker import Message, RosWorker, lacks
 
 OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
@@ -63,7 +63,7 @@ class RosRobot:
     """
 
     if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
-    rooms_are_regexes = False
+    rooms_are_regexes = has_pose = False
 
     def __init__(
         self,
@@ -76,7 +76,9 @@ class RosRobot:
         waits: Waits | None = None,
         node: str = "codebotler",
     ) -> None:
-        self.name, self.address, self.skills = name, address, options.skills
+        self.connection = options.connection or connection_of(options.skills)
+        self.name, self.address = name, address
+        self.skills = options.skills if options.connection is None else self.connection.skills(options.skills)
         self.clock = Clock(options.speed)
         self.missing: Mapping[str, str] = {}
         self._script, self._python, self._environment = script, options.ros_python, environment
@@ -97,9 +99,9 @@ class RosRobot:
         self.disconnect()
         worker = self._start(cancel_all=self._in_doubt)
         self.missing = worker.about["missing"]
-        if self.missing and self.missing.keys() == actions_of(self.skills).keys():
+        if self.missing and self.missing.keys() == self.connection.calls.keys():
             worker.leave()
-            raise NotReadyError(f"the robot has no action servers: {next(iter(self.missing.values()))}")
+            raise NotReadyError(f"the robot offers nothing: {next(iter(self.missing.values()))}")
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
@@ -111,17 +113,22 @@ class RosRobot:
             CancelledError: it was cancelled, by us or by another client.
             RobotLostError: the server or the worker died, or does not answer.
         """
-        action = self.skills[skill].ros
-        if action is None:
+        names = (parameter.name for parameter in self.skills[skill].parameters)
+        return self._called(skill, dict(zip(names, arguments, strict=True)), feedback)
+
+    def _called(self, skill: str, values: Values, feedback: Feedback) -> Result:
+        """Perform a skill by its call, with values for the variables of that."""
+        call = self.connection.calls.get(skill)
+        if call is None:
             raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
-        with self._order:
-            if self._stopped:
-                raise CancelledError
-            assert self._worker is not None, "the robot is not connected"
-            worker = self._worker
-            self._number += 1
-            number = self._number
-            worker.send({"do": "perform", "id": number, "skill": skill, "arguments": arguments})
+        return self._result(
+            call, self._awaited({"do": "perform", "skill": skill, "fields": call.fields(values)}, feedback)
+        )
+
+    def _awaited(self, order: Message, feedback: Feedback) -> Message:
+        """Send an order, and return the worker's last message about it."""
+        worker, number = self._sent(order)
+        at = ""
         while True:
             match worker.receive(self._waits.patience * 2):
                 case None:
@@ -138,8 +145,22 @@ class RosRobot:
                     feedback(text)
                 case {"id": int(goal), "is": "picture", "data": str(data)} if goal == number:
                     feedback(Picture(base64.b64decode(data)))
+                case {"is": "pose", "x": float(x), "y": float(y)}:
+                    before, at = at, f"at ({x:.2f}, {y:.2f})"
+                    if at != before:
+                        feedback(at)
                 case {"id": int(goal)} as message if goal == number:
-                    return self._result(action, message)
+                    return message
+
+    def _sent(self, order: Message) -> tuple[RosWorker, int]:
+        """Send an order, unless the robot was stopped; to which worker, and its number."""
+        with self._order:
+            if self._stopped:
+                raise CancelledError
+            assert self._worker is not None, "the robot is not connected"
+            self._number += 1
+            self._worker.send({**order, "id": self._number})
+            return self._worker, self._number
 
     def cancel(self) -> None:
         """Have the worker cancel the goal; if it hangs, have another one cancel all goals."""
@@ -168,7 +189,8 @@ class RosRobot:
         start = {
             "address": self.address,
             "node": self._node,
-            "actions": actions_of(self.skills),
+            "calls": calls_data(self.connection),
+            **reports_data(self.connection),
             "cancel_all": cancel_all,
             "sign": str(file_of(self.name, self.address, f"{self._node}.goal")),
             "patience": self._waits.patience,
@@ -177,13 +199,13 @@ class RosRobot:
         }
         return RosWorker(self._python, self._script, start, self._environment)
 
-    def _result(self, action: RosAction, message: Message) -> Result:
+    def _result(self, call: Call, message: Message) -> Result:
         match message:
-            case {"is": "result", "value": value}:
-                result: Result = value  # a mission looks whether it fits the skill
+            case {"is": "result", "values": dict(values)}:
+                result: Result = call.answer(values)
                 return result
             case {"is": "error", "text": str(text), "state": str(state)}:
-                raise error_of(action, text, state)
+                raise error_of(call, text or reason(message.get("values", {})), state)
             case {"is": "cancelled"}:
                 raise CancelledError
         self._in_doubt = self._in_doubt or message["is"] == "lost"
@@ -207,6 +229,15 @@ class RosRobot:
             return "another worker has cancelled all goals"
 
 
+def class_for(options: Options) -> type[RosRobot]:
+    """The class of a robot that offers an action for each skill, or what the options' connection says."""
+    if options.connection is None:
+        return RosRobot
+    from codebotler.robots.ros.connected import ConnectedRobot  # noqa: PLC0415 - needs much more
+
+    return ConnectedRobot
+
+
 def ros_readiness(
     name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
 ) -> Readiness:
@@ -220,16 +251,26 @@ def ros_readiness(
     return Readiness(name, works=True, note=note)
 
 
-def actions_of(skills: SkillTable) -> Message:
-    """Type, server and definition of the action of each skill that has one, as a worker reads them."""
+def calls_data(connection: Connection) -> Message:
+    """What a worker must know of the calls of a connection, by skill."""
     return {
-        skill.name: {"type": ros.full_type, "server": ros.server, "definition": ros.definition}
-        for skill in skills.rows
-        if (ros := skill.ros) is not None
+        skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
+        for skill, call in connection.calls.items()
     }
 
 
-def error_of(action: RosAction, text: str, state: str) -> RobotError:
+def reports_data(connection: Connection) -> Message:
+    """What a worker must listen to besides."""
+    return {
+        "packages": connection.packages,
+        "pose": connection.pose and vars(connection.pose),
+        "velocity": connection.velocity and vars(connection.velocity),
+        "keepout": connection.keepout or [],
+        "cameras": sorted({topic for topic, _ in connection.cameras.values()}),
+    }
+
+
+def error_of(call: Call, text: str, state: str) -> RobotError:
     """The error of a goal that was rejected or aborted (`state`), in the server's words.
 
     They may begin with the kind, as in `PickInvalidObject: there is no mug`.
@@ -237,5 +278,4 @@ def error_of(action: RosAction, text: str, state: str) -> RobotError:
     named = NAMED_ERROR.fullmatch(text)
     if named is not None:
         return RobotError(named[1], named[2])
-    kind = action.failure or f"{action.type}Failed"
-    return RobotError(kind, text or f"{action.server} {state} the goal without a reason")
+    return RobotError(call.failure, text or f"{call.name} {state} the goal without a reason")

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.robot import OTHER_PYTHON, RosRobot, Waits, ros_readiness
+from codebotler.robots.ros.robot import OTHER_PYTHON, RosRobot, Waits, class_for, ros_readiness
 
 MASTER = "http://localhost:11311"
 NEEDS = ("rospy", "actionlib", "actionlib_msgs", "genpy", "genmsg", "netifaces")
@@ -29,7 +29,7 @@ def robot(options: Options, waits: Waits | None = None) -> RosRobot:
         UserError: the URI is invalid.
     """
     uri = master_uri(options.address)
-    return RosRobot("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
+    return class_for(options)("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
 
 
 def master_uri(address: str = "") -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.robot import RosRobot, Waits, ros_readiness
+from codebotler.robots.ros.robot import RosRobot, Waits, class_for, ros_readiness
 from codebotler.robots.ros.worker import lacks
 
 NEEDS = ("rclpy", "action_msgs", "sensor_msgs")
@@ -22,9 +22,8 @@ def robot(options: Options, waits: Waits | None = None) -> RosRobot:
     """A robot on ROS 2; its address is a domain, by default that of ROS_DOMAIN_ID, or 0."""
     domain = domain_of(options.address)
     options = replace(options, ros_python=python_of(options.ros_python))
-    # rclpy says what is wrong with the value of a field, if it is asked to look.
-    environment = {"ROS_DOMAIN_ID": domain, "ROS_PYTHON_CHECK_FIELDS": "1"}
-    return RosRobot("ros2", domain, "ros2_worker.py", options, environment, waits=waits)
+    variables = {"ROS_DOMAIN_ID": domain}
+    return class_for(options)("ros2", domain, "ros2_worker.py", options, variables, waits=waits)
 
 
 def domain_of(address: str = "") -> str:

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.robot import RosRobot, Waits, class_for
 
 ADDRESS = "ws://localhost:9090"
 NOTE = "robots of ROS 2 behind it were tested against a stand-in for the protocol only"
@@ -18,7 +18,8 @@ def robot(options: Options, waits: Waits | None = None) -> RosRobot:
     """A robot behind a rosbridge, by default one on this machine; its worker runs under our own Python."""
     readiness()
     ours = replace(options, ros_python=Path(sys.executable))
-    return RosRobot("rosbridge", options.address or ADDRESS, "rosbridge_worker.py", ours, {}, waits=waits)
+    address = options.address or ADDRESS
+    return class_for(options)("rosbridge", address, "rosbridge_worker.py", ours, {}, waits=waits)
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:

@@ -14,7 +14,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
-from codebotler.robots.ros.robot import actions_of
+from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.ros.robot import calls_data
 from codebotler.robots.ros.ros1 import master_uri
 from codebotler.robots.ros.ros2 import domain_of, python_of
 from codebotler.robots.ros.worker import Message, RosWorker
@@ -109,14 +110,14 @@ class VirtualRobot:
         environment = {"ROS_MASTER_URI": self.address}
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
-        start = {"node": NODE, "actions": actions_of(self._body.skills), "port": port}
+        start = {"node": NODE, "actions": calls_data(connection_of(self._body.skills)), "port": port}
         return RosWorker(self._python, "servers.py", start, environment)
 
     def _ros2_servers(self) -> RosWorker:
         environment = {"ROS_DOMAIN_ID": self.address}
         if "ROS_AUTOMATIC_DISCOVERY_RANGE" not in os.environ:
             environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        start = {"node": NODE, "actions": actions_of(self._body.skills)}
+        start = {"node": NODE, "actions": calls_data(connection_of(self._body.skills))}
         return RosWorker(self._python, "ros2_servers.py", start, environment)
 
     def _at_start(self, world: World) -> Simulated:

@@ -19,6 +19,7 @@ from typing import IO, Any, TypeAlias, cast
 
 from codebotler.core.terminal import note
 from codebotler.robots.base import NotReadyError
+from codebotler.robots.ros.motion import Motion
 
 Message: TypeAlias = dict[str, Any]
 
@@ -28,6 +29,7 @@ READY = 30.0  # seconds within which it must report that it is ready
 BUILDS = 600.0  # seconds for that, if it says what it does meanwhile
 LEAVES = 4.0  # seconds that it may take to end by itself
 BEAT = 0.1  # seconds between two signs of life of this process, without which it stops the robot
+MOTIONS = ("pose", "velocity")
 LAST_LINES = 5  # of its error output, kept for error messages
 
 
@@ -50,6 +52,7 @@ class RosWorker:
 
     def __init__(self, python: Path, script: str, start: Message, environment: Mapping[str, str]) -> None:
         self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self.motion = Motion()
         self._printed: deque[str] = deque(maxlen=LAST_LINES)
         self._writing = threading.Lock()
         self._cancel_sent, self._leaves = threading.Event(), threading.Event()
@@ -152,7 +155,10 @@ class RosWorker:
                 continue
             if message["is"] == "cancel-sent":
                 self._cancel_sent.set()
-            elif message["is"] != "alive" or self._messages.empty():  # one sign of life is enough
+                continue
+            if message["is"] in MOTIONS:
+                self.motion.take(message)
+            if message["is"] not in {"alive", *MOTIONS} or self._messages.empty():  # one sign is enough
                 self._messages.put(message)
         self._messages.put({"is": "ended"})
 

@@ -10,10 +10,12 @@ from typing import Any
 
 from channel import Channel, Message, SetupError
 from message_types import in_base64
+from reports import MotionReports
 
 TICK = 0.1  # seconds between two rounds of the watchdog
 ALIVE = 1.0  # seconds between two signs of life
 TOOL_SILENCE = 0.7  # seconds without a sign of life of the tool, after which the robot is stopped
+TELLS_AGAIN = 0.5  # seconds between two feedbacks that are passed on
 LAST_WORDS = 1.0  # seconds for a cancelled goal to end when the worker does
 LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
 LARGEST_PICTURE = 2_000_000  # bytes
@@ -31,6 +33,7 @@ class Goal:
         self.is_acknowledged = self.is_over = False
         self.status_ended: float | None = None  # since then only the result is missing
         self.cancelled: float | None = None
+        self.told = 0.0  # when its last feedback was passed on
         self.ended, self.seen = threading.Event(), threading.Event()
 
     def cancel(self) -> None:
@@ -44,9 +47,9 @@ class Goal:
 class SkillWorker:
     """Performs skills, one at a time; `connect` and `send` belong to one kind of robot.
 
-    The first line has the `address`, the `node`, the `actions` by skill, whether to `cancel_all` goals, the
-    `sign`, a file that is there while a goal may go on, and the seconds to wait: `patience`, `silence` and
-    `longest`.
+    The first line has the `address`, the `node`, the `calls` by skill, folders of `packages`, the topics of
+    the `pose`, the `velocity`, the `cameras` and `keepout`, whether to `cancel_all` goals, the `sign`, a file
+    that is there while a goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -60,6 +63,7 @@ class SkillWorker:
         self.silence: float = start["silence"]
         self.longest: float = start["longest"]
         self.goal: Goal | None = None
+        self.cameras: dict[str, Any] = {}
         self._sign = Path(start["sign"])
         left_behind = self.connect(start) or self._sign.exists()
         missing = self.missing()
@@ -75,18 +79,26 @@ class SkillWorker:
         """Set `graph` and `servers`; whether an earlier worker died without leaving."""
         raise NotImplementedError
 
-    def send(self, goal: Goal, arguments: list[Any]) -> None:
+    def send(self, goal: Goal, fields: Message) -> None:
         """Send a goal, whose lock is held."""
         raise NotImplementedError
 
-    def start(self, goal: Goal, arguments: list[Any]) -> None:
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
+        """Call `hear` with each message of a topic as plain data; SetupError if a topic `is_needed`."""
+        raise NotImplementedError
+
+    def publish(self, topic: str, fields: Message) -> None:
+        """Publish the last message of a topic of `keepout`, also for those who come later."""
+        raise NotImplementedError
+
+    def start(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless it is cancelled."""
         with goal.lock:
             if goal.cancelled is not None:
                 self.end(goal, "cancelled")
             else:
                 self._sign.touch()
-                self.send(goal, arguments)
+                self.send(goal, fields)
 
     def obey(self, line: Message) -> None:
         """Perform or cancel a skill."""
@@ -94,11 +106,14 @@ class SkillWorker:
             server = self.servers[line["skill"]]
             self.goal = goal = Goal(line["id"], server)
             if server.is_connected(self.silence):
-                self.start(goal, line["arguments"])
+                self.start(goal, line["fields"])
             else:
-                threading.Thread(
-                    target=self._wait_and_send, args=(goal, line["arguments"]), daemon=True
-                ).start()
+                threading.Thread(target=self._wait_and_send, args=(goal, line["fields"]), daemon=True).start()
+        elif line["do"] == "look":
+            picture = self.cameras[line["topic"]].look(line["oldest"])
+            self.channel.send("result", id=line["id"], values=picture)
+        elif line["do"] == "publish":
+            self.publish(line["topic"], line["fields"])
         elif line["do"] == "cancel":
             if self.goal is not None:
                 self.goal.cancel()
@@ -160,10 +175,23 @@ class SkillWorker:
         goal.ended.set()
 
     def pass_on(self, goal: Goal, feedback: dict[str, Any]) -> None:
-        """Report the fields of a feedback."""
-        text = ", ".join(f"{name}: {value}" for name, value in feedback.items())
-        if text and not goal.is_over:
+        """Report the fields of a feedback that hold a text or a number, but not more often than is of use."""
+        plain = {name: value for name, value in feedback.items() if not isinstance(value, (dict, list))}
+        text = ", ".join(
+            f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}"
+            for name, value in plain.items()
+        )
+        now = time.monotonic()
+        if text and not goal.is_over and now - goal.told > TELLS_AGAIN:
+            goal.told = now
             self.channel.send("feedback", id=goal.number, text=text)
+
+    def finish(self, goal: Goal, values: Message) -> None:
+        """End what cannot be cancelled, with the fields of its answer."""
+        if goal.cancelled is None:
+            self.end(goal, "result", values=values)
+        else:
+            self.end(goal, "cancelled")
 
     def see(self, server: Any, data: Any) -> None:
         """Pass on a picture that a server shows while its goal goes on."""
@@ -177,23 +205,34 @@ class SkillWorker:
             self.channel.send("picture", id=goal.number, data=in_base64(data))
         goal.seen.set()
 
-    def succeed(self, goal: Goal, value: Any) -> None:
+    def succeed(self, goal: Goal, values: Message) -> None:
         """End a goal, with its picture, which may come a moment after the result."""
         if goal.seen.is_set() or not goal.server.shows_pictures():
-            self.end(goal, "result", value=value)
+            self.end(goal, "result", values=values)
             return
 
         def wait() -> None:
             goal.seen.wait(LAST_PICTURE)
-            self.end(goal, "result", value=value)
+            self.end(goal, "result", values=values)
 
         threading.Thread(target=wait, daemon=True).start()
 
-    def _wait_and_send(self, goal: Goal, arguments: list[Any]) -> None:
+    def _listen(self, start: Message) -> None:
+        """Listen to what tells where the robot is, and how fast it moves."""
+        pose, velocity = start["pose"], start["velocity"]
+        reports = MotionReports(self.channel, pose and pose["frames"])
+        if pose is not None:
+            self.listen(pose["topic"], reports.hear_pose)
+            if pose["frames"]:
+                self.listen(pose["topic"] + "_static", reports.hear_pose, is_needed=False)
+        if velocity is not None:
+            self.listen(velocity["topic"], reports.hear_velocity)
+
+    def _wait_and_send(self, goal: Goal, fields: Message) -> None:
         until = time.monotonic() + self.patience + self.settles
         while time.monotonic() < until and not self.graph.is_left():
             if goal.cancelled is not None or goal.server.is_connected(self.silence):
-                self.start(goal, arguments)
+                self.start(goal, fields)
                 return
             time.sleep(0.005)
         why = self.graph.why_missing(goal.server.name, goal.server.type)

@@ -86,6 +86,13 @@ class Ros1Graph:
         _, subscribers, _ = self._master.getSystemState()
         return [node for topic, names in subscribers if topic == server + "/goal" for node in names]
 
+    def has_service(self, name: str) -> bool:
+        """Whether a service is registered."""
+        try:
+            return bool(self._master.lookupService(name))
+        except self._rosgraph.MasterException:
+            return False
+
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with an action server."""
         if not self.is_online():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +11,8 @@ from typing import Any
 from channel import Message, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
-from message_types import BUFFER, COMPRESSED, message_types, picture_types
+from message_types import BUFFER, COMPRESSED, as_data, installed, message_types, picture_types
+from pictures import Ros1Camera
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
 
@@ -26,7 +28,7 @@ class Ros1Server:
         self.name: str = action["server"]
         self.type: str = action["type"]
         self.client = actionlib.ActionClient(self.name, spec)
-        self.goal = type(spec().action_goal.goal)
+        self.message = type(spec().action_goal.goal)
         self.heard = 0.0  # when its last status came, by the monotonic clock
         self._node: str | None = None
         self._results: Any = None  # the connection that brings them
@@ -72,6 +74,60 @@ class Ros1Server:
         self._node = status._connection_header["callerid"]
 
 
+class Ros1Service:
+    """A service that performs a skill; what it does cannot be cancelled."""
+
+    def __init__(self, graph: Ros1Graph, call: Message) -> None:
+        self.graph, self.name, self.type = graph, call["server"], call["type"]
+        self._open(self.type.partition("/")[0], self.type.rpartition("/")[2])
+
+    def _open(self, package: str, name: str) -> None:
+        import rospy
+
+        spec = installed(package, "srv", name)
+        self.message = spec._request_class
+        self.client = rospy.ServiceProxy(self.name, spec)
+
+    @property
+    def heard(self) -> float:
+        """Now: a service that dies ends its call."""
+        return time.monotonic()
+
+    def is_connected(self, _silence: float) -> bool:
+        """Whether it is there."""
+        return self.graph.has_service(self.name)
+
+    def cancel(self) -> None:
+        """Nothing."""
+
+    def perform(self, message: Any) -> Message:
+        """Call it, and return its answer."""
+        answer: Message = as_data(self.client(message))
+        return answer
+
+
+class Ros1Topic(Ros1Service):
+    """A topic whose messages perform a skill, as far as anybody can know."""
+
+    def _open(self, package: str, name: str) -> None:
+        import rospy
+
+        self.message = installed(package, "msg", name)
+        self.publisher = rospy.Publisher(self.name, self.message, queue_size=10)
+
+    def is_connected(self, _silence: float) -> bool:
+        """Whether anybody listens."""
+        return bool(self.publisher.get_num_connections())
+
+    def perform(self, message: Any) -> Message:
+        """Publish a message."""
+        self.publisher.publish(message)
+        return {}
+
+
+OTHERS = {"service": Ros1Service, "topic": Ros1Topic}
+
+
 class Ros1Worker(SkillWorker):
     """Performs skills over ROS 1."""
 
@@ -79,30 +135,56 @@ class Ros1Worker(SkillWorker):
         """Register our node, and subscribe to all servers."""
         import rospy
 
-        graph, actions = Ros1Graph(start["node"]), start["actions"]
+        graph, calls = Ros1Graph(start["node"]), start["calls"]
         self.graph, left_behind = graph, graph.enter()
         rospy.on_shutdown(self.stop)
-        specs = message_types(list(actions.values()))
+        specs = message_types([call for call in calls.values() if call["kind"] == "action"])
         self.servers = {
-            skill: Ros1Server(action, specs[action["type"]], self.see) for skill, action in actions.items()
+            skill: Ros1Server(call, specs[call["type"]], self.see)
+            if call["kind"] == "action"
+            else OTHERS[call["kind"]](graph, call)
+            for skill, call in calls.items()
         }
+        self._listen(start)
+        self.cameras = {topic: Ros1Camera(topic) for topic in start["cameras"]}
         return left_behind
 
-    def send(self, goal: Goal, arguments: list[Any]) -> None:
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - what is missing may come later
+        """Call `hear` with each message of a topic as plain data, of the type that its publisher has."""
+        import rospy
+        from genpy.dynamic import generate_dynamic
+
+        known: dict[str, Any] = {}
+
+        def take(message: Any) -> None:
+            header = message._connection_header
+            kind = header["type"]
+            if kind not in known:
+                known[kind] = generate_dynamic(kind, header["message_definition"])[kind]
+            hear(as_data(known[kind]().deserialize(message._buff)))
+
+        rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
+
+    def send(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless no message can hold it."""
         import genpy
 
         try:  # an error within rospy would leave half a message on the line and spoil the next one
-            message = goal.server.goal(*arguments)
+            message = goal.server.message()
+            genpy.message.fill_message_args(message, [fields])
             message.serialize(io.BytesIO())
-        except (genpy.SerializationError, TypeError, ValueError) as error:
+        except (genpy.SerializationError, genpy.MessageException, TypeError, ValueError) as error:
             self.end(goal, "unsent", text=f"the goal of {goal.server.name} cannot be sent: {error}")
             return
         goal.sent = time.monotonic()
+        if not isinstance(goal.server, Ros1Server):
+            goal.is_acknowledged = True
+            threading.Thread(target=self._perform, args=(goal, message), daemon=True).start()
+            return
         goal.handle = goal.server.client.send_goal(
             message,
             lambda handle: self._changed(goal, handle),
-            lambda _, feedback: self.pass_on(goal, _fields(feedback)),
+            lambda _, feedback: self.pass_on(goal, as_data(feedback)),
         )
         goal_id = goal.handle.comm_state_machine.action_goal.goal_id.id
         goal.stop = lambda: goal.server.cancel(goal_id)
@@ -123,16 +205,22 @@ class Ros1Worker(SkillWorker):
         elif goal.cancelled is not None:
             self.end(goal, "cancelled")
         elif terminal == TerminalState.SUCCEEDED:
-            self.succeed(goal, next(iter(_fields(handle.get_result()).values()), None))
+            self.succeed(goal, as_data(handle.get_result()))
         elif terminal in (TerminalState.ABORTED, TerminalState.REJECTED):
             state_name = "rejected" if terminal == TerminalState.REJECTED else "aborted"
-            self.end(goal, "error", state=state_name, text=handle.get_goal_status_text())
+            values = as_data(handle.get_result())
+            self.end(goal, "error", state=state_name, text=handle.get_goal_status_text(), values=values)
         else:
             self.end(goal, "cancelled")
 
+    def _perform(self, goal: Goal, message: Any) -> None:
+        """Perform what cannot be cancelled."""
+        import rospy
 
-def _fields(message: Any) -> dict[str, Any]:
-    return {name: getattr(message, name) for name in message.__slots__}
+        try:
+            self.finish(goal, goal.server.perform(message))
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            self.end(goal, "error", state="aborted", text=str(error))
 
 
 if __name__ == "__main__":

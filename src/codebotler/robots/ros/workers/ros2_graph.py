@@ -9,14 +9,17 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from channel import SetupError
 from message_types import parts_of
+from ros2_types import as_data, message_types
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
 LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
+OFFERS = {"action": "action server", "srv": "service", "msg": "subscriber"}
 TAKEN = "another codebotler is using this robot (the node {}); stop it first"
 
 
@@ -79,10 +82,11 @@ class Ros2Graph:
         return f"the node {self.node} was shut down; connect again"
 
     def why_missing(self, server: str, type_name: str) -> str:
-        """Why there is no connection with an action server."""
-        kind = "/action/".join(parts_of(type_name))
+        """Why there is no connection with what a robot offers."""
+        whole = type_name if type_name.count("/") > 1 else "/action/".join(parts_of(type_name))
+        what = OFFERS[whole.split("/")[1]]
         return (
-            f"there is no action server of {kind} at {server}; start it, or compare "
+            f"there is no {what} of {whole} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
@@ -98,6 +102,42 @@ class Ros2Graph:
             self.soon(lambda: None)
 
         self.soon(resolve)
+
+    def listen(
+        self, topic: str, hear: Callable[[Any], object], packages: list[str], patience: float | None
+    ) -> None:
+        """Call `hear` with each message of a topic as plain data, of the type that its publishers have.
+
+        Without `patience`, in seconds, a topic that nobody publishes is left out.
+        """
+        from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+        until = time.monotonic() + (patience or 0.0)
+        while not (publishers := self.ours.get_publishers_info_by_topic(topic)):
+            if time.monotonic() > until:
+                if patience is None:
+                    return
+                raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
+            time.sleep(0.05)
+        kind, durability = publishers[0].topic_type, publishers[0].qos_profile.durability
+        is_kept = (
+            durability == DurabilityPolicy.TRANSIENT_LOCAL
+        )  # the last message is sent to who comes later
+        qos = QoSProfile(
+            depth=10,
+            reliability=ReliabilityPolicy.RELIABLE if is_kept else ReliabilityPolicy.BEST_EFFORT,
+            durability=durability if is_kept else DurabilityPolicy.VOLATILE,
+        )
+        spec = message_types([kind], map(Path, packages))[kind]
+        self.ours.create_subscription(spec, topic, lambda message: hear(as_data(message)), qos)
+
+    def latched(self, spec: Any, topic: str) -> Any:
+        """A publisher whose last message also those get who come later."""
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
+        return self.ours.create_publisher(
+            spec, topic, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        )
 
     def hear_statuses(self, server: str, hear: Callable[[str, Any], None]) -> None:
         """Call `hear` with an action server's name and each list of statuses that it publishes."""

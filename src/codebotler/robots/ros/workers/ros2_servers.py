@@ -10,7 +10,7 @@ from typing import Any
 
 from channel import Channel, Message, serve
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, as_in, fields_of, plain
+from ros2_types import action_types, as_data, fields_of, fill
 
 TAKEN = "there is another virtual robot (the node {}); stop it first"
 
@@ -56,13 +56,13 @@ class Ros2ActionServers:
 
             number = _number_of(handle)
             self.ends[number] = end = Future(executor=self.graph.executor)
-            arguments = [plain(getattr(handle.request, field)) for field in goals]
+            arguments = [as_data(getattr(handle.request, field)) for field in goals]
             self.channel.send("goal", id=number, skill=skill, arguments=arguments)
             line = await end
             result = spec.Result()
             if line["do"] == "succeed":
                 if results:
-                    setattr(result, results[0], as_in(getattr(result, results[0]), line["value"]))
+                    fill(result, {results[0]: line["value"]})
                 handle.succeed()
             elif line["do"] == "abort":
                 handle.abort()

@@ -1,22 +1,24 @@
-"""ROS 2 action types, generated and compiled once if their packages are not installed."""
+"""ROS 2 types, generated and compiled once if their packages are not installed, and messages as JSON."""
 
 from __future__ import annotations
 
 import hashlib
 import importlib
+import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Dict, Sequence
+from typing import Any, Callable, Dict, Sequence
 
 from channel import Message, SetupError
-from message_types import parts_of
+from message_types import in_base64, parts_of
 
 NEEDED = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
 """The packages whose messages are part of each action."""
@@ -37,24 +39,46 @@ import pathlib
 for support in {supports}:  # found by their names, once they are loaded
     ctypes.CDLL(str(pathlib.Path(__file__).parent / f"lib{package}__{{support}}.so"))
 """
-LIBRARIES = (
-    "generator_c",
-    "generator_py",
-    "typesupport_c",
-    "typesupport_fastrtps_c",
-    "typesupport_introspection_c",
-)
-RUNTIME = (*SUPPORTS, "rosidl_runtime_c", "rosidl_typesupport_c", "rcutils", "fastcdr")
 COMPILERS = {".c": "cc", ".cpp": "c++"}
-Definitions = Dict[str, str]
+USES = re.compile(r"^\s*(?:(\w+)/)?([A-Z]\w*)", re.MULTILINE)
+Tell = Callable[[str], object]
+Definitions = Dict[str, str]  # by kind and name, such as action/GoTo
 
 
-def action_types(actions: list[Message], tell: Callable[[str], object] = lambda _: None) -> dict[str, Any]:
-    """Action types by their `type`, from rows with this and the `definition` of an .action file.
+def message_types(names: list[str], folders: Iterable[Path], tell: Tell = lambda _: None) -> dict[str, Any]:
+    """Return the Python class of each message, service and action, by names such as std_msgs/msg/String.
+
+    Args:
+        names: all that a process needs, since a package that is built has nothing else.
+        folders: packages to build where they are not installed, with their name and action/, msg/ or srv/.
+        tell: called with a sentence before a step that takes long.
+
+    Raises:
+        SetupError: a package or a definition is missing, or cannot be built.
+    """
+    sources = {folder.name: folder for folder in folders}
+    wanted: dict[str, list[str]] = {}
+    for name in names:
+        package, _, kind = name.partition("/")
+        if kind.count("/") != 1:
+            raise SetupError(f"{name} is not the name of a ROS 2 type; write PACKAGE/msg/NAME, srv or action")
+        wanted.setdefault(package, []).append(kind)
+    for package, kinds in wanted.items():
+        if not _is_installed(package):
+            if package not in sources:
+                raise SetupError(
+                    f"the ROS 2 package {package} is not installed; source it, or list its folder in packages"
+                )
+            _install(package, _definitions(sources[package], kinds), tell)
+    return {name: _class(name) for name in names}
+
+
+def action_types(actions: list[Message], tell: Tell = lambda _: None) -> dict[str, Any]:
+    """Return action types by their `type`, from rows with this and the `definition` of an .action file.
 
     Args:
         actions: what a robot offers.
-        tell: called with a sentence before something that takes long.
+        tell: called with a sentence before a step that takes long.
 
     Raises:
         SetupError: an installed package differs, or one that is missing cannot be built.
@@ -62,72 +86,133 @@ def action_types(actions: list[Message], tell: Callable[[str], object] = lambda 
     packages: dict[str, Definitions] = {}
     for action in actions:
         package, name = parts_of(action["type"])
-        packages.setdefault(package, {})[name] = action["definition"]
-    modules = {package: _module(package, texts, tell) for package, texts in packages.items()}
-    found = {}
-    for action in actions:
-        package, name = parts_of(action["type"])
-        found[action["type"]] = _checked(modules[package], name, action["definition"])
-    return found
+        packages.setdefault(package, {})[f"action/{name}"] = action["definition"]
+    for package, definitions in packages.items():
+        if not _is_installed(package):
+            _install(package, definitions, tell)
+    return {action["type"]: _checked(action["type"], action["definition"]) for action in actions}
 
 
 def fields_of(definition: str) -> list[list[str]]:
-    """The names of the fields of goal, result and feedback."""
+    """Return the names of the fields of goal, result and feedback."""
     parts = (definition + "\n").split("---\n")
     return [[line.split()[1] for line in part.splitlines() if line.strip()] for part in parts]
 
 
-def plain(value: Any) -> Any:
-    """The value of a field as JSON has it; an array of numbers is none of Python's lists."""
-    return list(value) if hasattr(value, "typecode") else value
+def as_data(value: Any) -> Any:
+    """Return a message, or the value of one of its fields, as JSON has it; bytes are in base64."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: as_data(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, bytes) or getattr(value, "typecode", "") == "B":
+        return in_base64(value)
+    if hasattr(value, "tolist"):  # an array of numbers
+        return value.tolist()
+    return [as_data(each) for each in value] if isinstance(value, list) else value
 
 
-def as_in(default: Any, value: Any) -> Any:
-    """A value of JSON as a field with this default takes it: a whole number may be meant as a float."""
-    if isinstance(default, float):
-        return float(value)
-    if getattr(default, "typecode", "") in {"d", "f"}:
-        return [float(each) for each in value]
-    return value
+def fill(message: Any, values: Message, where: str = "") -> Any:
+    """Set fields of a message from nested dictionaries as JSON has them, and return it.
+
+    Args:
+        message: keeps the fields that are not given.
+        values: by name; a whole number may be meant as a float.
+        where: the path of the message, with a dot at its end.
+
+    Raises:
+        SetupError: there is no such field, or the value does not fit; it says the path.
+    """
+    kinds = message.get_fields_and_field_types()
+    if hasattr(message, "_check_fields"):
+        message._check_fields = True  # otherwise rclpy may crash at a wrong value
+    for name, value in values.items():
+        path = where + name
+        if name not in kinds:
+            raise SetupError(f"there is no field {path}, but {', '.join(where + kind for kind in kinds)}")
+        try:
+            setattr(message, name, _fitted(getattr(message, name), kinds[name], value, path))
+        except (AssertionError, TypeError, ValueError, OverflowError):
+            raise SetupError(
+                f"the field {path} is {kinds[name]}, which {json.dumps(value)} does not fit"
+            ) from None
+    return message
 
 
-def _module(package: str, definitions: Definitions, tell: Callable[[str], object]) -> Any:
-    try:
-        return importlib.import_module(package + ".action")
-    except ModuleNotFoundError as error:
-        if error.name not in {package, package + ".action"}:
-            raise
+def _fitted(default: Any, kind: str, value: Any, path: str) -> Any:
+    base = re.sub(r"sequence<|[,>\[].*", "", kind)
+    if isinstance(value, list):
+        return [_fitted(None, base, each, f"{path}[{index}]") for index, each in enumerate(value)]
+    if "/" in base and isinstance(value, dict):
+        return fill(default or _class(base.replace("/", "/msg/"))(), value, path + ".")
+    return float(value) if base in {"float", "double"} and type(value) is int else value
+
+
+def _is_installed(package: str) -> bool:
+    spec = importlib.util.find_spec(package)
+    return spec is not None and spec.origin is not None  # a folder of definitions on the path has none
+
+
+def _install(package: str, definitions: Definitions, tell: Tell) -> None:
     sys.path.insert(0, str(built(package, definitions, tell)))
     importlib.invalidate_caches()
-    return importlib.import_module(package + ".action")
 
 
-def _checked(module: Any, name: str, definition: str) -> Any:
-    spec = getattr(module, name, None)
-    where = Path(module.__file__).parent
-    package = module.__name__.partition(".")[0]
-    if spec is None:
-        raise SetupError(f"{package} in {where} has no action {name}; add {name}.action and build it again")
+def _definitions(folder: Path, wanted: list[str]) -> Definitions:
+    """Return the texts of what is wanted of a package, and of the messages of its own that this uses."""
+    found: Definitions = {}
+    while wanted:
+        name, *wanted = wanted
+        path = folder / f"{name}.{name.partition('/')[0]}"
+        try:
+            found[name] = path.read_text(encoding="utf-8")
+        except OSError:
+            raise SetupError(f"there is no file {path}; is the folder of {folder.name} complete?") from None
+        uses = {f"msg/{used}" for package, used in USES.findall(found[name]) if package in {"", folder.name}}
+        wanted += sorted(uses - {*found, *wanted})
+    return found
+
+
+def _class(name: str) -> Any:
+    package, kind, plain = name.split("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), plain)
+    except (AttributeError, ModuleNotFoundError):
+        where = Path(importlib.import_module(package).__file__ or "").parent
+        raise SetupError(
+            f"{package} in {where} has no {kind} {plain}; add {plain}.{kind} and build it again"
+        ) from None
+
+
+def _checked(kind: str, definition: str) -> Any:
+    package, name = parts_of(kind)
+    spec = _class(f"{package}/action/{name}")
     for part, fields in zip((spec.Goal, spec.Result), fields_of(definition)):
         installed = list(part.get_fields_and_field_types())
         if installed != fields:
             raise SetupError(
-                f"{package}/action/{name} in {where} has the fields {', '.join(installed) or 'none'}, "
+                f"{package}/action/{name} has the fields {', '.join(installed) or 'none'}, "
                 f"but {', '.join(fields) or 'none'} are needed; build it again"
             )
     return spec
 
 
-def built(package: str, definitions: Definitions, tell: Callable[[str], object] = lambda _: None) -> Path:
-    """A folder for sys.path with a package that has these actions, built unless that was done before.
+def built(package: str, definitions: Definitions, tell: Tell = lambda _: None) -> Path:
+    """Return a folder for sys.path with a package of these types, built unless that was done before.
 
     Raises:
-        SetupError: there is no C++ compiler, or it fails.
+        SetupError: a package whose messages it uses is missing, or a C++ compiler, or that fails.
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # ROS from wheels lies in the environment itself
+    from ament_index_python import PackageNotFoundError
     from ament_index_python import get_package_share_directory as share
 
-    shares = {name: Path(share(name)) for name in (*NEEDED, *("rosidl_" + name for name in GENERATORS))}
+    used = {name for text in definitions.values() for name, _ in USES.findall(text)} - {"", package}
+    needed = sorted({*NEEDED, *used})
+    try:
+        shares = {name: Path(share(name)) for name in (*needed, *("rosidl_" + name for name in GENERATORS))}
+    except PackageNotFoundError as error:
+        raise SetupError(
+            f"{package} needs the ROS 2 package {error}, which is not installed; source it"
+        ) from None
     versions = [(folder / "package.xml").read_text() for folder in shares.values()]
     parts = [package, definitions, sysconfig.get_config_var("SOABI"), versions, Path(__file__).read_text()]
     key = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
@@ -144,9 +229,9 @@ def built(package: str, definitions: Definitions, tell: Callable[[str], object] 
     tell(f"building the ROS 2 messages of {package}, once: this takes half a minute")
     home.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=str(home)) as temporary:
-        _Build(package, Path(temporary), shares).make(definitions)
+        _Build(package, Path(temporary), shares, needed).make(definitions)
         try:
-            (Path(temporary) / "made").rename(folder)
+            (Path(temporary) / "kept").rename(folder)
         except OSError:  # another worker was faster
             if not folder.exists():
                 raise
@@ -156,22 +241,22 @@ def built(package: str, definitions: Definitions, tell: Callable[[str], object] 
 class _Build:
     """Builds one package, as the CMake functions of ROS do, but only what rclpy needs."""
 
-    def __init__(self, package: str, work: Path, shares: dict[str, Path]) -> None:
-        self.package, self.work, self.shares = package, work, shares
+    def __init__(self, package: str, work: Path, shares: dict[str, Path], needed: list[str]) -> None:
+        self.package, self.work, self.shares, self.needed = package, work, shares, needed
         self.made = work / "made" / package
-        self.prefix = shares["action_msgs"].parents[1]
+        self.prefixes = {shares[name].parents[1] for name in needed}
 
     def make(self, definitions: Definitions) -> None:
-        (self.made / "action").mkdir(parents=True)
+        (self.made / "msg").mkdir(parents=True)
         (self.made / "__init__.py").write_text(PRELOADS.format(package=self.package, supports=SUPPORTS))
         self._generate(definitions)
         module = f"{self.package}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
         objects = [self._compiled(unit) for unit in list(self._units())]
-        libraries = [f"-l{name}__rosidl_{kind}" for name in NEEDED for kind in LIBRARIES]
+        libraries = [f"-l{name}__rosidl_{kind}" for name in self.needed for kind in GENERATORS[1:]]
         self._run(
             "c++", "-shared", "-s", "-Wl,--allow-shlib-undefined", f"-Wl,-soname,{module}", "-o",
-            str(self.made / module), *objects,
-            "-L", str(self.prefix / "lib"), *libraries, *(f"-l{name}" for name in RUNTIME)
+            str(self.made / module), *objects, "-Wl,--no-as-needed",
+            *(f"-L{prefix / 'lib'}" for prefix in self.prefixes), *libraries
         )  # fmt: skip
         libraries = [f"lib{self.package}__{support}.so" for support in SUPPORTS]
         for library in libraries:  # empty, but leads to all symbols of the module
@@ -179,15 +264,12 @@ class _Build:
                 "c++", "-shared", f"-Wl,-soname,{library}", "-Wl,--no-as-needed", "-Wl,-rpath,$ORIGIN",
                 "-Wl,--allow-shlib-undefined", str(self.made / module), "-o", str(self.made / library)
             )  # fmt: skip
-        kept = {module, *libraries}
-        for path in sorted(self.made.rglob("*"), reverse=True):
-            if path.is_dir() and not any(path.iterdir()):
-                path.rmdir()
-            elif path.is_file() and path.suffix != ".py" and path.name not in kept:
-                path.unlink()
+        sources = shutil.ignore_patterns("detail", "*.[ch]", "*.idl", "*.json")
+        shutil.copytree(str(self.made), str(self.work / "kept" / self.package), ignore=sources)
 
     def _generate(self, definitions: Definitions) -> None:
-        from rosidl_adapter.action import convert_action_to_idl
+        from rosidl_adapter import convert_to_idl
+        from rosidl_adapter.parser import InvalidSpecification
         from rosidl_generator_c import generate_c
         from rosidl_generator_py import generate_py
         from rosidl_generator_type_description import generate_type_hash
@@ -195,21 +277,20 @@ class _Build:
         from rosidl_typesupport_fastrtps_c import generate_typesupport_fastrtps_c
         from rosidl_typesupport_introspection_c import generate_c as generate_introspection_c
 
-        self.idls = []
-        for name, text in sorted(definitions.items()):
-            source = Path("action") / f"{name}.action"
-            (self.work / "action").mkdir(exist_ok=True)
-            (self.work / source).write_text(text)
-            self.idls.append(
-                convert_action_to_idl(self.work, self.package, source, self.made / "action").name
-            )
-        generate_type_hash(
-            self._arguments(
-                "generator_type_description", include_paths=[f"{n}:{self.shares[n]}" for n in NEEDED]
-            )
-        )
-        hashes = [f"action/{name}:{self.made / 'action' / name[:-4]}.json" for name in self.idls]
-        sources = [str(self.work / "action" / f"{name}.action") for name in sorted(definitions)]
+        sources = []
+        for name, text in definitions.items():
+            source = self.work / f"{name}.{name.partition('/')[0]}"
+            source.parent.mkdir(exist_ok=True)
+            source.write_text(text, encoding="utf-8")
+            try:
+                convert_to_idl(self.work, self.package, source.relative_to(self.work), self.made)
+            except InvalidSpecification as error:
+                raise SetupError(f"{self.package}/{name} is not a ROS 2 definition: {error}") from None
+            sources.append(str(source))
+        self.names = sorted(definitions)
+        includes = [f"{name}:{self.shares[name]}" for name in self.needed]
+        generate_type_hash(self._arguments("generator_type_description", include_paths=includes))
+        hashes = [f"{name}.idl:{self.made / name}.json" for name in self.names]
         generate_c(
             self._arguments("generator_c", type_description_tuples=hashes, ros_interface_files=sources)
         )
@@ -222,20 +303,20 @@ class _Build:
         )
         generate_py(self._arguments("generator_py"), ["rosidl_typesupport_c"])
         for generator in ("generator_c", "typesupport_fastrtps_c", "typesupport_introspection_c"):
-            self._write_visibility(f"rosidl_{generator}__visibility_control.h", self._templates(generator))
-
-    def _templates(self, generator: str) -> Path:
-        return self.shares["rosidl_" + generator] / "resource"
+            header = f"rosidl_{generator}__visibility_control.h"
+            text = (self.shares["rosidl_" + generator] / "resource" / f"{header}.in").read_text()
+            text = text.replace("@PROJECT_NAME@", self.package)
+            (self.made / "msg" / header).write_text(
+                text.replace("@PROJECT_NAME_UPPER@", self.package.upper())
+            )
 
     def _arguments(self, generator: str, **more: Any) -> str:
         """A file of arguments, as the generators read them."""
-        interfaces = [f"{name}:{path}" for name in NEEDED for path in self.shares[name].glob("*/*.idl")]
         arguments = {
             "package_name": self.package,
             "output_dir": str(self.made),
-            "template_dir": str(self._templates(generator)),
-            "idl_tuples": [f"{self.made}:action/{name}" for name in self.idls],
-            "ros_interface_dependencies": interfaces,
+            "template_dir": str(self.shares["rosidl_" + generator] / "resource"),
+            "idl_tuples": [f"{self.made}:{name}.idl" for name in self.names],
             "target_dependencies": [],
             **more,
         }
@@ -243,21 +324,10 @@ class _Build:
         path.write_text(json.dumps(arguments))
         return str(path)
 
-    def _write_visibility(self, header: str, templates: Path) -> None:
-        text = (templates / f"{header}.in").read_text()
-        text = text.replace("@PROJECT_NAME@", self.package)
-        text = text.replace("@PROJECT_NAME_UPPER@", self.package.upper())
-        (self.made / "msg").mkdir(exist_ok=True)
-        (self.made / "msg" / header).write_text(text)
-
     def _units(self) -> Iterator[Path]:
         """What is compiled: one file for all of a language, but for descriptions, whose names collide."""
-        introspection = self.work / "introspection.c"
-        files = sorted((self.work / "introspection").rglob("*.c"))
-        introspection.write_text("".join(f'#include "{path}"\n' for path in files))
-        yield introspection
         for suffix in COMPILERS:
-            files = sorted(self.made.rglob("*" + suffix))
+            files = sorted(self.work.rglob("*" + suffix))
             together = [path for path in files if not path.stem.endswith("__description")]
             unit = self.work / ("all" + suffix)
             unit.write_text("".join(f'#include "{path}"\n' for path in together))
@@ -267,15 +337,10 @@ class _Build:
     def _compiled(self, unit: Path) -> str:
         from numpy import get_include
 
-        headers = self.prefix / "include"
-        folders = [
-            self.work / "made",
-            self.work / "introspection",
-            headers,
-            Path(sysconfig.get_paths()["include"]),
-            Path(get_include()),
-        ]
-        folders += [path for path in headers.iterdir() if (path / path.name).is_dir()]
+        headers = [prefix / "include" for prefix in self.prefixes]
+        folders = [self.work / "made", self.work / "introspection", *headers, Path(get_include())]
+        folders += [Path(sysconfig.get_paths()["include"])]
+        folders += [path for each in headers for path in each.iterdir() if (path / path.name).is_dir()]
         done = self.work / (unit.name + ".o")
         includes = [argument for path in folders for argument in ("-I", str(path))]
         self._run(COMPILERS[unit.suffix], "-c", "-fPIC", "-O0", "-w", *includes, str(unit), "-o", str(done))

@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from channel import Message, serve
+from channel import Message, SetupError, serve
 from goals import TICK, Goal, SkillWorker
+from ros2_camera import Ros2Camera
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, as_in, fields_of, plain
+from ros2_types import action_types, as_data, fill, message_types
 
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
+KEEPOUT = ("nav_msgs/msg/OccupancyGrid", "nav2_msgs/msg/CostmapFilterInfo")
 REJECTED = 1  # of action_msgs/srv/CancelGoal
 DISCOVERS = 3  # times the patience, for the first server to be discovered
 TELLS = 2.0  # seconds after which a search for servers is told
@@ -38,8 +41,7 @@ class Ros2Server:
 
         self.name: str = action["server"]
         self.type: str = action["type"]
-        self.fields, self.returns, _ = fields_of(action["definition"])
-        self.spec = spec
+        self.spec, self.message = spec, spec.Goal
         self.client = rclpy.action.ActionClient(graph.ours, spec, self.name)
         self._graph, self._request = graph, CancelGoal.Request
         self._cancels = graph.ours.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
@@ -79,6 +81,55 @@ class Ros2Server:
         return self._cancels.call_async(request)
 
 
+class Ros2Service:
+    """A service that performs a skill; what it does cannot be cancelled."""
+
+    has_cancelled = True
+
+    def __init__(self, graph: Ros2Graph, call: Message, spec: Any) -> None:
+        self.name: str = call["server"]
+        self.type: str = call["type"]
+        self.message = spec.Request
+        self.client = graph.ours.create_client(spec, self.name)
+
+    @property
+    def heard(self) -> float:
+        """Now, since its end shows in `is_connected`, and it answers then all the same or never."""
+        return time.monotonic()
+
+    def is_connected(self, _silence: float) -> bool:
+        """Whether it is there."""
+        return bool(self.client.service_is_ready())
+
+    def cancel(self) -> None:
+        """Nothing."""
+
+    def perform(self, message: Any, end: Callable[[Message], None]) -> None:
+        """Call it, and end with its answer."""
+        answer = self.client.call_async(message)
+        answer.add_done_callback(lambda done: end(as_data(done.result())))
+
+
+class Ros2Topic(Ros2Service):
+    """A topic whose messages perform a skill, as far as anybody can know."""
+
+    def __init__(self, graph: Ros2Graph, call: Message, spec: Any) -> None:
+        self.name, self.type, self.message = call["server"], call["type"], spec
+        self.publisher = graph.ours.create_publisher(spec, self.name, 10)
+
+    def is_connected(self, _silence: float) -> bool:
+        """Whether anybody listens."""
+        return bool(self.publisher.get_subscription_count())
+
+    def perform(self, message: Any, end: Callable[[Message], None]) -> None:
+        """Publish a message."""
+        self.publisher.publish(message)
+        end({})
+
+
+OTHERS = {"service": Ros2Service, "topic": Ros2Topic}
+
+
 class Ros2Worker(SkillWorker):
     """Performs skills over ROS 2."""
 
@@ -87,18 +138,35 @@ class Ros2Worker(SkillWorker):
 
     def connect(self, start: Message) -> bool:
         """Start our node, and a client for each server; whether an earlier worker died without leaving."""
-        actions = start["actions"]
-        specs = action_types(list(actions.values()), lambda text: self.channel.send("progress", text=text))
+        calls, self._packages = start["calls"], start["packages"]
+        given = [call for call in calls.values() if call["definition"]]
+        latched = dict(zip(start["keepout"], KEEPOUT))
+        names = [call["type"] for call in calls.values() if not call["definition"]] + list(latched.values())
+        specs = action_types(given, self._tell)
+        specs.update(message_types(names, map(Path, self._packages), self._tell))
         self.graph = Ros2Graph(start["node"])
         left_behind = self.graph.enter()
         self.servers = {
-            skill: Ros2Server(self.graph, action, specs[action["type"]], self.see)
-            for skill, action in actions.items()
+            skill: Ros2Server(self.graph, call, specs[call["type"]], self.see)
+            if call["kind"] == "action"
+            else OTHERS[call["kind"]](self.graph, call, specs[call["type"]])
+            for skill, call in calls.items()
         }
         for server in self.servers.values():
-            self.graph.hear_statuses(server.name, self._hear)
+            if isinstance(server, Ros2Server):
+                self.graph.hear_statuses(server.name, self._hear)
+        self._listen(start)
+        self._latched = {
+            topic: (self.graph.latched(specs[kind], topic), specs[kind]) for topic, kind in latched.items()
+        }
+        self.cameras = {topic: Ros2Camera(self.graph, topic) for topic in start["cameras"]}
         self.graph.spin()
         return left_behind
+
+    def publish(self, topic: str, fields: Message) -> None:
+        """Publish the last message of a topic, also for those who come later."""
+        publisher, spec = self._latched[topic]
+        self.graph.soon(publisher.publish, fill(spec(), fields))
 
     def cancel_all(self) -> bool:
         """Cancel all goals of all clients; whether all servers that are there have confirmed it."""
@@ -131,23 +199,32 @@ class Ros2Worker(SkillWorker):
             if not server.is_connected(self.silence)
         }
 
-    def send(self, goal: Goal, arguments: list[Any]) -> None:
+    def send(self, goal: Goal, fields: Message) -> None:
         """Have the executor's thread send a goal, unless no message can hold it.
 
         Elsewhere, rclpy can lose the answer.
         """
-        message = goal.server.spec.Goal()
         try:
-            for field, value in zip(goal.server.fields, arguments):
-                setattr(message, field, as_in(getattr(message, field), value))
-            _check(message, arguments)
-        except (AssertionError, OverflowError, TypeError, ValueError) as error:
+            message = fill(goal.server.message(), fields)
+            _check(message, fields)
+        except (SetupError, ValueError) as error:
             self.end(goal, "unsent", text=f"the goal of {goal.server.name} cannot be sent: {error}")
             return
-        goal.handle = Ros2Goal()
         goal.sent = time.monotonic()
+        if not isinstance(goal.server, Ros2Server):
+            goal.is_acknowledged = True
+            self.graph.soon(goal.server.perform, message, lambda values: self.finish(goal, values))
+            return
+        goal.handle = Ros2Goal()
         goal.stop = lambda: self.graph.soon(self._cancel, goal)
         self.graph.soon(self._send, goal, message)
+
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
+        """Call `hear` with each message of a topic as plain data, of the type that its publishers have."""
+        self.graph.listen(topic, hear, self._packages, self.patience if is_needed else None)
+
+    def _tell(self, text: str) -> None:
+        self.channel.send("progress", text=text)
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
         """Repeat what has no effect: a cancel may overtake its goal, and an answer may be lost."""
@@ -170,9 +247,9 @@ class Ros2Worker(SkillWorker):
             message,
             feedback_callback=lambda m: self._feedback(goal, m.feedback),
             goal_uuid=UUID(uuid=goal.handle.uuid),
-        ).add_done_callback(lambda done: self._answered(goal, done.result()))
+        ).add_done_callback(lambda done: self._accepted(goal, done.result()))
 
-    def _answered(self, goal: Goal, handle: Any) -> None:
+    def _accepted(self, goal: Goal, handle: Any) -> None:
         """Note whether the server accepts the goal."""
         if handle.accepted:
             self._accept(goal)
@@ -221,24 +298,23 @@ class Ros2Worker(SkillWorker):
         if goal.cancelled is not None or response.status == CANCELED:
             self.end(goal, "cancelled")
         elif response.status == SUCCEEDED:
-            values = [getattr(response.result, field) for field in goal.server.returns]
-            self.succeed(goal, plain(values[0]) if values else None)
+            self.succeed(goal, as_data(response.result))
         elif response.status == ABORTED:
-            self.end(goal, "error", state="aborted", text="")
+            self.end(goal, "error", state="aborted", text="", values=as_data(response.result))
         else:
             self.end(
                 goal, "lost", text=f"{goal.server.name} ended its goal with the status {response.status}"
             )
 
     def _feedback(self, goal: Goal, feedback: Any) -> None:
-        self.pass_on(goal, {name: getattr(feedback, name) for name in feedback.get_fields_and_field_types()})
+        self.pass_on(goal, as_data(feedback))
 
 
-def _check(message: Any, arguments: list[Any]) -> None:
+def _check(message: Any, fields: Message) -> None:
     """Raise an error that says why a message cannot be sent; later, it would end the executor's thread."""
     from rclpy.serialization import serialize_message
 
-    if r"\x00" in repr(arguments).replace(r"\\", ""):  # strings of ROS 2 end there
+    if r"\x00" in repr(fields).replace(r"\\", ""):  # strings of ROS 2 end there
         raise ValueError("a text contains NUL")
     serialize_message(message)
 

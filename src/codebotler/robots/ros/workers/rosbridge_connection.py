@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 
 from channel import Message
-from rosbridge_protocol import ActionProtocol, GoalUpdate, Ros1Protocol, Ros2Protocol
+from rosbridge_protocol import ActionProtocol, GoalUpdate, Ros1Protocol, Ros2Protocol, service_updates
 
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell its version of ROS; one without rosapi cannot
@@ -38,6 +38,7 @@ class Connection:
         self._socket = connect(address, open_timeout=OPENS, close_timeout=CLOSES, max_size=None)
         self._version: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._heard_first: dict[str, float] = {}
+        self._listeners: dict[str, Callable[[Message], object]] = {}
         self.heard: dict[str, float] = {}  # when the last status of a server came, by the monotonic clock
         self.settled: set[str] = set()  # servers heard for so long that their results are connected too
         self.is_lost = self.has_ended = False
@@ -56,6 +57,11 @@ class Connection:
         """Send a message; a lost connection shows in `is_lost`."""
         with suppress(ConnectionClosed):
             self._socket.send(json.dumps(message))
+
+    def listen(self, topic: str, hear: Callable[[Message], object]) -> None:
+        """Call `hear` with each message of a topic."""
+        self._listeners[topic] = hear
+        self.send({"op": "subscribe", "topic": topic})
 
     def insist(self, message: Message) -> bool:
         """Send a message over another connection, again and again for a while; whether that was possible."""
@@ -109,9 +115,11 @@ class Connection:
                 self._version.put(ros)
             case {"op": "service_response", "id": "version"}:
                 self._version.put(1)
+            case {"op": "publish", "topic": str(topic), "msg": dict(told)} if topic in self._listeners:
+                self._listeners[topic](told)
             case {"op": "status", "level": "error", "msg": str(complaint)}:
                 self.complaint = complaint
-        for update in self.protocol.updates(message):
+        for update in (*self.protocol.updates(message), *service_updates(message)):
             if update.goal:
                 self._hear(update)
             elif update.server:

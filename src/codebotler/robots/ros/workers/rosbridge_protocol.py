@@ -114,4 +114,13 @@ class Ros2Protocol:
                 yield GoalUpdate(goal, "ended", "lost", text=str(why))
 
 
+def service_updates(message: Message) -> Iterator[GoalUpdate]:
+    """The news in the answer of a service."""
+    match message:
+        case {"op": "service_response", "id": str(goal), "result": True, "values": dict(values)}:
+            yield GoalUpdate(goal, "ended", "succeeded", values=values)
+        case {"op": "service_response", "id": str(goal), "values": why}:
+            yield GoalUpdate(goal, "ended", "aborted", text=str(why))
+
+
 ActionProtocol: TypeAlias = Ros1Protocol | Ros2Protocol

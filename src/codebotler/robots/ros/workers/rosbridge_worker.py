@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import uuid
-from typing import Any
+from collections.abc import Callable
 
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
@@ -20,13 +20,13 @@ class RosbridgeServer:
     def __init__(self, connection: Connection, action: Message) -> None:
         self.name: str = action["server"]
         self.type: str = action["type"]
-        self.fields = [line.split()[1] for line in action["definition"].partition("---")[0].splitlines()]
+        self.kind: str = action["kind"]
         self._connection = connection
 
     @property
     def heard(self) -> float:
         """When its last status came, by the monotonic clock; now, if there are none."""
-        if self._connection.protocol.has_status:
+        if self._connection.protocol.has_status and self.kind == "action":
             return self._connection.heard.get(self.name, 0.0)
         return time.monotonic()
 
@@ -34,7 +34,8 @@ class RosbridgeServer:
         """Whether no result of a goal would be lost."""
         if self._connection.is_lost:
             return False
-        return not self._connection.protocol.has_status or self.name in self._connection.settled
+        is_heard = self._connection.protocol.has_status and self.kind == "action"
+        return not is_heard or self.name in self._connection.settled
 
     def cancel(self, goal: str = "") -> None:
         """Cancel one goal, or all goals of all clients."""
@@ -49,18 +50,24 @@ class RosbridgeWorker(SkillWorker):
 
     def connect(self, start: Message) -> bool:
         """Open the connection; an earlier worker that died leaves no sign."""
-        actions = start["actions"]
+        calls = start["calls"]
+        actions = [call for call in calls.values() if call["kind"] == "action"]
         try:
-            self.graph = Connection(start["address"], actions.values(), self._hear, self._lost)
+            self.graph = Connection(start["address"], actions, self._hear, self._lost)
         except FAULTS as error:
             raise SetupError(
                 f"no rosbridge answers at {start['address']} ({error}); start it, "
                 "or name another with --address"
             ) from None
-        self.servers = {skill: RosbridgeServer(self.graph, action) for skill, action in actions.items()}
+        self.servers = {skill: RosbridgeServer(self.graph, call) for skill, call in calls.items()}
+        self._listen(start)
         self._message: Message = {}
         self._again = 0.0
         return False
+
+    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - nobody knows whether it is there
+        """Call `hear` with each message of a topic as plain data."""
+        self.graph.listen(topic, hear)
 
     def missing(self) -> dict[str, str]:
         """Nothing: servers are seen only when their skills are performed."""
@@ -75,17 +82,32 @@ class RosbridgeWorker(SkillWorker):
             super().cancel_all()
         return not self.graph.is_lost
 
-    def send(self, goal: Goal, arguments: list[Any]) -> None:
-        """Send a goal."""
+    def send(self, goal: Goal, fields: Message) -> None:
+        """Send a goal, call a service, or publish a message."""
         server, protocol = goal.server, self.graph.protocol
         name = goal.handle = str(uuid.uuid4())
-        fields = dict(zip(server.fields, arguments, strict=True))
+        if server.kind != "action":
+            self._send_other(goal, fields)
+            return
         self._message = protocol.goal(server.name, server.type, name, fields)
         goal.is_acknowledged = not protocol.has_status
         goal.sent = time.monotonic()
         self._again = goal.sent + AGAIN
         self.graph.send(self._message)
         goal.stop = lambda: server.cancel(name)
+
+    def _send_other(self, goal: Goal, fields: Message) -> None:
+        """Perform what cannot be cancelled."""
+        goal.sent, goal.is_acknowledged = time.monotonic(), True
+        name, kind = goal.server.name, goal.server.type
+        if goal.server.kind == "service":
+            call = {"op": "call_service", "id": goal.handle, "service": name, "type": kind, "args": fields}
+            self.graph.send(call)
+        else:
+            self.graph.send({"op": "advertise", "topic": name, "type": kind})
+            time.sleep(SETTLES)  # for those who listen to connect
+            self.graph.send({"op": "publish", "topic": name, "msg": fields})
+            self.end(goal, "result", values={})
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
         """Send again what has no effect."""
@@ -117,9 +139,9 @@ class RosbridgeWorker(SkillWorker):
         elif update.state == "cancelled" or goal.cancelled is not None:
             self.end(goal, "cancelled")
         elif update.state == "succeeded":
-            self.end(goal, "result", value=next(iter(update.values.values()), None))
+            self.end(goal, "result", values=update.values)
         else:
-            self.end(goal, "error", state=update.state, text=update.text)
+            self.end(goal, "error", state=update.state, text=update.text, values=update.values)
 
     def _lost(self) -> None:
         """Cancel the goal that goes on over another connection."""

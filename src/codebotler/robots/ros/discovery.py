@@ -1,0 +1,125 @@
+"""Looks at what the nodes of a robot offer, and writes a first file for `--connect` from it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.robots.base import NotReadyError
+from codebotler.robots.ros import ros1, ros2
+from codebotler.robots.ros.worker import RosWorker
+
+
+def _own_actions() -> Iterator[tuple[str, str, str, str]]:
+    for skill in SKILLS.rows:
+        assert skill.ros is not None, "all of them have an action"
+        names = [field.split()[1] for field in skill.ros.goal]
+        goal = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
+        text = f"{ACTION}{goal}{', result: result' if skill.ros.result else ''}".replace("'", "")
+        yield rf"action \S+ {skill.ros.package}/{skill.ros.type}", skill.name, text, ""
+
+
+ACTION, SERVICE = "action: NAME, type: TYPE, goal: ", "service: NAME, type: TYPE, request: "
+SAY = "topic: NAME, type: TYPE, message: {data: $message}"
+PLACES, DETECTOR, OWN = "name places first", "choose a detector first", "declare this skill of yours first"
+FRAME = "only if the places are in its frame"
+USES = (
+    *_own_actions(),
+    (r"action \S+ nav2_msgs/NavigateToPose", "go_to", ACTION + "{pose: $place}", PLACES),
+    (r"action \S+ move_base_msgs/MoveBase", "go_to", ACTION + "{target_pose: $place}", PLACES),
+    (r"hears \S*[/_](say|speak|speech|tts|talk)(_text|_output)? std_msgs/String", "say", SAY, ""),
+    (r"sends \S+ sensor_msgs/(Compressed)?Image", "is_in_room", "detector: hf:PATH, image: NAME", DETECTOR),
+    (r"service \S+ std_srvs/Trigger", "", SERVICE + "{}, success: success", OWN),
+    (r"service \S+ std_srvs/SetBool", "", SERVICE + "{data: $on}, success: success", OWN),
+    (r"sends \S*/(amcl_)?pose geometry_msgs/Pose(WithCovariance)?Stamped", "pose", "topic: NAME", ""),
+    (r"sends /tf tf2_msgs/TFMessage", "pose", "tf: {from: map, to: base_link}", ""),
+    (r"sends \S+ nav_msgs/Odometry", "pose", "topic: NAME", FRAME),
+    (r"sends \S+ nav_msgs/Odometry", "velocity", "topic: NAME", ""),
+)
+"""A regex of offers, the key that they are for (an empty one is named after the offer), what the key maps to,
+and what must be done first; the line is a comment then."""
+
+OF_ROS = re.compile(
+    r"\S+ \S*((lifecycle|controller)_manager|costmap|rosbag|rosbridge|rosapi|rviz|/_|/tf_static|_logger).*"
+    r"|.* (rcl_interfaces|lifecycle_msgs|\w+_interfaces|rosgraph_msgs|actionlib_msgs|bond|dynamic_reconfigure"
+    r"|diagnostic_msgs)/\w+|.*Action(Goal|Result|Feedback)"
+)
+"""Offers that nobody maps, such as the services for parameters that each node has."""
+
+ABOUT = ("pose", "velocity")  # the keys that are not skills
+EXPECTED = {
+    "places": "places (name a file of them)",
+    "pose": "pose (a topic that says where the robot is)",
+    **{skill: skill for skill in SKILLS if skill not in {"get_all_rooms", "get_current_location"}},
+}
+
+
+def offers_of(robot: str, address: str, python: Path) -> list[str]:
+    """What the nodes of a robot offer: kind (action, service, hears or sends), name and type in a line.
+
+    Args:
+        robot: ros1 or ros2.
+        address: the URI of the master, or a domain; empty for the default.
+        python: the interpreter that the robot's ROS belongs to.
+
+    Raises:
+        UserError: the kind or the address is wrong.
+        NotReadyError: there is no ROS, no master or no node.
+    """
+    if robot not in {"ros1", "ros2"}:
+        raise UserError(f'"{robot}" cannot be looked at; use ros1 or ros2, on a machine with its ROS')
+    if robot == "ros1":
+        environment = {"ROS_MASTER_URI": ros1.master_uri(address)}
+    else:
+        environment, python = {"ROS_DOMAIN_ID": ros2.domain_of(address)}, ros2.python_of(python)
+    worker = RosWorker(python, "discovery_worker.py", {"robot": robot}, environment)
+    worker.leave()
+    if not worker.about["offers"]:
+        where = " ".join(*environment.items())
+        raise NotReadyError(f"no node was found with {where}; start the robot, or give its --address")
+    return [" ".join(offer) for offer in worker.about["offers"]]
+
+
+def first_connection(robot: str, offers: Iterable[str]) -> str:
+    """The text of a first file for `--connect`; what is not ready, or is not mapped, is in comments.
+
+    Args:
+        robot: ros1 or ros2.
+        offers: as `offers_of` returns them.
+    """
+    by_form = {re.sub("/(action|srv|msg)/", "/", offer): offer for offer in sorted(offers)}
+    forms = [
+        form for form in by_form if re.fullmatch(r"\w+ [\w/]+ [\w/]+", form) and not OF_ROS.fullmatch(form)
+    ]
+    rest = {by_form[form].partition(" ")[2] for form in forms}
+    ready: set[str] = set()
+    lines: list[tuple[bool, str]] = []  # whether each is about a skill
+    for pattern, use, text, first in USES:
+        for form in (form for form in forms if re.fullmatch(pattern, form)):
+            _, name, kind = by_form[form].split()
+            key = use or name.strip("/").replace("/", "_").lower()
+            line = f"{key}: {{{text.replace('TYPE', kind).replace('NAME', name)}}}"
+            why = first or "another one" * (key in ready)
+            ready |= set() if why else {key}
+            lines.append((key not in ABOUT, f"# {line}  # {why}" if why else line))
+            rest.discard(f"{name} {kind}")
+    if "get_all_rooms" in ready:
+        ready.add("places")
+    lacks = [what for key, what in EXPECTED.items() if key not in ready]
+    return "".join(
+        f"{line}\n"
+        for line in (
+            "# A draft of `codebotler connect --discover`; read each line before you use it.",
+            *([f"# Missing: {', '.join(lacks)}"] if lacks else []),
+            f"robot: {robot}",
+            *([] if "places" in ready else ["# places: places.yaml"]),
+            *(line for is_skill, line in lines if not is_skill),
+            "skills:",
+            *(f"  {line}" for is_skill, line in lines if is_skill),
+            *(["# Not mapped:"] if rest else []),
+            *(f"#   {offer}" for offer in sorted(rest)),
+        )
+    )

@@ -1,0 +1,58 @@
+"""Where a robot is, and whether it stands still, as its poses and velocities tell."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+STILL = 0.5  # seconds without a movement, after which it stands still
+METRES, RADIANS = 0.02, 0.05  # by which it must have moved
+SPEED = 0.02  # metres or radians per second at which it moves
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a robot is, in metres and radians of a frame."""
+
+    x: float
+    y: float
+    yaw: float
+    frame: str
+
+
+class Motion:
+    """What a robot reports of its motion, from any thread."""
+
+    def __init__(self) -> None:
+        self.pose: Pose | None = None
+        self._rested: Pose | None = None  # since it last moved
+        self._heard = self._moved = -math.inf
+
+    def take(self, message: Mapping[str, Any]) -> None:
+        """Take a pose or a velocity."""
+        self._heard = now = time.monotonic()
+        if message["is"] == "velocity":
+            self._moved = now if message["speed"] > SPEED else self._moved
+            return
+        self.pose = here = Pose(message["x"], message["y"], message["yaw"], message["frame"])
+        if self._rested is None or _is_apart(here, self._rested):
+            self._rested, self._moved = here, now
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it reports that it stands still."""
+        now = time.monotonic()
+        return self._heard > now - STILL > self._moved
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether it reports that it moves."""
+        return self._moved > time.monotonic() - STILL
+
+
+def _is_apart(one: Pose, other: Pose) -> bool:
+    turned = math.remainder(one.yaw - other.yaw, math.tau)
+    return math.hypot(one.x - other.x, one.y - other.y) > METRES or abs(turned) > RADIANS

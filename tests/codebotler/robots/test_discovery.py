@@ -1,0 +1,180 @@
+"""What a graph offers becomes a first file for `--connect`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.robots.base import ROS_PYTHON
+from codebotler.robots.ros.discovery import first_connection, offers_of
+
+NAV2 = "action /navigate_to_pose nav2_msgs/action/NavigateToPose"
+
+
+def written(*offers: str, robot: str = "ros2") -> dict[str, Any]:
+    """What is not in a comment."""
+    read: dict[str, Any] = yaml.safe_load(first_connection(robot, offers))
+    return read
+
+
+def comments(*offers: str, robot: str = "ros2") -> str:
+    lines = first_connection(robot, offers).splitlines()
+    return "\n".join(line.strip() for line in lines if line.lstrip().startswith("#"))
+
+
+def in_comment(start: str, *offers: str) -> Any:  # noqa: ANN401 - as it is in YAML
+    """A line that is in a comment, as it is read without the #."""
+    (line,) = [line for line in comments(*offers).splitlines() if line.startswith(f"# {start}: ")]
+    return yaml.safe_load(line.removeprefix("# "))[start]
+
+
+def test_drive_of_nav2_waits_for_places() -> None:
+    assert written(NAV2) == {"robot": "ros2", "skills": None}
+    assert in_comment("go_to", NAV2) == {
+        "action": "/navigate_to_pose",
+        "type": "nav2_msgs/action/NavigateToPose",
+        "goal": {"pose": "$place"},
+    }
+    assert "places: " in comments(NAV2)
+
+
+def test_move_base_of_ros_1_is_a_drive() -> None:
+    text = first_connection("ros1", ["action /move_base move_base_msgs/MoveBase"])
+    assert yaml.safe_load(text)["robot"] == "ros1"
+    goal = "# go_to: {action: /move_base, type: move_base_msgs/MoveBase, goal: {target_pose: $place}}"
+    assert goal in text
+
+
+def test_own_actions_are_written_with_arguments_and_results() -> None:
+    offers = [f"action {s.ros.server} robot_actions_pkg/action/{s.ros.type}" for s in SKILLS.rows if s.ros]
+    skills = written(*offers)["skills"]
+    assert skills.keys() == SKILLS.keys()
+    kind = "robot_actions_pkg/action"
+    assert skills["go_to"] == {
+        "action": "/go_to_server",
+        "type": f"{kind}/GoTo",
+        "goal": {"location": "$location"},
+    }
+    assert skills["is_in_room"]["result"] == "result"
+    assert skills["get_all_rooms"]["goal"] == {}
+    assert "# places" not in comments(*offers)
+
+
+@pytest.mark.parametrize("name", ["/speech", "/robot/say", "/robot_tts", "/tts/say_text"])
+def test_speech_is_a_topic_that_is_heard(name: str) -> None:
+    said = {"topic": name, "type": "std_msgs/msg/String", "message": {"data": "$message"}}
+    assert written(f"hears {name} std_msgs/msg/String")["skills"] == {"say": said}
+
+
+@pytest.mark.parametrize(
+    "offer",
+    ["sends /speech std_msgs/msg/String", "hears /chatter std_msgs/msg/String", "hears /say lab/msg/Say"],
+)
+def test_other_texts_are_no_speech(offer: str) -> None:
+    assert written(offer)["skills"] is None
+    assert offer.split()[1] in comments(offer)
+
+
+def test_services_are_suggested_as_own_skills() -> None:
+    offers = ("service /door/open std_srvs/srv/Trigger", "service /lamp/on std_srvs/srv/SetBool")
+    assert written(*offers)["skills"] is None
+    door, lamp = in_comment("door_open", *offers), in_comment("lamp_on", *offers)
+    assert door == {
+        "service": "/door/open",
+        "type": "std_srvs/srv/Trigger",
+        "request": {},
+        "success": "success",
+    }
+    assert lamp["request"] == {"data": "$on"}
+
+
+def test_cameras_wait_for_a_detector() -> None:
+    offer = "sends /camera/image_raw sensor_msgs/msg/Image"
+    assert in_comment("is_in_room", offer)["image"] == "/camera/image_raw"
+    offer = "sends /camera/compressed sensor_msgs/msg/CompressedImage"
+    assert in_comment("is_in_room", offer)["image"] == "/camera/compressed"
+
+
+AMCL = "sends /amcl_pose geometry_msgs/msg/PoseWithCovarianceStamped"
+TF, ODOM = "sends /tf tf2_msgs/msg/TFMessage", "sends /odom nav_msgs/msg/Odometry"
+
+
+def test_pose_is_that_of_amcl_else_of_tf() -> None:
+    assert written(TF, ODOM, AMCL)["pose"] == {"topic": "/amcl_pose"}
+    assert written(TF, ODOM)["pose"] == {"tf": {"from": "map", "to": "base_link"}}
+    assert "# pose: {tf: " in comments(TF, AMCL)
+    assert "pose" not in written(ODOM)
+    assert in_comment("pose", ODOM) == {"topic": "/odom"}
+    assert written(ODOM)["velocity"] == {"topic": "/odom"}
+
+
+def test_services_of_unknown_type_are_listed() -> None:
+    offers = ("service /door/open unknown", "service /robot/get_loggers unknown")
+    text = comments(*offers, robot="ros1")
+    assert "/door/open unknown" in text
+    assert "get_loggers" not in text
+
+
+def test_only_the_first_of_several_is_written() -> None:
+    offers = [f"hears /{name} std_msgs/msg/String" for name in ("tts", "say")]
+    assert written(*offers)["skills"]["say"]["topic"] == "/say"
+    assert in_comment("say", *offers)["topic"] == "/tts"
+
+
+def test_the_rest_is_listed_once_without_what_every_graph_has() -> None:
+    offers = (
+        "sends /scan sensor_msgs/msg/LaserScan",
+        "hears /scan sensor_msgs/msg/LaserScan",
+        "service /talker/list_parameters rcl_interfaces/srv/ListParameters",
+        "service /go/_action/send_goal lab/action/Go_SendGoal",
+        "service /lifecycle_manager/is_active std_srvs/srv/Trigger",
+        "service /talker/get_type_description type_description_interfaces/srv/GetTypeDescription",
+        "hears /go/goal lab/GoActionGoal",
+        "sends /rosout rcl_interfaces/msg/Log",
+    )
+    text = comments(*offers)
+    assert text.count("/scan") == 1
+    assert "sensor_msgs/msg/LaserScan" in text
+    for absent in ("talker", "_action", "lifecycle", "/go/goal", "rosout"):
+        assert absent not in text
+
+
+def test_head_names_what_is_missing() -> None:
+    text = comments("hears /say std_msgs/msg/String")
+    (missing,) = re.findall("Missing: (.*)", text)
+    assert [what.split()[0] for what in missing.split(", ")] == [
+        *("places", "pose", "is_in_room", "go_to", "ask", "pick", "place")
+    ]
+
+
+def test_hostile_names_stay_out_of_the_file() -> None:
+    assert (
+        written("hears /x\nskills:\n/say std_msgs/msg/String", "hears /{say std_msgs/msg/String")["skills"]
+        is None
+    )
+
+
+@pytest.mark.parametrize("robot", ["sim", "rosbridge"])
+def test_other_robots_cannot_be_looked_at(robot: str) -> None:
+    with pytest.raises(UserError, match=robot):
+        offers_of(robot, "", ROS_PYTHON)
+
+
+def test_example_of_the_guide() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "ros.md").read_text()
+    offers = (
+        NAV2,
+        AMCL,
+        ODOM,
+        "hears /speech std_msgs/msg/String",
+        "service /door/open std_srvs/srv/Trigger",
+        "sends /camera/image_raw sensor_msgs/msg/Image",
+        "sends /scan sensor_msgs/msg/LaserScan",
+    )
+    assert f"```yaml\n{first_connection('ros2', offers)}```" in page

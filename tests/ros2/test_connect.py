@@ -1,0 +1,242 @@
+"""A robot with Nav2 as it is, connected by a file: what is sent to it, what comes back, and how it stops."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from codebotler.checking.rules import read_rules
+from codebotler.core.errors import RobotError
+from codebotler.core.skills.files import skills_from
+from codebotler.missions.progress import AT
+from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
+from codebotler.robots.ros.connected import ConnectedRobot
+from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.robot import Waits
+from codebotler.robots.ros.worker import WORKERS
+from ros2_scene import ROS2_PYTHON, SHORT, Scene
+from ros_graph import LONG, Process, started
+
+STAND_IN = Path(__file__).with_name("nav2_stand_in.py")
+PACKAGE = Path(__file__).with_name("nav2_msgs")
+
+CONNECTION = f"""\
+places: places.yaml
+pose: {{topic: /amcl_pose}}
+velocity: {{topic: /odom}}
+packages: [{PACKAGE}]
+skills:
+  go_to: {{action: /navigate_to_pose, type: nav2_msgs/action/NavigateToPose, goal: {{pose: $place}}}}
+  say: {{topic: /speech, type: std_msgs/msg/String, message: {{data: "Listen: $message"}}}}
+  open_door: {{service: /door/open, type: std_srvs/srv/Trigger, success: success}}
+"""
+PLACES = """\
+frame: map
+places:
+  dock: {x: 0, y: 0, polygon: [[-1, -1], [1, -1], [1, 1], [-1, 1]]}
+  lab: {x: 2, y: 0, yaw: 1.57}
+  cellar: {polygon: [[3, -1.5], [5, -1.5], [5, 1.5], [3, 1.5]]}
+  hall: {x: 7, y: 0}
+  shaft: {x: 5, y: 5}
+  moon: {x: 9, y: -9}
+"""
+SKILLS = """\
+from codebotler import Simulation, skill
+
+
+@skill
+def open_door(sim: Simulation) -> None:
+    \"\"\"Open the door.\"\"\"
+"""
+
+
+class Robots:
+    """A robot with Nav2, and those who are connected with it."""
+
+    def __init__(self, scene: Scene, folder: Path) -> None:
+        self.scene, self.folder = scene, folder
+
+    def nav2(self, *options: str) -> Process:
+        process = Process(STAND_IN, str(WORKERS), *options, python=ROS2_PYTHON)
+        self.scene.processes.append(process)
+        process.expect("ready")
+        return process
+
+    def robot(self, connection: str = CONNECTION, waits: Waits = SHORT) -> ConnectedRobot:
+        for name, text in {"robot.yaml": connection, "places.yaml": PLACES, "door.py": SKILLS}.items():
+            (self.folder / name).write_text(text)
+        table = skills_from(self.folder / "door.py")
+        read = read_connection(self.folder / "robot.yaml", table)
+        robot = self.scene.robot(waits, skills=table, connection=read)
+        assert isinstance(robot, ConnectedRobot)
+        return robot
+
+
+def told(process: Process, what: str) -> list[object]:
+    """What the stand-in says about the next event of a kind."""
+    while True:
+        kind, *about = process.said.get(timeout=LONG)
+        if kind == what:
+            return about
+
+
+@pytest.fixture
+def robots(scene: Scene, tmp_path: Path) -> Robots:
+    return Robots(scene, tmp_path)
+
+
+def test_skills_are_what_the_file_maps(robots: Robots) -> None:
+    nav2 = robots.nav2("--speed", "5", "--acceleration", "9")
+    robot = robots.robot()
+    robot.connect()
+    assert [*robot.skills] == ["get_current_location", "get_all_rooms", "go_to", "say", "open_door"]
+    assert robot.missing == {}
+    assert robot.perform("get_all_rooms", []) == ["dock", "lab", "cellar", "hall", "shaft", "moon"]
+    assert robot.perform("get_current_location", []) == "dock"
+    reported: list[str | Picture] = []
+    robot.perform("go_to", ["Lab"], reported.append)
+    assert told(nav2, "goal") == [2.0, 0.0, 1.57]
+    assert any(str(one).startswith("at (1.") for one in reported)
+    assert (
+        robot.perform("get_current_location", [], reported.append) == "lab"
+    )  # the nearest, since none holds it
+    assert "lab, the nearest" in str(reported[-1])
+    robot.perform("say", ["it is open"])
+    assert told(nav2, "heard") == ["Listen: it is open"]
+    robot.perform("open_door", [])
+    told(nav2, "door")
+    assert robot.has_pose
+
+
+def test_what_fails_is_a_robot_error_in_the_words_of_the_robot(robots: Robots) -> None:
+    robots.nav2("--obstacle", "4,4,6,6", "--door-jams", "--recoveries", "1")
+    robot = robots.robot()
+    robot.connect()
+    kinds = {}
+    for skill, arguments in {"go_to": ["shaft"], "open_door": []}.items():
+        with pytest.raises(RobotError) as error:
+            robot.perform(skill, arguments)
+        kinds[error.value.kind] = str(error.value)
+    assert "206" in kinds["GoToFailed"]
+    assert "jam" in kinds["OpenDoorFailed"]
+    with pytest.raises(RobotError) as error:
+        robot.perform("go_to", ["attic"])
+    assert error.value.kind == "GoToInvalidLocation"
+
+
+def test_stop_ends_when_the_robot_stands_still(robots: Robots) -> None:
+    nav2 = robots.nav2("--speed", "2", "--acceleration", "2")
+    robot = robots.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["moon"])) as ended:
+        told(nav2, "goal")
+        time.sleep(1.0)
+        asked = time.monotonic()
+        robot.cancel()
+        told(nav2, "cancel")
+        assert time.monotonic() - asked < 1.0
+    assert isinstance(ended["error"], CancelledError)
+    assert 1.0 < time.monotonic() - asked < 4.0  # it brakes for a second
+
+
+def test_robot_that_goes_on_after_a_stop_is_lost(robots: Robots) -> None:
+    nav2 = robots.nav2("--never-stops")
+    robot = robots.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["moon"])) as ended:
+        told(nav2, "goal")
+        time.sleep(0.7)
+        robot.cancel()
+    assert isinstance(ended["error"], RobotLostError)
+    assert "BY HAND" in str(ended["error"])
+
+
+def test_poses_in_another_frame_are_refused(robots: Robots) -> None:
+    robots.nav2()
+    robot = robots.robot(CONNECTION.replace("/amcl_pose", "/odom"))
+    with pytest.raises(NotReadyError, match=r'"odom".*"map"'):
+        robot.connect()
+
+
+def test_topic_without_a_publisher_and_message_without_a_field_are_told(robots: Robots) -> None:
+    robots.nav2()
+    robot = robots.robot(CONNECTION.replace("/amcl_pose", "/nothing"))
+    with pytest.raises(NotReadyError, match="/nothing"):
+        robot.connect()
+    robot = robots.robot(CONNECTION.replace("{data:", "{text:"))
+    robot.connect()
+    with pytest.raises(RobotLostError, match="text"):
+        robot.perform("say", ["hello"])
+
+
+def test_pose_comes_from_transforms(robots: Robots) -> None:
+    robots.nav2("--start", "3,4,1.0")
+    package = PACKAGE.with_name("tf2_msgs")
+    text = CONNECTION.replace("{topic: /amcl_pose}", "{tf: {from: map, to: base_link}}")
+    robot = robots.robot(text.replace("packages: [", f"packages: [{package}, "))
+    robot.connect()
+    pose = robot._pose()
+    assert pose is not None
+    assert math.dist((pose.x, pose.y, pose.yaw), (3, 4, 1.0)) < 0.01
+
+
+KEEPOUT = "keepout: {mask: /keepout_mask, info: /costmap_filter_info}\nskills:"
+RULE = """\
+rules:
+  - name: not-the-cellar
+    says: Never be in the cellar.
+    always: not tr.Exists(inside("cellar"))
+"""
+
+
+def test_planner_keeps_out_of_rooms_that_rules_forbid(robots: Robots) -> None:
+    nav2 = robots.nav2("--speed", "3", "--acceleration", "9")
+    robot = robots.robot(CONNECTION.replace("skills:", KEEPOUT))
+    (robots.folder / "rules.yaml").write_text(RULE)
+    robot.connect()
+    robot.keep_out(read_rules(robots.folder / "rules.yaml"))
+    width, height, cells = told(nav2, "mask")
+    assert [width, height, cells] == [40, 60, 40 * 60]  # 2 m by 3 m
+    reported: list[str | Picture] = []
+    robot.perform("go_to", ["hall"], reported.append)
+    way = [tuple(map(float, match)) for one in reported for match in re.findall(AT, str(one))]
+    assert len(way) > 5
+    assert not [(x, y) for x, y in way if 3 < x < 5 and -1.5 < y < 1.5]
+    robot.keep_out(())
+    assert told(nav2, "mask") == [1, 1, 0]
+
+
+def test_mission_ends_where_the_robot_enters_a_forbidden_room(robots: Robots) -> None:
+    nav2 = robots.nav2("--speed", "2", "--acceleration", "9")
+    robots.robot()
+    (robots.folder / "rules.yaml").write_text(RULE)
+    (robots.folder / "drive.py").write_text("def task_program():\n    go_to('hall')\n    say('there')\n")
+    files = [str(robots.folder / name) for name in ("robot.yaml", "door.py", "rules.yaml", "drive.py")]
+    command = ["run", files[3], "--connect", files[0], "--skills", files[1], "--rules", files[2], "--yes"]
+    environment = {**os.environ, "CODEBOTLER_HOME": str(robots.folder / "home")}
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "codebotler",
+            *command,
+            "--despite-problems",
+            "--ros-python",
+            str(ROS2_PYTHON),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+    )
+    assert done.returncode == 1, done.stderr
+    assert "not-the-cellar" in done.stdout + done.stderr
+    told(nav2, "goal")
+    told(nav2, "cancel")
