@@ -42,7 +42,6 @@ DOTS = while read -r; do printf .; done; echo
 SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
 INSTRUCTION = Look into every printer room for a stapler. To each printer room that has none, bring one stapler \
 from the supply room.
-ROS2_MESSAGES = ros-nav-msgs ros-std-srvs # that tests exchange, beside those of the extra
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
@@ -196,7 +195,7 @@ $(ROS2_VENV)-%/made: pyproject.toml constraints.txt constraints-%.txt
 	@$(PYTHON) -m venv --clear $(ROS2_VENV)-$*
 	@$(ROS2_VENV)-$*/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 	@$(ROS2_VENV)-$*/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
-		--constraint constraints-$*.txt "$(PACKAGE)[ros2]" $(ROS2_MESSAGES) | { $(DOTS); }
+		--constraint constraints-$*.txt "$(PACKAGE)[ros2]" | { $(DOTS); }
 	@touch $@
 
 # Of what is installed here, most is never imported: --no-compile saves minutes.
