@@ -167,7 +167,7 @@ def test_other_robots_cannot_be_looked_at(robot: str) -> None:
 
 
 def test_example_of_the_guide() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "ros.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "nav2.md").read_text()
     offers = (
         NAV2,
         AMCL,
