@@ -42,8 +42,9 @@ SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraint
 INSTRUCTION = Look into every printer room for a stapler. To each printer room that has none, bring one stapler \
 from the supply room.
 # As in the extra of this name.
-ROS2 = "ros-rclpy>=9.1.2" ros-rmw-fastrtps-cpp ros-rosidl-generator-py ros-rosidl-typesupport-c
-ROS2_MESSAGES = ros-geometry-msgs ros-std-msgs ros-std-srvs # that tests exchange
+ROS2 = "ros-rclpy>=9.1.2" ros-rmw-fastrtps-cpp ros-rosidl-generator-py ros-rosidl-typesupport-c ros-nav-msgs ros-sensor-msgs \
+	ros-std-srvs
+ROS2_MESSAGES = ros-geometry-msgs ros-std-msgs # that tests exchange
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
