@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import CancelledError
+from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.ros1 import MEND
 from error_tables import errors_on, unsaid
 from ros_graph import Graph, Process, free_port, installed, started
@@ -80,6 +82,14 @@ def test_the_server_in_twenty_lines_does_what_it_must(
         robot.cancel()
     assert isinstance(ended["error"], CancelledError)
     server.process.terminate()
+
+
+def test_file_of_the_page_is_read(tmp_path: Path) -> None:
+    (file,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    (tmp_path / "robot.yaml").write_text(file)
+    (tmp_path / "places.yaml").write_text("places: {dock: {x: 0, y: 0}}\n")
+    connection = read_connection(tmp_path / "robot.yaml", SKILLS)
+    assert (connection.robot, connection.calls["go_to"].type) == ("ros1", "move_base_msgs/MoveBase")
 
 
 VARIES = (

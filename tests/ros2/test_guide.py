@@ -11,10 +11,15 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.checking.rules import read_rules
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
+from codebotler.core.world import Room
 from codebotler.robots.base import CancelledError
+from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.keepout import keepout as keepout_mask
 from codebotler.robots.ros.worker import WORKERS
 from error_tables import errors_on, unsaid
 from ros2_scene import ROS2_PYTHON, Scene, installed
@@ -23,6 +28,7 @@ from ros_graph import GO_TO, Process, started
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 ROS2, NAV2 = ((ROOT / "docs" / name).read_text() for name in ("ros.md", "nav2.md"))
+ROOMS = (Room("cellar", footprint=((0, 0), (1, 0), (1, 1))),)
 LINES = 25  # of a file that connects a robot, at most
 
 
@@ -110,8 +116,24 @@ def test_robot_of_the_page_is_connected_by_its_file(scene: Scene, tmp_path: Path
         ]
 
 
+def test_files_of_the_page_are_read(tmp_path: Path) -> None:
+    robot, places, *_ = blocks(NAV2, "yaml")
+    (tmp_path / "places.yaml").write_text(places)
+    (tmp_path / "door.py").write_text(blocks(NAV2, "python")[0])
+    table = skills_from(tmp_path / "door.py")
+    (camera,) = (block for block in blocks(NAV2, "yaml") if block.startswith("skills:"))
+    (keepout,) = (block for block in blocks(NAV2, "yaml") if block.startswith("keepout:"))
+    for text in (camera, robot + keepout):
+        (tmp_path / "robot.yaml").write_text(text)
+        assert read_connection(tmp_path / "robot.yaml", table).skills(table)
+    (rule,) = (block for block in blocks(NAV2, "yaml") if block.startswith("rules:"))
+    (tmp_path / "rules.yaml").write_text(rule)
+    assert any(keepout_mask(read_rules(tmp_path / "rules.yaml"), ROOMS)[0]["data"])
+
+
 VARIES = (
-    r"\.\.\.|(?<=died|sent): |/\w+(?:/\w+)*|ros2|robot_actions_pkg\S*|std_srvs\S*|nav2_msgs|signal 9|'rclpy'|No module named"
+    r"\.\.\.|(?<=died|sent): |/\w+(?:/\w+)*|ros2|robot_actions_pkg\S*|std_srvs\S*|nav2_msgs|signal 9"
+    r"|'rclpy'|No module named"
     r'|codebotler(?= has)|c\+\+|"\w+"|node codebotler|field text|\bdata\b|service|action server|aborted|\d+'
 )
 

@@ -103,7 +103,10 @@ ConnectOption = Annotated[
     ),
 ]
 AddressOption = Annotated[
-    str, typer.Option(help="A ROS_DOMAIN_ID, the URI of a ROS master, or ws://HOST:PORT of a rosbridge.")
+    str,
+    typer.Option(
+        help="If not the default: a ROS_DOMAIN_ID, the URI of a ROS master, or ws://HOST:PORT of a rosbridge."
+    ),
 ]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
