@@ -40,7 +40,7 @@ NOT_RUN = {
     "perception.md": ["needs a robot with a camera"],
     "roboeval-plus.md": ["takes minutes"],
     "robots.md": ["needs pyrobosim, with which `make test-pyrobosim` tests the robot"],
-    "ros.md": ["needs root, and a Debian or Ubuntu"],
+    "ros1.md": ["needs root, and a Debian or Ubuntu"],
     "training.md": [
         *("needs a model behind it", "needs a model behind it", "needs a model behind it"),
         "needs a package of its own",
