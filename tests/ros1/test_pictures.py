@@ -32,6 +32,7 @@ from ros_graph import HERE, Graph, Process, started
 from server import Fault, Server
 
 SRC = HERE.parents[1] / "src"
+PAGE = (HERE.parents[1] / "docs" / "perception.md").read_text()
 TOPIC = "/camera/image_raw"
 CONNECTION = f"""\
 robot: ros1
@@ -121,8 +122,8 @@ def test_mission_keeps_what_the_robot_saw(graph: Graph, tmp_path: Path) -> None:
     camera(graph, "Image", RAW)
     others = graph.serve(*(skill for name, skill in SKILLS.items() if name != "is_in_room"))
     (tmp_path / "look.py").write_text(PROGRAM)
-    say = "  say: {action: /say_server, type: robot_actions_pkg/Say, goal: {message: $message}}\n"
-    (tmp_path / "robot.yaml").write_text(CONNECTION + say)
+    ((file, command),) = re.findall(r"```yaml\n(.*?)```.*?```sh\ncodebotler (.*?)\n```", PAGE, re.DOTALL)
+    (tmp_path / "robot.yaml").write_text(file)
     environment = {**os.environ, "PYTHONPATH": str(SRC), "CODEBOTLER_HOME": str(tmp_path),
                    "ROS_MASTER_URI": graph.uri}  # fmt: skip
 
@@ -134,7 +135,7 @@ def test_mission_keeps_what_the_robot_saw(graph: Graph, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr + done.stdout
         return done.stdout + done.stderr
 
-    watched = tool("run", "look.py", "--connect", "robot.yaml", "--yes")
+    watched = tool(*command.split(), "--yes")
     for text in ("I see the mug", "no cat"):
         others.expect("goal", text)
     (folder,) = (tmp_path / "missions").iterdir()
