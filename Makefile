@@ -7,7 +7,8 @@
 #     test-suites          the tasks of both suites as data: linted, and judged on programs with known verdicts
 #     test-guide           README, guides and examples: every command on them runs, and prints what they say
 #     test-ros1            robots on ROS 1, for which the system's Python must have rospy (`codebotler robots` tells)
-#     test-ros2            robots on ROS 2, whose packages come into an environment of their own, ROS2_VENV
+#     test-ros2            robots on ROS 2 Kilted, and some of it on Jazzy, in environments of their own, ROS2_VENV-kilted
+#                          and ROS2_VENV-jazzy, for which PYTHON must be one that has wheels of ROS: 3.11 to 3.13
 #     test-browser         the page in Chromium, also with a robot on ROS 1; SHOTS names a folder for screenshots
 #     test-faulty-server   4,000 completions of a server that fails one request in ten
 #     test-transformers, -pyrobosim, -inspect, -ray
@@ -41,10 +42,6 @@ DOTS = while read -r; do printf .; done; echo
 SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
 INSTRUCTION = Look into every printer room for a stapler. To each printer room that has none, bring one stapler \
 from the supply room.
-# As in the extra of this name.
-ROS2 = "ros-rclpy>=9.1.2" ros-rmw-fastrtps-cpp ros-rosidl-generator-py ros-rosidl-typesupport-c ros-nav-msgs ros-sensor-msgs \
-	ros-std-srvs
-ROS2_MESSAGES = ros-geometry-msgs ros-std-msgs # that tests exchange
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
@@ -91,8 +88,10 @@ test-guide: $(VENV)/tested
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 3 tests/ros1
 
-test-ros2: $(VENV)/tested $(ROS2_VENV)/made
-	ROS2_PYTHON="$(abspath $(ROS2_VENV))/bin/python" $(BIN)/python -m pytest --no-skips --numprocesses 2 tests/ros2
+ros2 = ROS2_PYTHON="$(abspath $(ROS2_VENV))-$(1)/bin/python" $(BIN)/python -m pytest --no-skips --numprocesses 2
+test-ros2: $(VENV)/tested $(ROS2_VENV)-kilted/made $(ROS2_VENV)-jazzy/made
+	$(call ros2,kilted) tests/ros2
+	$(call ros2,jazzy) -m smoke tests/ros2
 
 test-browser: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 2 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
@@ -157,7 +156,7 @@ lint: $(VENV)/linted
 docs: $(VENV)/documented
 	$(BIN)/python website/build.py
 
-bench: $(VENV)/installed
+bench: $(VENV)/installed $(ROS2_VENV)-kilted/made
 	$(BIN)/python bench/evaluate.py
 	$(BIN)/python bench/completions.py
 	$(BIN)/python bench/generate.py
@@ -168,6 +167,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/report.py
 	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
+	ROS2_PYTHON="$(abspath $(ROS2_VENV))-kilted/bin/python" $(BIN)/python bench/ros2.py
 	$(BIN)/python bench/page.py
 	$(BIN)/python bench/benchmark_pages.py
 
@@ -189,11 +189,13 @@ $(VENV)/tested: $(VENV)/installed
 	@touch $@
 
 # Apart, since what comes with ROS starts Python anew each time, to set where its libraries are.
-$(ROS2_VENV)/made:
-	@echo "making an environment with ROS 2 in $(ROS2_VENV), which takes a minute"
-	@$(PYTHON) -m venv --clear $(ROS2_VENV)
-	@$(ROS2_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(ROS2_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile $(ROS2) $(ROS2_MESSAGES) | { $(DOTS); }
+$(ROS2_VENV)-%/made: pyproject.toml constraints.txt constraints-%.txt
+	@$(CHECK_PYTHON)
+	@echo "making an environment with ROS 2 $* in $(ROS2_VENV)-$*, which takes a minute"
+	@$(PYTHON) -m venv --clear $(ROS2_VENV)-$*
+	@$(ROS2_VENV)-$*/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(ROS2_VENV)-$*/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
+		--constraint constraints-$*.txt "$(PACKAGE)[ros2]" | { $(DOTS); }
 	@touch $@
 
 # Of what is installed here, most is never imported: --no-compile saves minutes.
@@ -217,5 +219,5 @@ $(VENV)/documented: $(VENV)/installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(EXTRAS_VENV) $(ROS2_VENV) build dist .hypothesis .mypy_cache \
+	rm -rf $(VENV) $(EXTRAS_VENV) $(ROS2_VENV)-kilted $(ROS2_VENV)-jazzy build dist .hypothesis .mypy_cache \
 		.pytest_cache .ruff_cache .import_linter_cache

@@ -30,9 +30,8 @@ ON_TOP = {
         "mkdocs.yml",
         "pyproject.toml",
     ),
-    "ros",
     *(path.name for path in ROOT.glob("constraints*.txt")),
-    *(".ci", "bench", "environments", "docs", "examples", "packaging", "src", "tests", "website"),
+    *(".ci", "bench", "environments", "docs", "examples", "packaging", "ros", "src", "tests", "website"),
 }
 """Of what a source archive is made."""
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import os
+import fcntl
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
+from tempfile import gettempdir
 
 import pytest
 
@@ -14,7 +16,7 @@ from codebotler.robots.ros.worker import lacks
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
 
 HERE = Path(__file__).parent
-DOMAIN = 10 + os.getpid() % 90  # each test process has a graph of its own
+DOMAINS = range(41, 100)  # each test process has a graph of its own
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -28,8 +30,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    with pytest.MonkeyPatch.context() as patch, ExitStack() as locks:
+        patch.setenv("ROS_DOMAIN_ID", str(free_domain(locks)))
         # The profile keeps all traffic on loopback; LOCALHOST would add sockets on other addresses to it.
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
         patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros2")))
@@ -37,6 +39,16 @@ def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
         actions = [skill.ros for skill in SKILLS.rows if skill.ros is not None]
         installed("robot_actions_pkg", {action.type: action.definition for action in actions})
         yield
+
+
+def free_domain(locks: ExitStack) -> int:
+    """A domain that no other tests use; it is locked for as long as they may."""
+    for domain in DOMAINS:
+        lock = locks.enter_context((Path(gettempdir()) / f"codebotler-tests-{domain}.lock").open("w"))
+        with suppress(BlockingIOError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return domain
+    raise AssertionError("no domain is free")
 
 
 @pytest.fixture

@@ -96,7 +96,7 @@ def test_drive_is_seen_in_feedback_odometry_poses_and_frames(nav2: Callable[...,
     assert left == sorted(left, reverse=True)
     assert len(left) > 20 * (drives["sec"] + drives["nanosec"] / 1e9)  # 100 a second, were the machine idle
     assert any(each["estimated_time_remaining"]["nanosec"] for each in seen["feedback"])
-    assert 1.5 < max(speed for _, speed in seen["speeds"]) <= 3
+    assert 1.5 < max(speed for _, speed in seen["speeds"]) < 3.01
     assert all(abs(b[1] - a[1]) <= 8 * (b[0] - a[0] + 0.2) for a, b in pairwise(seen["speeds"]))
     assert 5 < len(seen["poses"]) < 30  # one each 0.25 m or 0.2 rad
     assert seen["feedback"][0]["current_pose"]["header"]["frame_id"] == "map"
@@ -200,7 +200,7 @@ def test_faults_of_a_stop(nav2: Callable[..., Nav2], fault: str) -> None:
     refuses, waits, drives = "refuse" in fault, "slow" in fault, "never" in fault
     assert (goals, status) == ((0, SUCCEEDED) if refuses else (1, CANCELED))
     assert (ended - asked > 0.7) == (refuses or waits)
-    time.sleep(0 if drives else 0.5)
+    time.sleep(0.5)
     assert robot.stands_still() != drives
 
 

@@ -85,6 +85,7 @@ def test_messages_go_there_and_back() -> None:
         (POSE, {"pose": {"covariance": [1, 2]}}, "pose.covariance"),
         (POSE, {"pose": 3}, "pose"),
         ("geometry_msgs/msg/PoseArray", {"poses": [{}, {"position": {"y": []}}]}, "poses[1].position.y"),
+        ("geometry_msgs/msg/PoseArray", {"poses": {}}, "poses"),
         ("std_msgs/msg/UInt8", {"data": 300}, "data"),
         ("std_msgs/msg/String", {"data": 3}, "data"),
     ],

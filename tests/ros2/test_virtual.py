@@ -19,7 +19,7 @@ from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Person, Room, World
-from codebotler.robots.base import CancelledError, NotReadyError
+from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros.virtual import VirtualRobot
 from ros2_scene import ROS2_PYTHON, Scene
 from ros_graph import started
@@ -88,6 +88,15 @@ def test_it_stops_where_it_is(scene: Scene) -> None:
     virtual.stop()
 
 
+def test_it_leaves_the_graph_at_once(scene: Scene, virtual: VirtualRobot) -> None:
+    robot = scene.robot(skills=SKILLS)
+    robot.connect()
+    virtual.stop()
+    time.sleep(0.5)
+    with pytest.raises(RobotLostError, match="there is no action server"):
+        robot.perform("say", ["hello"])
+
+
 @pytest.mark.usefixtures("virtual")
 def test_second_virtual_robot_is_refused() -> None:
     with pytest.raises(NotReadyError, match="another virtual robot"):
@@ -121,6 +130,7 @@ def commands_on(page: str) -> list[list[str]]:
     return [options for _, *options in commands]
 
 
+@pytest.mark.smoke
 def test_commands_of_the_guide(tmp_path: Path) -> None:
     page, readme = ((Path(__file__).parents[2] / name).read_text() for name in ("docs/ros.md", "README.md"))
     of_robot, of_tool = commands_on(page)

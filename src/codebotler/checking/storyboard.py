@@ -100,6 +100,8 @@ def step_text(step: Mapping[str, Any]) -> Text:
     verb = verb_for(kind)
     told = (
         f"{visible(kind)} {text}"
+        if step["text"]
+        else visible(kind)
         if verb is None
         else done_with(kind, verb.past, [shortened(each) for each in (step["text"], *step.get("more", ()))])
     )

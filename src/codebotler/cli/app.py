@@ -135,16 +135,17 @@ def rules(
     """
     from codebotler.checking.rule_review import reviewed
     from codebotler.checking.rules import read_rules
-    from codebotler.cli.rules import note_destinations, note_evasions, review_data, review_view
+    from codebotler.cli.rules import note_evasions, review_data, review_view
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.terminal import busy, note, print_json, print_rich
     from codebotler.core.world import World
 
     table = skills_from(*(skills or ()))
     house_rules = read_rules(file, table)
     known = None if world is None else World.read(world, table)
     note_evasions(house_rules, known, table)
-    note_destinations(house_rules)
+    if not any(rule.inside for rule in house_rules):
+        note("goto is about destinations: a robot may drive through other rooms, unless a rule uses inside")
     with busy("looking for examples"):
         found = reviewed(house_rules, known)
     if json:

@@ -50,12 +50,6 @@ def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable
         note(sentence)
 
 
-def note_destinations(rules: Sequence[Rule]) -> None:
-    """Say that a robot may drive through rooms, as long as no rule is about where it is."""
-    if not any(rule.inside for rule in rules):
-        note("goto is about destinations: a robot may drive through other rooms, unless a rule uses inside")
-
-
 def review_view(found: Sequence[Review]) -> RenderableType:
     """The rules, each with its examples and warnings."""
     parts: list[RenderableType] = []

@@ -187,16 +187,14 @@ class LiveRobot:
 
     def _moved(self, feedback: str) -> None:
         """Tell the guard which rooms the robot has entered, as if it drove straight between its reports."""
-        found = AT.search(feedback)
-        if found is None or self._guard is None or self._stopped.is_set():
-            return
-        at = float(found[1]), float(found[2])
-        before, self._at = self._at or at, at
-        try:
-            self._guard.moved(before, at, self._held)
-        except RuleViolationError as broken:
-            with suppress(StoppedError):  # this may be a thread of the robot
-                self._end_by(broken)
+        if self._guard is not None and not self._stopped.is_set() and (found := AT.search(feedback)):
+            at = float(found[1]), float(found[2])
+            before, self._at = self._at or at, at
+            try:
+                self._guard.moved(before, at, self._held)
+            except RuleViolationError as broken:
+                with suppress(StoppedError):  # this may be a thread of the robot
+                    self._end_by(broken)
 
     def _end_by(self, broken: RuleViolationError) -> None:
         """Stop the robot, and only then log which rule was broken, unless the program may go on."""

@@ -15,7 +15,6 @@ from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import answered
 from codebotler.models.recorded import UnknownInstructionError, closest_to, recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
-from codebotler.rtl.wording import quoted
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -74,14 +73,13 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
     known = room_map or RoomMap((), "")
     outlined = {room.name for room in known.plan if room.footprint is not None}
     for rule, element in ((one, element) for one in rules for element in one.inside):
-        lacks = [room for room in known.rooms if room not in outlined and element.text.matches(room)]
+        others = (room for room in known.rooms if room not in outlined and element.text.matches(room))
+        lacks = next(others, "each room" if room_map is None else "")
+        what = f'the footprint of "{lacks}"; add it to the map'
         if not robot.has_pose:
-            why = f"needs the robot's position, which {robot.name} does not report; leave the rule out"
-        elif lacks or room_map is None:
-            why = f"needs the footprint of {quoted(lacks[0]) if lacks else 'each room'}; add it to the map"
-        else:
-            continue
-        raise NotReadyError(f'the rule "{rule.name}" {why}')
+            what = f"the robot's position, which {robot.name} does not report; leave the rule out"
+        if lacks or not robot.has_pose:
+            raise NotReadyError(f'the rule "{rule.name}" needs {what}')
 
 
 def rooms_to_check(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:

@@ -50,9 +50,8 @@ class Simulated:
         UserError: the speed is out of range.
     """
 
-    name, address = "simulated", ""
+    name, address, has_pose = "simulated", "", True
     if_tool_dies, rooms_are_regexes = "the simulated robot ended with the tool", True
-    has_pose = True
     missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(
@@ -104,7 +103,8 @@ class Simulated:
         takes = math.dist(start, end) / self._pace
         step = takes if self.clock.speed is None else max(FEEDBACK_EVERY * self.clock.speed, 1e-3)
         driven = 0.0
-        feedback(f"at ({start[0]:.1f}, {start[1]:.1f})")
+        if takes:
+            feedback(f"at ({start[0]:.1f}, {start[1]:.1f})")
         while driven < takes:
             self._wait(min(step, takes - driven))
             driven = min(driven + step, takes)

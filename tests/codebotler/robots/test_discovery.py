@@ -12,6 +12,8 @@ import yaml
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import ROS_PYTHON
+from codebotler.robots.ros.connection import Watched
+from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.discovery import first_connection, offers_of
 
 NAV2 = "action /navigate_to_pose nav2_msgs/action/NavigateToPose"
@@ -164,6 +166,22 @@ def test_hostile_names_stay_out_of_the_file() -> None:
 def test_other_robots_cannot_be_looked_at(robot: str) -> None:
     with pytest.raises(UserError, match=robot):
         offers_of(robot, "", ROS_PYTHON)
+
+
+def test_what_is_written_connects_a_robot(tmp_path: Path) -> None:
+    speech, file = "hears /speech std_msgs/msg/String", tmp_path / "robot.yaml"
+    file.write_text(first_connection("ros2", [NAV2, TF, ODOM, speech]))
+    read = read_connection(file, SKILLS)
+    assert (read.robot, {*read.calls}, read.velocity) == ("ros2", {"say"}, Watched("/odom"))
+    (tmp_path / "places.yaml").write_text("places: {hall: {x: 1, y: 2}}")
+    file.write_text(file.read_text().replace("# places:", "places:").replace("# go_to:", "go_to:"))
+    assert read_connection(file, SKILLS).calls["go_to"].request == {"pose": "$place"}
+
+
+def test_own_actions_connect_a_robot(tmp_path: Path) -> None:
+    offers = [f"action {s.ros.server} robot_actions_pkg/{s.ros.type}" for s in SKILLS.rows if s.ros]
+    (tmp_path / "robot.yaml").write_text(first_connection("ros1", offers))
+    assert read_connection(tmp_path / "robot.yaml", SKILLS).calls.keys() == SKILLS.keys()
 
 
 def test_example_of_the_guide() -> None:

@@ -18,14 +18,9 @@ from codebotler.core.skills.verbs import Verb, verb_of
 
 TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"})
 INSIDE = "inside"
-POSE = Skill(
-    "inside a room",
-    (Parameter("room"),),
-    NOTHING,
-    "Not a skill: house rules see this event when the robot's pose enters a room.",
-    Recording(INSIDE, "room", names="room"),
-    verb=Verb("be inside", "is inside", "was inside", "being inside", "was in a room"),
-)
+BE = Verb("be inside", "is inside", "was inside", "being inside", "was in a room")
+POSE = Skill("(pose)", (Parameter("room"),), NOTHING, "", Recording(INSIDE, "room", names="room"), verb=BE)
+"""Not a skill: house rules see this event when the robot's pose enters a room."""
 RTL_WORDS = frozenset(
     {
         *("at", "holding", "to", "options", "found", "missed", "mention", "answered", "returned", "tr"),

@@ -127,7 +127,7 @@ class ConnectedRobot(RosRobot):
             return within
         nearest = places.nearest(pose.x, pose.y)
         away = math.dist((pose.x, pose.y), (nearest.x, nearest.y))
-        feedback(f"{away:.1f} m from {nearest.name}, the nearest place")
+        feedback(f"the robot is {away:.1f} m from {nearest.name}, the nearest place")
         return nearest
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
@@ -164,7 +164,7 @@ class ConnectedRobot(RosRobot):
         if worker is None or (self.connection.pose is None and self.connection.velocity is None):
             return
         motion, until = worker.motion, time.monotonic() + self._waits.patience
-        while not motion.is_still and time.monotonic() < until:
+        while not motion.is_still and not motion.is_silent and time.monotonic() < until:
             time.sleep(BEAT)
         if motion.is_moving:
             raise RobotLostError(f"its goal was cancelled, but the robot goes on moving: {BY_HAND}")

@@ -38,6 +38,7 @@ class Call:
         definition: the text of the .action file; empty if the robot's own ROS must have it.
         result: the path of the field that the skill returns; empty for nothing.
         success: the path of a field that must be true; empty for none.
+        reason: the path of the field that says why something failed; empty for the usual names.
         failure: the kind of error of a goal that fails without naming one.
     """
 
@@ -48,6 +49,7 @@ class Call:
     definition: str = ""
     result: str = ""
     success: str = ""
+    reason: str = ""
     failure: str = ""
 
     def fields(self, values: Values) -> Any:  # noqa: ANN401 - as in a message
@@ -61,8 +63,16 @@ class Call:
             RobotError: it says that the skill has failed.
         """
         if self.success and not _at(received, self.success):
-            raise RobotError(self.failure, reason(received) or f"{self.name} says that it failed")
+            raise RobotError(self.failure, self.why(received) or f"{self.name} says that it failed")
         return _at(received, self.result) if self.result else None
+
+    def why(self, received: Values) -> str:
+        """Why something failed, as far as a message says it: its words, and its number of an error."""
+        if self.reason:
+            return str(_at(received, self.reason))
+        words = next((text for name in REASONS if isinstance(text := received.get(name), str) and text), "")
+        code = received.get("error_code")
+        return f"{words} (error {code})".strip() if code else words
 
 
 @dataclass(frozen=True)
@@ -125,20 +135,16 @@ def _action_of(skill: Skill) -> Call:
     return Call("action", ros.server, ros.full_type, request, ros.definition, result, failure=failure)
 
 
-def reason(received: Values) -> str:
-    """Why something failed, as far as a message says it: its words, and its number of an error."""
-    words = next((text for name in REASONS if isinstance(text := received.get(name), str) and text), "")
-    code = received.get("error_code")
-    return f"{words} (error {code})".strip() if code else words
-
-
 # --- fields of messages
 
 
 def _filled(request: Any, values: Values) -> Any:  # noqa: ANN401 - as in a message
     match request:
         case dict():
-            return {key: _filled(value, values) for key, value in request.items()}
+            found: dict[str, Any] = {}
+            for key, value in request.items():
+                _put(found, key, _filled(value, values))
+            return found
         case list():
             return [_filled(value, values) for value in request]
         case str() if (whole := VARIABLE.fullmatch(request)) is not None:
@@ -146,6 +152,15 @@ def _filled(request: Any, values: Values) -> Any:  # noqa: ANN401 - as in a mess
         case str():
             return VARIABLE.sub(lambda found: str(values[found[1]]), request)
     return request
+
+
+def _put(fields: dict[str, Any], path: str, value: Any) -> None:  # noqa: ANN401 - as in a message
+    """Set the field at a path, such as `pose.position.x`."""
+    first, _, rest = path.partition(".")
+    if rest:
+        _put(fields.setdefault(first, {}), rest, value)
+    else:
+        fields[first] = value
 
 
 def variables_in(request: Any) -> set[str]:  # noqa: ANN401 - as in a message

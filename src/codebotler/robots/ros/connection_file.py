@@ -79,6 +79,7 @@ class SkillForm(_Form):
     message: dict[str, Any] = {}
     result: str = ""
     success: str = ""
+    reason: str = ""
     detector: str | None = None
     image: Topic | None = None
 
@@ -165,4 +166,8 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"
             raise file.wrong(f"${variable} is unknown here{lacks}; known are: {given}", *at, SENT[kind])
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
-    return Call(kind, name, form.type, request, "", form.result, form.success, failure)  # type: ignore[arg-type]
+    ros = skill.ros
+    package, *_, plain = form.type.split("/")
+    is_ours = ros is not None and (ros.package, ros.type) == (package, plain)
+    definition = ros.definition if ros is not None and is_ours else ""
+    return Call(kind, name, form.type, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]

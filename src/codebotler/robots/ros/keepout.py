@@ -13,7 +13,6 @@ from codebotler.simulator.rule_guard import Rule
 
 RESOLUTION = 0.05  # metres
 NOWHERE = ((0.0, 0.0), (RESOLUTION, RESOLUTION))  # what an empty mask covers, which replaces an earlier one
-NO_TURN = dict.fromkeys("xyz", 0.0) | {"w": 1.0}
 
 
 def keepout(
@@ -28,9 +27,7 @@ def keepout(
         topic: on which the grid will be published, latched.
     """
     never = [element for rule in rules if rule.when == "always" for element in _never(rule.formula)]
-    zones = [
-        room.footprint for room in rooms if room.footprint and any(e.text.matches(room.name) for e in never)
-    ]
+    zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in never)]
     xs, ys = zip(*(corner for zone in zones or [NOWHERE] for corner in zone), strict=True)
     left, bottom = (math.floor(min(each) / RESOLUTION) * RESOLUTION for each in (xs, ys))
     width, height = (math.ceil((max(each) - low) / RESOLUTION) for each, low in ((xs, left), (ys, bottom)))
@@ -41,7 +38,7 @@ def keepout(
             columns = [round((edge - left) / RESOLUTION) for edge in edges]
             for first, end in zip(columns[::2], columns[1::2], strict=True):
                 cells[row * width + first : row * width + end] = [100] * (end - first)
-    origin = {"position": {"x": left, "y": bottom, "z": 0.0}, "orientation": NO_TURN}
+    origin = {"position": {"x": left, "y": bottom, "z": 0.0}, "orientation": {"w": 1.0}}
     info = {"resolution": RESOLUTION, "width": width, "height": height, "origin": origin}
     header = {"frame_id": frame}
     about = {"header": header, "type": 0, "filter_mask_topic": topic, "base": 0.0, "multiplier": 1.0}

@@ -48,6 +48,11 @@ class Motion:
         return self._heard > now - STILL > self._moved
 
     @property
+    def is_silent(self) -> bool:
+        """Whether it has reported nothing for a while, as AMCL does where a robot stands still."""
+        return self._heard < time.monotonic() - 2 * STILL
+
+    @property
     def is_moving(self) -> bool:
         """Whether it reports that it moves."""
         return self._moved > time.monotonic() - STILL

@@ -25,7 +25,7 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import file_of
-from codebotler.robots.ros.connection import Call, Connection, Values, connection_of, reason
+from codebotler.robots.ros.connection import Call, Connection, Values, connection_of
 from codebotler.robots.ros.worker import Message, RosWorker, lacks
 
 OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
@@ -205,7 +205,7 @@ class RosRobot:
                 result: Result = call.answer(values)
                 return result
             case {"is": "error", "text": str(text), "state": str(state)}:
-                raise error_of(call, text or reason(message.get("values", {})), state)
+                raise error_of(call, text or call.why(message.get("values", {})), state)
             case {"is": "cancelled"}:
                 raise CancelledError
         self._in_doubt = self._in_doubt or message["is"] == "lost"

@@ -61,9 +61,9 @@ def as_data(value: Any) -> Any:
 
 
 def parts_of(kind: str) -> tuple[str, str]:
-    """The package and the name of an action's type; without a package, it is in ours."""
-    package, _, name = kind.rpartition("/")
-    return package or PACKAGE, name
+    """The package and the name of a type, without its kind; without a package, it is in ours."""
+    *package, name = kind.split("/")
+    return package[0] if package else PACKAGE, name
 
 
 def _messages_of(package: str) -> types.ModuleType:

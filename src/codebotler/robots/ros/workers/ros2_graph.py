@@ -62,9 +62,11 @@ class Ros2Graph:
         self._spinning.start()
 
     def leave(self) -> None:
-        """Destroy our node: others would see it until the lease is over, if it were only shut down."""
+        """Destroy our node: if it were only shut down, others would see it until its lease is over."""
         self._rclpy.shutdown()
         self._spinning.join(LEAVES)
+        for action in list(self.ours.waitables):
+            action.destroy()
         self.ours.destroy_node()
 
     def is_left(self) -> bool:

@@ -141,7 +141,7 @@ def _fitted(default: Any, kind: str, value: Any, path: str) -> Any:
     base = re.sub(r"sequence<|[,>\[].*", "", kind)
     if isinstance(value, list):
         return [_fitted(None, base, each, f"{path}[{index}]") for index, each in enumerate(value)]
-    if "/" in base and isinstance(value, dict):
+    if "/" in base and base == kind and isinstance(value, dict):
         return fill(default or _class(base.replace("/", "/msg/"))(), value, path + ".")
     return float(value) if base in {"float", "double"} and type(value) is int else value
 

@@ -48,15 +48,12 @@ class Ros2Server:
         graph.ours.create_subscription(
             CompressedImage, f"{self.name}/picture", lambda message: see(self, message.data), 10
         )
-        self._heard = 0.0
         self.has_cancelled = False
 
     @property
     def heard(self) -> float:
-        """When it was last there, by the monotonic clock."""
-        if self.client.server_is_ready():
-            self._heard = time.monotonic()
-        return self._heard
+        """Now, by the monotonic clock, if it is there: DDS has already waited for one that is not."""
+        return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
         """Whether it is there."""
@@ -137,7 +134,7 @@ class Ros2Worker(SkillWorker):
     """Performs skills over ROS 2."""
 
     graph: Ros2Graph
-    silence_says = "it has left the graph"
+    silence_says = "it has left the graph; DDS reports a killed process only after its lease, by default 20 s"
 
     def connect(self, start: Message) -> bool:
         """Start our node, and a client for each server; whether an earlier worker died without leaving."""

@@ -1,0 +1,128 @@
+"""Files that connect a robot: what they map, what is sent, what comes back, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.robots.base import RobotLostError
+from codebotler.robots.ros.connection import Call, Connection, connection_of
+from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.motion import Motion
+
+GO_TO = "go_to: {action: /drive, type: nav2_msgs/action/NavigateToPose, goal: {pose: $place}}"
+PLACES = "frame: map\nplaces: {lab: {x: 1, y: 2}}\n"
+
+
+def read(folder: Path, text: str) -> Connection:
+    (folder / "places.yaml").write_text(PLACES)
+    path = folder / "robot.yaml"
+    path.write_text(text)
+    return read_connection(path, SKILLS)
+
+
+def test_what_a_file_maps_is_what_the_robot_has(tmp_path: Path) -> None:
+    text = f"places: places.yaml\npose: {{tf: {{to: base}}}}\nskills:\n  {GO_TO}\n"
+    found = read(tmp_path, text)
+    assert [*found.skills(SKILLS)] == ["get_current_location", "get_all_rooms", "go_to"]
+    assert found.robot == "ros2"
+    assert found.pose is not None
+    assert (found.pose.topic, found.pose.frames) == ("/tf", ("map", "base"))
+    without_pose = read(tmp_path, text.replace("pose: {tf: {to: base}}\n", ""))
+    assert [*without_pose.skills(SKILLS)] == ["get_all_rooms", "go_to"]
+    text = "skills:\n  is_in_room: {detector: openai-chat:m, image: /camera}\n"
+    assert [*read(tmp_path, text).skills(SKILLS)] == ["is_in_room"]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("skills: {}\n", 1, "skills"),
+        ("robot: ros3\nskills:\n  say: {topic: /a, type: a/msg/B}\n", 1, "ros1"),
+        ("skills:\n  dance: {topic: /a, type: a/msg/B}\n", 2, "--skills"),
+        ("skills:\n  say: {topic: /a}\n", 2, "type"),
+        ("skills:\n  say: {topic: /a, action: /b, type: a/msg/B}\n", 2, "one of"),
+        ("skills:\n  say: {topic: a b, type: a/msg/B}\n", 2, "name of ROS"),
+        ("skills:\n  say: {topic: /a, type: String}\n", 2, "package"),
+        ("skills:\n  say: {topic: /a, type: a/msg/B, goal: {data: 1}}\n", 2, '"message"'),
+        ("skills:\n  say:\n    topic: /a\n    type: a/msg/B\n    message: {data: $text}\n", 5, "$message"),
+        ("skills:\n  go_to: {action: /a, type: a/action/B, goal: {pose: $place}}\n", 2, "places"),
+        ("skills:\n  ask: {service: /a, type: a/srv/B}\n", 2, "result"),
+        ("skills:\n  is_in_room: {detector: m}\n", 2, "image"),
+        ("skills:\n  say: {detector: m, image: /a}\n", 2, "detector"),
+        ("packages: [nothing]\nskills:\n  say: {topic: /a, type: a/msg/B}\n", 1, "folder"),
+        ("keepout: {mask: /a, info: /b}\nskills:\n  say: {topic: /a, type: a/msg/B}\n", 1, "keepout"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, line: int, words: str) -> None:
+    with pytest.raises(UserError) as error:
+        read(tmp_path, text)
+    assert error.value.line == line
+    assert words in str(error.value)
+
+
+def test_fields_are_filled_from_arguments() -> None:
+    request = {"pose.x": "$place.x", "pose.y": 2, "names": ["$who", "to $who"], "plain": {"who": "$who"}}
+    fields = Call("topic", "/a", "a/msg/B", request).fields({"who": "ann", "place.x": 1.5})
+    assert fields == {
+        "pose": {"x": 1.5, "y": 2},
+        "names": ["ann", "to ann"],
+        "plain": {"who": "ann"},
+    }
+
+
+def test_actions_of_the_skill_table_are_calls_as_well() -> None:
+    call = connection_of(SKILLS).calls["ask"]
+    fields = call.fields({"person": "ann", "question": "tea?", "options": ("yes", "no")})
+    assert fields == {"person": "ann", "question": "tea?", "options": ("yes", "no")}
+    assert call.answer({"result": "yes"}) == "yes"
+
+
+@pytest.mark.parametrize(
+    ("received", "message"),
+    [
+        ({"ok": False, "error_code": 206, "error_msg": "in a wall"}, "in a wall (error 206)"),
+        ({"ok": False, "error_code": 0, "message": "it jams"}, "it jams"),
+        ({"ok": False}, "/open says that it failed"),
+    ],
+)
+def test_why_a_skill_failed(received: dict[str, Any], message: str) -> None:
+    call = Call("service", "/open", "a/srv/B", success="ok", failure="OpenFailed")
+    with pytest.raises(RobotError) as error:
+        call.answer(received)
+    assert (error.value.kind, str(error.value)) == ("OpenFailed", message)
+
+
+def test_result_is_at_the_path_of_a_field() -> None:
+    call = Call("action", "/look", "a/action/B", result="found.0.name", reason="detail.text")
+    assert call.answer({"found": [{"name": "mug"}]}) == "mug"
+    assert call.why({"detail": {"text": "too dark"}, "message": "other"}) == "too dark"
+    with pytest.raises(RobotLostError, match=r"found\.0\.name"):
+        call.answer({"found": []})
+
+
+def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr("time.monotonic", lambda: now)
+    seen = Motion()
+    states = [(seen.is_still, seen.is_moving)]  # it has said nothing
+    pose = {"is": "pose", "x": 1.0, "y": 0.0, "yaw": math.pi, "frame": "map"}
+    for later, said in (
+        (0.0, pose),
+        (0.4, {"is": "velocity", "speed": 0.5}),
+        (0.4, {**pose, "x": 1.01, "yaw": -math.pi}),  # the same direction
+        (0.2, {"is": "velocity", "speed": 0.0}),
+        (0.1, {**pose, "y": 0.1}),
+    ):
+        now += later
+        seen.take(said)
+        states.append((seen.is_still, seen.is_moving))
+    now += 1.5
+    states.append((seen.is_still, seen.is_moving))  # it says no more
+    assert seen.is_silent
+    assert states == [(False, False), *[(False, True)] * 3, (True, False), (False, True), (False, False)]
