@@ -30,7 +30,6 @@ ON_TOP = {
         "mkdocs.yml",
         "pyproject.toml",
     ),
-    "ros",
     *(path.name for path in ROOT.glob("constraints*.txt")),
     *(".ci", "bench", "environments", "docs", "examples", "packaging", "ros", "src", "tests", "website"),
 }
