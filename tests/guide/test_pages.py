@@ -39,7 +39,7 @@ NOT_RUN = {
     "install.md": ["makes an environment of its own", "makes an environment of its own"],
     "roboeval-plus.md": ["takes minutes"],
     "robots.md": ["needs pyrobosim, with which `make test-pyrobosim` tests the robot"],
-    "ros.md": ["needs root, and a Debian or Ubuntu"],
+    "ros1.md": ["needs root, and a Debian or Ubuntu"],
     "training.md": [
         *("needs a model behind it", "needs a model behind it", "needs a model behind it"),
         "needs a package of its own",

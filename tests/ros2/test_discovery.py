@@ -15,7 +15,7 @@ from codebotler.core.skills.paper import SKILLS
 from ros2_scene import HERE, ROS2_PYTHON, Scene
 from ros_graph import Process
 
-PAGE = Path(__file__).parents[2] / "docs" / "ros.md"
+PAGE = Path(__file__).parents[2] / "docs" / "nav2.md"
 
 
 def test_file_has_what_robots_offer(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,13 +19,12 @@ from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Person, Room, World
-from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError
 from codebotler.robots.ros.virtual import VirtualRobot
 from ros2_scene import ROS2_PYTHON, Scene
 from ros_graph import started
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
-PROGRAM = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n'
 OWN = """
 from typing import Literal
 from codebotler import Simulation, skill
@@ -89,15 +88,6 @@ def test_it_stops_where_it_is(scene: Scene) -> None:
     virtual.stop()
 
 
-def test_it_leaves_the_graph_at_once(scene: Scene, virtual: VirtualRobot) -> None:
-    robot = scene.robot(skills=SKILLS)
-    robot.connect()
-    virtual.stop()
-    time.sleep(0.5)
-    with pytest.raises(RobotLostError, match="there is no action server"):
-        robot.perform("say", ["hello"])
-
-
 @pytest.mark.usefixtures("virtual")
 def test_second_virtual_robot_is_refused() -> None:
     with pytest.raises(NotReadyError, match="another virtual robot"):
@@ -121,10 +111,24 @@ def test_own_values_of_every_type_go_there_and_back(scene: Scene, tmp_path: Path
     virtual.stop()
 
 
+def commands_on(page: str) -> list[list[str]]:
+    """The options of the commands of a block for ROS 2, each without a remark behind it."""
+    (block,) = re.findall(
+        rf"<!-- run by tests/ros2/{Path(__file__).name} -->\n```sh\n(.*?)```", page, re.DOTALL
+    )
+    install, *commands = (line.partition("#")[0].split() for line in block.splitlines())
+    assert install[-2:] == ["install", '".[ros2]"']
+    return [options for _, *options in commands]
+
+
 @pytest.mark.smoke
 def test_commands_of_the_guide(tmp_path: Path) -> None:
-    (tmp_path / "world.yaml").write_text(WORLD.to_yaml())
-    (tmp_path / "mug.py").write_text(PROGRAM)
+    page, readme = ((Path(__file__).parents[2] / name).read_text() for name in ("docs/ros.md", "README.md"))
+    of_robot, of_tool = commands_on(page)
+    for ours, others in zip(commands_on(page), commands_on(readme), strict=True):
+        assert [one for one in ours if "." not in one] == [one for one in others if "." not in one]
+    for name, kind in {"office.yaml": "yaml", "mug.py": "python"}.items():
+        (tmp_path / name).write_text(re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL)[0])
     environment = {
         **os.environ,
         "PYTHONPATH": str(Path(__file__).parents[2] / "src"),
@@ -133,7 +137,7 @@ def test_commands_of_the_guide(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "codebotler"]
     python = ["--speed", "100", "--ros-python", str(ROS2_PYTHON)]
     with subprocess.Popen(
-        [*command, "virtual-robot", "--world", "world.yaml", "--ros", "2", *python],
+        [*command, *of_robot, *python],
         cwd=tmp_path,
         env=environment,
         stdout=subprocess.PIPE,
@@ -144,7 +148,7 @@ def test_commands_of_the_guide(tmp_path: Path) -> None:
         while not re.search(r"ROS_DOMAIN_ID \d+; the robot is ready", virtual.stderr.readline()):
             assert virtual.poll() is None
         run = subprocess.run(
-            [*command, "run", "mug.py", "--robot", "ros2", "--yes", *python],
+            [*command, *of_tool, "--yes", *python],
             cwd=tmp_path,
             env=environment,
             capture_output=True,
@@ -155,6 +159,8 @@ def test_commands_of_the_guide(tmp_path: Path) -> None:
         said, _ = virtual.communicate(timeout=60)
     assert run.returncode == 0, run.stderr
     assert [line for line in said.splitlines() if line.startswith(("go_to", "pick"))] == [
+        "go_to(meeting room)",
         "go_to(kitchen)",
         "pick(mug)",
+        "go_to(meeting room)",
     ]

@@ -98,10 +98,9 @@ def step_text(step: Mapping[str, Any]) -> Text:
         return _drive(step, text)
     kind, result = step["kind"], step.get("found")
     verb = verb_for(kind)
+    bare = f"{visible(kind)} {text}" if step["text"] else visible(kind)
     told = (
-        f"{visible(kind)} {text}"
-        if step["text"]
-        else visible(kind)
+        bare
         if verb is None
         else done_with(kind, verb.past, [shortened(each) for each in (step["text"], *step.get("more", ()))])
     )

@@ -102,7 +102,12 @@ ConnectOption = Annotated[
         metavar="FILE",
     ),
 ]
-AddressOption = Annotated[str, typer.Option(help="The robot's address, if not the default.")]
+AddressOption = Annotated[
+    str,
+    typer.Option(
+        help="If not the default: a ROS_DOMAIN_ID, the URI of a ROS master, or ws://HOST:PORT of a rosbridge."
+    ),
+]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
     int | None,

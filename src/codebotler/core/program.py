@@ -289,7 +289,8 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
             hint = f"; did you mean {hints[name]}?" if name in hints else ""
             if not hint and name in called:
                 hint = "; if it is a skill of your own, name its file with --skills"
-            message = f"the name {name} is not defined{hint}"
+            unknown = f"the name {name} is not defined{hint}"
+            message = f"this robot has no `{name}` skill" if name in SKILLS else unknown
             yield Flaw(line, "NameError", message, is_misuse=name in called)
 
 

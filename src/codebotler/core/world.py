@@ -118,20 +118,26 @@ ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
 SQUARE = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
 
 
+def _squared(room: Room) -> Room:
+    """A room that has a footprint if it has a standing point."""
+    if room.footprint is not None or room.stand_at is None:
+        return room
+    x, y = room.stand_at
+    return replace(room, footprint=tuple((x + dx, y + dy) for dx, dy in SQUARE))
+
+
 def laid_out(world: World) -> World:
     """The world with a footprint and a standing point for every room: a grid on both sides of a hallway.
 
     Rooms with a footprint keep it; around a mere standing point it is a square of a metre, and other rooms
     are placed to the right.
     """
-    taken = [x for room in world.rooms for x, _ in room.footprint or ()]
+    known = [_squared(room) for room in world.rooms]
+    taken = [x for room in known for x, _ in room.footprint or ()]
     start = max(taken, default=0.0) + (HALLWAY if taken else 0.0)
     rooms, placed = [], 0
-    for room in world.rooms:
+    for room in known:
         footprint = room.footprint
-        if footprint is None and room.stand_at is not None:
-            x, y = room.stand_at
-            footprint = tuple((x + dx, y + dy) for dx, dy in SQUARE)
         if footprint is None:
             left = start + placed // 2 * ROOM_WIDTH
             low = 0.0 if placed % 2 == 0 else ROOM_DEPTH + HALLWAY

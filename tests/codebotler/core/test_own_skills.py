@@ -416,6 +416,13 @@ def test_a_call_of_what_is_not_defined_is_a_problem_even_where_all_errors_are_ca
     assert check(program.format("say(hatch)"), rooms=["hall"]).problems == ()
 
 
+def test_call_of_a_skill_that_the_robot_lacks_says_so() -> None:
+    program = "def task_program():\n    pick('mug')\n"
+    (problem,) = check(program, rooms=["hall"], skills=SKILLS.without({"pick"})).problems
+    assert (problem.kind, problem.line) == ("NameError", 2)
+    assert "this robot has no `pick` skill" in problem.message
+
+
 def test_events_with_fewer_arguments_than_a_formula_names_do_not_match(every: SkillTable) -> None:
     assert not holds(parse('tr.Exists(paint("red", "wall"))', skills=every), (Event("paint", "red"),))
 

@@ -267,12 +267,11 @@ def test_layout_gives_every_room_a_place_of_its_own_and_keeps_those_that_are_giv
         assert low < room.stand_at[1] < high
 
 
-def test_layout_is_a_hallway_with_rooms_on_both_sides_and_keeps_standing_points() -> None:
-    world = World((Room("a"), Room("b", stand_at=(9.0, 9.0)), Room("c")), "a", may_wait_forever=True)
+def test_layout_is_a_hallway_with_rooms_on_both_sides() -> None:
+    world = World((Room("a"), Room("b"), Room("c")), "a", may_wait_forever=True)
     a, b, c = laid_out(world).rooms
     assert (extent(a)[:2], extent(c)[0]) == (extent(b)[:2], extent(a)[1])
     assert extent(b)[2] - extent(a)[3] == HALLWAY
-    assert b.stand_at == (9.0, 9.0)
     assert laid_out(world).may_wait_forever
     assert laid_out(laid_out(world)) == laid_out(world)
 
@@ -281,6 +280,13 @@ def test_rooms_without_a_place_stand_a_hallway_to_the_right_of_those_with_one() 
     given = ((-1.0, 0.0), (7.0, 0.0), (7.0, 5.0))
     world = World((Room("new"), Room("given", footprint=given)), "new")
     assert extent(laid_out(world).rooms[0])[0] == 7 + HALLWAY
+
+
+def test_room_with_a_standing_point_alone_is_a_square_of_a_metre_around_it() -> None:
+    world = laid_out(World((Room("new"), Room("b", stand_at=(9.0, 4.0))), "new"))
+    assert extent(world.rooms[1]) == (8.5, 9.5, 3.5, 4.5)
+    assert world.rooms[1].stand_at == (9.0, 4.0)
+    assert extent(world.rooms[0])[0] == 9.5 + HALLWAY
 
 
 def test_world_file_is_written_for_people_to_read() -> None:

@@ -185,7 +185,7 @@ def test_own_actions_connect_a_robot(tmp_path: Path) -> None:
 
 
 def test_example_of_the_guide() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "ros.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "nav2.md").read_text()
     offers = (
         NAV2,
         AMCL,

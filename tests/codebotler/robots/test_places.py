@@ -256,7 +256,7 @@ NAV2 = """\
    "geometry": {"type": "LineString", "coordinates": [[1.5, 2], [7, 2]]}}]}
 """
 GRAPH = "levels: {L1: {lanes: [], vertices: [[1, 2, {name: ''}], [3, -4, {name: lounge}]]}}\n"
-GUIDE = Path(__file__).parents[3] / "docs" / "ros.md"
+GUIDE = Path(__file__).parents[3] / "docs" / "nav2.md"
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from hypothesis.strategies import SearchStrategy
 
 from codebotler import rtl
 from codebotler.core.trace import Event, Option, Trace
+from codebotler.core.unicode import composed
 from codebotler.rtl.formulas import ScopeName
 
 NAMES = st.sampled_from(["a", "b", "ab", "a b", "No"])
@@ -115,7 +116,7 @@ def single_tests() -> SearchStrategy[rtl.Test]:
 @pytest.fixture(scope="session")
 def strange_formulas() -> SearchStrategy[rtl.Formula]:
     """Formulas whose regexes hold anything a string may hold."""
-    return formulas_from(st.text(max_size=6).map(_escaped))
+    return formulas_from(st.text(max_size=6).map(composed).map(_escaped))
 
 
 @pytest.fixture(scope="session")

@@ -331,7 +331,7 @@ def test_nothing_is_left_behind_when_a_row_is_wrong(tmp_path: Path, verb: str, o
 
 
 FULL = r"[^\n]*: File too large; [^\n]*\n"
-SMALL_DISK = "ulimit -f 500;"  # in KiB: no file may grow beyond it
+SMALL_DISK = "ulimit -f 600;"  # in KiB: no file may grow beyond it
 LONG = 'def task_program(): say("good day " * 1000)\n'
 
 
@@ -349,7 +349,7 @@ def test_a_full_disk_ends_an_evaluation_in_one_sentence_and_it_goes_on(tmp_path:
 
 
 def test_a_full_disk_leaves_no_half_run(tmp_path: Path) -> None:
-    (tmp_path / "a.jsonl").write_text("".join(row(index, "#" * 100_000) for index in range(6)))
+    (tmp_path / "a.jsonl").write_text("".join(row(index, "#" * 100_000) for index in range(8)))
     ended = roboeval("import", "a.jsonl", "--out", "new/run", cwd=tmp_path, before=SMALL_DISK)
     assert (ended.status, ended.out) == (1, "")
     assert re.fullmatch(r"roboeval: new/run/completions\.jsonl" + FULL, ended.err)

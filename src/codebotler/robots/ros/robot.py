@@ -146,7 +146,7 @@ class RosRobot:
                 case {"id": int(goal), "is": "picture", "data": str(data)} if goal == number:
                     feedback(Picture(base64.b64decode(data)))
                 case {"is": "pose", "x": float(x), "y": float(y)}:
-                    before, at = at, f"at ({x:.2f}, {y:.2f})"
+                    before, at = at, f"at ({x:z.2f}, {y:z.2f})"
                     if at != before:
                         feedback(at)
                 case {"id": int(goal)} as message if goal == number:

@@ -351,7 +351,6 @@ class _Build:
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
         )
         if done.returncode:
-            sys.stderr.write(done.stdout)
             lines: Sequence[str] = done.stdout.splitlines() or [""]
             error = next((line for line in lines if "error" in line), lines[-1])
             raise SetupError(

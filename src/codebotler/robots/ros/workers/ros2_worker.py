@@ -229,7 +229,7 @@ class Ros2Worker(SkillWorker):
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
         """Repeat what has no effect: a cancel may overtake its goal, and an answer may be lost."""
         super().look_after(goal, sent, now)
-        if goal.is_over:
+        if goal.is_over or goal.handle is None:  # services and topics cannot be cancelled
             return
         if goal.cancelled is not None and not goal.handle.is_cancelling and now - goal.cancelled > TICK:
             self.graph.soon(self._cancel, goal)
