@@ -6,7 +6,7 @@
 #     test-slow            tests that take seconds of a processor each
 #     test-suites          the tasks of both suites as data: linted, and judged on programs with known verdicts
 #     test-guide           README, guides and examples: every command on them runs, and prints what they say
-#     test-ros1            robots on ROS 1, for which the system's Python must have rospy (`codebotler robots` tells)
+#     test-ros1            robots on ROS 1, for which the system's Python must have rospy and the messages named in .ci/run
 #     test-ros2            robots on ROS 2 Kilted, and some of it on Jazzy, in environments of their own, ROS2_VENV-kilted
 #                          and ROS2_VENV-jazzy, for which PYTHON must be one that has wheels of ROS: 3.11 to 3.13
 #     test-browser         the page in Chromium, also with a robot on ROS 1; SHOTS names a folder for screenshots

@@ -37,7 +37,6 @@ NOT_RUN = {
     "house-rules.md": ["needs a model behind it", "needs Inspect, and a model behind it"],
     "index.md": ["makes an environment of its own"],
     "install.md": ["makes an environment of its own", "makes an environment of its own"],
-    "perception.md": ["needs a robot with a camera"],
     "roboeval-plus.md": ["takes minutes"],
     "robots.md": ["needs pyrobosim, with which `make test-pyrobosim` tests the robot"],
     "ros1.md": ["needs root, and a Debian or Ubuntu"],

@@ -1,6 +1,7 @@
-"""The ROS side of a double of rosbridge: its operations for topics, line by line, on a real graph.
+"""The ROS side of a double of rosbridge: its operations for topics and services, on a real graph.
 
-What is published right after it was advertised may be lost, as rosbridge itself loses it.
+What is published right after it was advertised may be lost, as rosbridge itself loses it. Without a type, a
+topic can be subscribed to only if it is there.
 """
 
 import json
@@ -15,21 +16,16 @@ import actionlib_msgs.msg
 import genpy.message
 import rospy
 
-from message_types import message_types
+from channel import SetupError
+from message_types import as_data, installed, message_types
 
 LOCK = threading.Lock()
+SUBSCRIBED: dict[str, Any] = {}
 
 
 def tell(**message: Any) -> None:
     with LOCK:
         print(json.dumps(message), flush=True)
-
-
-def plain(value: Any) -> Any:
-    """A message as JSON."""
-    if hasattr(value, "__slots__") and not isinstance(value, str):
-        return {field: plain(getattr(value, field)) for field in value.__slots__}
-    return [plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
 def known_types() -> dict[str, Any]:
@@ -41,22 +37,48 @@ def known_types() -> dict[str, Any]:
     }
 
 
+def type_of(kind: str, types: dict[str, Any], folder: str = "msg") -> Any:
+    if kind in types:
+        return types[kind]
+    try:
+        return installed(kind.partition("/")[0], folder, kind.partition("/")[2])
+    except SetupError:
+        tell(op="status", level="error", msg=f"Unable to import {kind}")
+        return None
+
+
+def call(message: dict[str, Any]) -> None:
+    about = {"op": "service_response", "id": message["id"], "service": message["service"]}
+    try:
+        rospy.wait_for_service(message["service"], 0.1)
+        spec = type_of(message["type"], {}, "srv")
+        request = spec._request_class()
+        genpy.message.fill_message_args(request, [message["args"]])
+        tell(**about, result=True, values=as_data(rospy.ServiceProxy(message["service"], spec)(request)))
+    except (rospy.ROSException, rospy.ServiceException) as error:
+        tell(**about, result=False, values=str(error))
+
+
 def obey(message: dict[str, Any], types: dict[str, Any], published: dict[str, Any]) -> None:
     operation = message["op"]
     if operation == "call_service":
-        tell(op="service_response", id=message["id"], result=False, values="there is no rosapi")
+        threading.Thread(target=call, args=(message,), daemon=True).start()
         return
     topic = message["topic"]
-    if "type" in message and message["type"] not in types:
-        tell(op="status", level="error", msg=f"Unable to import {message['type']}")
-    elif operation == "advertise":
-        published[topic] = rospy.Publisher(topic, types[message["type"]], queue_size=10)
+    if operation == "advertise":
+        if (spec := type_of(message["type"], types)) is not None:
+            published[topic] = rospy.Publisher(topic, spec, queue_size=10)
     elif operation == "subscribe":
-        rospy.Subscriber(
-            topic,
-            types[message["type"]],
-            lambda heard: tell(op="publish", topic=topic, msg=plain(heard)),
-        )
+        kind = message.get("type") or dict(rospy.get_published_topics()).get(topic)
+        if kind is None:
+            tell(op="status", level="error", msg=f"Cannot infer topic type for topic {topic}")
+        elif (spec := type_of(kind, types)) is not None:
+            SUBSCRIBED[topic] = rospy.Subscriber(
+                topic, spec, lambda heard: tell(op="publish", topic=topic, msg=as_data(heard))
+            )
+    elif operation == "unsubscribe":
+        if topic in SUBSCRIBED:
+            SUBSCRIBED.pop(topic).unregister()
     elif operation == "publish" and topic in published:
         made = published[topic].data_class()
         genpy.message.fill_message_args(made, [message["msg"]])

@@ -5,20 +5,16 @@ import os
 import select
 import sys
 
-sys.path.insert(0, sys.argv[1])
-
 import rospy
+import sensor_msgs.msg
+import std_msgs.msg
 
-from message_types import picture_types
-
-topic, kind, fields = sys.argv[2], sys.argv[3], json.loads(sys.argv[4])
+topic, kind, fields = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
 rospy.init_node("camera", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
-if kind in picture_types():
+if fields:
     fields["data"] = bytes.fromhex(fields["data"])
-    message = picture_types()[kind](**fields)
+    message = getattr(sensor_msgs.msg, kind)(**fields)
 else:
-    import std_msgs.msg
-
     message = std_msgs.msg.String("no picture")
 publisher = rospy.Publisher(topic, type(message), queue_size=1, latch=True)
 publisher.publish(message)

@@ -16,9 +16,11 @@ HERE = Path(__file__).parent
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    missing = lacks(ROS_PYTHON, (*NEEDS, "rosmaster"))
+    messages = ("move_base_msgs", "nav_msgs", "sensor_msgs", "std_srvs", "tf2_msgs")
+    missing = lacks(ROS_PYTHON, (*NEEDS, "rosmaster", *messages))
     if missing is None or missing:
-        reason = f"{ROS_PYTHON} lacks {missing or 'Python'}: {MEND}"
+        packages = " ".join(f"python3-{name.replace('_', '-')}" for name in messages)
+        reason = f"{ROS_PYTHON} lacks {missing or 'Python'}: {MEND} {packages}"
         for item in items:
             if HERE in item.path.parents:
                 item.add_marker(pytest.mark.skip(reason=reason))

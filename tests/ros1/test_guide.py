@@ -89,7 +89,7 @@ def test_file_of_the_page_is_read(tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(file)
     (tmp_path / "places.yaml").write_text("places: {dock: {x: 0, y: 0}}\n")
     connection = read_connection(tmp_path / "robot.yaml", SKILLS)
-    assert (connection.robot, connection.calls["go_to"].type) == ("ros1", "move_base_msgs/MoveBase")
+    assert (connection.robot, connection.calls["go_to"].type) == ("ros1", "move_base_msgs/action/MoveBase")
 
 
 VARIES = (

@@ -158,6 +158,44 @@ def test_robot_that_goes_on_after_a_stop_is_lost(robots: Robots) -> None:
     assert "BY HAND" in str(ended["error"])
 
 
+SLOW_DOOR = """
+import os, sys, threading, time
+import rclpy
+from std_srvs.srv import Trigger
+
+def open_door(_, answer):
+    print('["opening"]', flush=True)
+    time.sleep(60)
+    return answer
+
+rclpy.init()
+node = rclpy.create_node("door")
+node.create_service(Trigger, "/door/open", open_door)
+threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+print('["ready"]', flush=True)
+sys.stdin.read()
+os._exit(0)
+"""
+DOOR = """\
+skills:
+  open_door: {service: /door/open, type: std_srvs/srv/Trigger, success: success}
+"""
+
+
+def test_service_that_goes_on_after_a_stop_is_told(robots: Robots, tmp_path: Path) -> None:
+    (tmp_path / "slow_door.py").write_text(SLOW_DOOR)
+    door = Process(tmp_path / "slow_door.py", python=ROS2_PYTHON)
+    robots.scene.processes.append(door)
+    door.expect("ready")
+    robot = robots.robot(DOOR)
+    robot.connect()
+    with started(lambda: robot.perform("open_door", [])) as ended:
+        door.expect("opening")
+        robot.cancel()
+    assert isinstance(ended["error"], RobotLostError)
+    assert re.search("/door/open .*stop", str(ended["error"]))
+
+
 def test_poses_in_another_frame_are_refused(robots: Robots) -> None:
     robots.nav2()
     robot = robots.robot(CONNECTION.replace("/amcl_pose", "/odom"))

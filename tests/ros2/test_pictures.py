@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import signal
@@ -14,31 +13,20 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import Picture
+from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.worker import WORKERS
+from halves import encoded, has_frame, rows, sees
 from ros2_scene import ROS2_PYTHON, Scene
-from ros_graph import LONG, Process
+from ros_graph import Process
+from server import Server
 
 HERE = Path(__file__).parent
 LOOK = SKILLS["is_in_room"]
 TOPIC = "/camera/image_raw"
-IMAGE = {"encoding": "rgb8", "width": 2, "height": 1, "step": 6, "data": [1, 2, 3, 4, 5, 6]}
-LOOKS = """
-import json, os, sys
-sys.path.insert(0, sys.argv[1])
-from ros2_camera import Ros2Camera
-from ros2_graph import Ros2Graph
-
-graph = Ros2Graph("looker")
-graph.enter()
-camera = Ros2Camera(graph, sys.argv[2])
-graph.spin()
-for line in sys.stdin:
-    print(json.dumps([camera.look(float(line))]), flush=True)
-os._exit(0)
-"""
 TOOL = """
 import sys
 from pathlib import Path
@@ -100,45 +88,43 @@ def test_suspended_tool_that_reads_no_pictures_stops_the_robot(eyes: Process) ->
         tool.kill()
 
 
-def looks(looker: Process, oldest: float) -> dict[str, Any]:
-    assert looker.process.stdin is not None
-    looker.process.stdin.write(f"{oldest}\n")
-    looker.process.stdin.flush()
-    (seen,) = looker.said.get(timeout=LONG)
-    assert isinstance(seen, dict)
-    return seen
-
-
-def seen_at_last(looker: Process) -> dict[str, Any]:
-    until = time.monotonic() + LONG
-    while "no picture has arrived" in (seen := looks(looker, 60)).get("none", ""):
-        assert time.monotonic() < until
-        time.sleep(0.1)
-    return seen
-
-
 @pytest.mark.parametrize(
-    ("kind", "fields"), [("Image", IMAGE), ("CompressedImage", {"format": "jpeg", "data": [255, 0]})]
+    ("kind", "fields"),
+    [
+        ("Image", {"encoding": "bgr8", "width": 64, "height": 32, "step": 200, "data": [*rows("BGR", 8)]}),
+        ("CompressedImage", {"format": "jpeg", "data": [*encoded("JPEG")]}),
+    ],
 )
-def test_last_picture_of_a_camera(scene: Scene, tmp_path: Path, kind: str, fields: dict[str, Any]) -> None:
-    (tmp_path / "looks.py").write_text(LOOKS)
-    looker = process(scene, tmp_path / "looks.py", str(WORKERS), TOPIC)
-    assert TOPIC in looks(looker, 60)["none"]
-    camera = process(scene, HERE / "ros2_camera.py", TOPIC, kind, json.dumps(fields))
-    camera.expect("ready")
-    seen = seen_at_last(looker)
-    assert base64.b64decode(seen["data"]) == bytes(fields["data"])
-    assert {**seen, **{name: value for name, value in fields.items() if name != "data"}} == seen
-    camera.end()
-    time.sleep(1.0)
-    assert "ago" in looks(looker, 0.5)["none"]
-    assert "data" in looks(looker, 60)
+def test_connected_camera_becomes_an_answer_and_a_picture(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, fields: dict[str, Any]
+) -> None:
+    process(scene, HERE / "ros2_camera.py", TOPIC, kind, json.dumps(fields)).expect("ready")
+    path = tmp_path / "robot.yaml"
+    path.write_text(f'skills: {{is_in_room: {{detector: "openai-chat:eyes", image: {TOPIC}}}}}')
+    with Server(answer=sees) as model:
+        monkeypatch.setenv("OPENAI_BASE_URL", model.url)
+        robot = scene.robot(skills=SkillTable((LOOK,)), connection=read_connection(path, SKILLS))
+        robot.connect()
+        shown: list[str | Picture] = []
+        assert robot.perform("is_in_room", ["mug"], shown.append) is True
+        (picture,) = shown
+        assert isinstance(picture, Picture)
+        assert has_frame(picture.data)
+        assert robot.perform("is_in_room", ["cat"]) is False
+        robot.disconnect()
 
 
-def test_what_is_no_picture_is_said(scene: Scene, tmp_path: Path) -> None:
-    (tmp_path / "looks.py").write_text(LOOKS)
-    looker = process(scene, tmp_path / "looks.py", str(WORKERS), "/words")
+@pytest.mark.parametrize(("topic", "why"), [("/words", "is empty"), (TOPIC, "no picture")])
+def test_what_is_no_picture_is_said(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, topic: str, why: str
+) -> None:
+    monkeypatch.setenv("OPENAI_BASE_URL", "http://localhost:1/v1")  # which is not asked
     process(scene, HERE / "ros2_camera.py", "/words", "String", "{}").expect("ready")
-    why = seen_at_last(looker)["none"]
-    for part in ("/words", "std_msgs/msg/String", "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"):
-        assert part in why
+    path = tmp_path / "robot.yaml"
+    path.write_text(f'skills: {{is_in_room: {{detector: "openai-chat:eyes", image: {topic}}}}}')
+    robot = scene.robot(skills=SkillTable((LOOK,)), connection=read_connection(path, SKILLS))
+    robot.connect()
+    with pytest.raises(RobotError, match=why) as error:
+        robot.perform("is_in_room", ["mug"])
+    assert topic in str(error.value)
+    robot.disconnect()

@@ -19,7 +19,7 @@ from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Person, Room, World
-from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError
 from codebotler.robots.ros.virtual import VirtualRobot
 from ros2_scene import ROS2_PYTHON, Scene
 from ros_graph import started
@@ -86,15 +86,6 @@ def test_it_stops_where_it_is(scene: Scene) -> None:
     robot.connect()
     assert robot.perform("get_current_location", []) == "hall"
     virtual.stop()
-
-
-def test_it_leaves_the_graph_at_once(scene: Scene, virtual: VirtualRobot) -> None:
-    robot = scene.robot(skills=SKILLS)
-    robot.connect()
-    virtual.stop()
-    time.sleep(0.5)
-    with pytest.raises(RobotLostError, match="there is no action server"):
-        robot.perform("say", ["hello"])
 
 
 @pytest.mark.usefixtures("virtual")

@@ -29,6 +29,7 @@ from codebotler.robots.ros.robot import RosRobot, Waits
 from codebotler.simulator.rule_guard import Rule
 
 BEAT = 0.05  # seconds between two looks at what it reports
+CLOSES = 1.0  # seconds for detectors to close; one that looks closes later
 BY_HAND = "STOP THE ROBOT BY HAND"
 
 
@@ -51,6 +52,7 @@ class ConnectedRobot(RosRobot):
         super().__init__(name, address, script, options, environment, waits=waits)
         self.has_pose = self.connection.pose is not None
         self._detectors: dict[str, Detector] = {}
+        self._looking = threading.Lock()  # held by one look, perhaps one that nobody waits for any more
 
     def connect(self) -> None:
         """Open what looks at pictures, and connect.
@@ -58,17 +60,23 @@ class ConnectedRobot(RosRobot):
         Raises:
             NotReadyError: something is missing, or the poses are not in the frame of the places.
         """
+        self.disconnect()
         for _, model in self.connection.cameras.values():
             if model not in self._detectors:
                 self._detectors[model] = open_detector(model)
         super().connect()
         places, pose = self.connection.places, self._pose() if self.has_pose else None
-        if places is not None and pose is not None and pose.frame not in {"", places.frame}:
-            self.disconnect()
-            raise NotReadyError(
+        sentence = ""
+        if self.has_pose and pose is None:
+            sentence = f"no pose has come on {self._topic}; start what publishes it, or correct its name"
+        elif places is not None and pose is not None and pose.frame not in {"", places.frame}:
+            sentence = (
                 f'the poses on {self._topic} are in the frame "{pose.frame}", but the places are in '
                 f'"{places.frame}"; name another topic, or tf, under pose'
             )
+        if sentence:
+            self.disconnect()
+            raise NotReadyError(sentence)
 
     def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
         """Answer from places and pose, look at a picture, or have the robot perform the skill.
@@ -94,6 +102,21 @@ class ConnectedRobot(RosRobot):
         except CancelledError:
             self._confirm_standing(feedback)
             raise
+
+    def disconnect(self) -> None:
+        """Have the worker cancel what goes on, and end it; close what looks at pictures."""
+        was_connected = self._worker is not None
+        super().disconnect()
+        if was_connected:
+            detectors, self._detectors = self._detectors, {}
+            closing = threading.Thread(target=self._close, args=(detectors,), daemon=True)
+            closing.start()
+            closing.join(CLOSES)
+
+    def _close(self, detectors: Mapping[str, Detector]) -> None:
+        with self._looking:
+            for detector in detectors.values():
+                detector.close()
 
     def keep_out(self, rules: Sequence[Rule]) -> None:
         """Have the robot's planner keep out of rooms that rules forbid, if its connection says how."""
@@ -131,18 +154,20 @@ class ConnectedRobot(RosRobot):
         return nearest
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
-        """Look for something in a camera's last picture, unless the robot is stopped."""
+        """Look for something in a camera's next picture, unless the robot is stopped."""
         until = time.monotonic() + self._waits.patience
-        order = {"do": "look", "topic": topic, "oldest": self._waits.patience}
+        order = {"do": "look", "topic": topic, "is_new": True}
         while "none" in (seen := self._awaited(order, no_feedback)["values"]):
             if time.monotonic() > until:
                 raise RobotError("IsInRoomFailed", seen["none"])
             time.sleep(BEAT)
-        found = Future[tuple[bool, bytes]]()
+            order["is_new"] = False
+        found, detector = Future[tuple[bool, bytes]](), self._detectors[model]
 
         def look() -> None:
             try:
-                found.set_result(_seen(self._detectors[model], seen, label, topic))
+                with self._looking:
+                    found.set_result(_seen(detector, seen, label, topic))
             except Exception as error:  # noqa: BLE001 - which is raised again below
                 found.set_exception(error)
 

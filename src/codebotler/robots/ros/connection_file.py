@@ -99,6 +99,9 @@ class ConnectionForm(_Form):
 SENT = {"action": "goal", "service": "request", "topic": "message"}
 """The key of what is sent, for each kind."""
 
+FOLDERS = {"action": "action", "service": "srv", "topic": "msg"}
+"""The middle of a type, for each kind."""
+
 
 def read_connection(path: Path, skills: SkillTable) -> Connection:
     """Read a file that connects a robot.
@@ -166,8 +169,15 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"
             raise file.wrong(f"${variable} is unknown here{lacks}; known are: {given}", *at, SENT[kind])
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
-    ros = skill.ros
-    package, *_, plain = form.type.split("/")
-    is_ours = ros is not None and (ros.package, ros.type) == (package, plain)
+    whole, ros = _whole(kind, form.type), skill.ros
+    is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
     definition = ros.definition if ros is not None and is_ours else ""
-    return Call(kind, name, form.type, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]
+    return Call(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]
+
+
+def _whole(kind: str, text: str) -> str:
+    """A type as ROS 2 writes it, such as std_srvs/srv/Trigger, from that or from how ROS 1 does."""
+    package, *middle, name = text.split("/")
+    if kind == "action" and middle != ["action"]:
+        name = name.removesuffix("Action")
+    return f"{package}/{FOLDERS[kind]}/{name}"

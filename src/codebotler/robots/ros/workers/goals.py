@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from channel import Channel, Message, SetupError
-from message_types import in_base64
+from pictures import Camera
 from reports import MotionReports
 
 TICK = 0.1  # seconds between two rounds of the watchdog
@@ -63,7 +63,7 @@ class SkillWorker:
         self.silence: float = start["silence"]
         self.longest: float = start["longest"]
         self.goal: Goal | None = None
-        self.cameras: dict[str, Any] = {}
+        self.cameras = {topic: Camera(topic, self.listen) for topic in start["cameras"]}
         self._sign = Path(start["sign"])
         left_behind = self.connect(start) or self._sign.exists()
         missing = self.missing()
@@ -83,8 +83,13 @@ class SkillWorker:
         """Send a goal, whose lock is held."""
         raise NotImplementedError
 
-    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
-        """Call `hear` with each message of a topic as plain data; SetupError if a topic `is_needed`."""
+    def listen(
+        self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True
+    ) -> Callable[[], object] | None:
+        """Call `hear` with each message of a topic as plain data; what ends that, if the topic is there.
+
+        Where one `is_needed` that is not there, a SetupError says so.
+        """
         raise NotImplementedError
 
     def publish(self, topic: str, fields: Message) -> None:
@@ -110,7 +115,7 @@ class SkillWorker:
             else:
                 threading.Thread(target=self._wait_and_send, args=(goal, line["fields"]), daemon=True).start()
         elif line["do"] == "look":
-            picture = self.cameras[line["topic"]].look(line["oldest"])
+            picture = self.cameras[line["topic"]].look(is_new=line["is_new"])
             self.channel.send("result", id=line["id"], values=picture)
         elif line["do"] == "publish":
             self.publish(line["topic"], line["fields"])
@@ -193,16 +198,17 @@ class SkillWorker:
         else:
             self.end(goal, "cancelled")
 
-    def see(self, server: Any, data: Any) -> None:
-        """Pass on a picture that a server shows while its goal goes on."""
+    def see(self, server: Any, data: str) -> None:
+        """Pass on a picture, in base64, that a server shows while its goal goes on."""
         goal = self.goal
         if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
             return
-        if len(data) > LARGEST_PICTURE:
-            text = f"a picture of {len(data):,} bytes was left out; the limit is {LARGEST_PICTURE:,} bytes"
+        size = len(data) * 3 // 4
+        if size > LARGEST_PICTURE:
+            text = f"a picture of {size:,} bytes was left out; the limit is {LARGEST_PICTURE:,} bytes"
             self.channel.send("feedback", id=goal.number, text=text)
         else:
-            self.channel.send("picture", id=goal.number, data=in_base64(data))
+            self.channel.send("picture", id=goal.number, data=data)
         goal.seen.set()
 
     def succeed(self, goal: Goal, values: Message) -> None:

@@ -8,7 +8,7 @@ import xmlrpc.client
 from typing import Any
 
 from channel import SetupError
-from message_types import parts_of
+from message_types import OFFERS, offer_of, parts_of
 
 LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
 MASTER_ANSWERS, NODE_ANSWERS = 5.0, 2.0  # seconds
@@ -82,9 +82,17 @@ class Ros1Graph:
         return f"another node called {self.node} has taken over; stop it, and connect again"
 
     def nodes_of(self, server: str) -> list[str]:
-        """Nodes registered for the goals of an action server; they may have died."""
-        _, subscribers, _ = self._master.getSystemState()
-        return [node for topic, names in subscribers if topic == server + "/goal" for node in names]
+        """Nodes registered for an action's goals, a topic or a service; they may have died."""
+        _, subscribers, services = self._master.getSystemState()
+        name = self._rosgraph.names.resolve_name(server, self.node)
+        return [
+            node for one, nodes in subscribers + services if one in {name, name + "/goal"} for node in nodes
+        ]
+
+    def has_publisher(self, topic: str) -> bool:
+        """Whether a publisher of a topic is registered."""
+        name = self._rosgraph.names.resolve_name(topic, self.node)
+        return name in (one for one, _ in self._master.getSystemState()[0])
 
     def has_service(self, name: str) -> bool:
         """Whether a service is registered."""
@@ -94,22 +102,25 @@ class Ros1Graph:
             return False
 
     def why_missing(self, server: str, type_name: str) -> str:
-        """Why there is no connection with an action server."""
+        """Why there is no connection with what a robot offers."""
         if not self.is_online():
             return f"{server} is gone, and so is the ROS master at {self.uri}; start it again"
         if self.address_of(self.node) is None:
             return f"the ROS master at {self.uri} was restarted; connect again"
         nodes = self.nodes_of(server)
+        what = offer_of(type_name)
         if not nodes:
-            return f"there is no action server at {server}; start it"
+            return f"there is no {what} at {server}; start it"
         address = self.address_of(nodes[0])
         if address is None or not is_alive(address):
-            return f"the action server at {server} (node {nodes[0]}) has died; start it again"
-        action = "/".join(parts_of(type_name)) + "Action"
+            return f"the {what} at {server} (node {nodes[0]}) has died; start it again"
+        whole, goal = "/".join(parts_of(type_name)), ""
+        if what == OFFERS["action"]:
+            whole, goal = whole + "Action", "Goal"
         return (
-            f"the action server at {server} (node {nodes[0]}) is running, but does not accept our "
-            f"messages: its definition of {action} differs (another md5; compare with `rosmsg md5 "
-            f"{action}Goal`), or its machine cannot be reached (see ROS_IP and ROS_HOSTNAME)"
+            f"the {what} at {server} (node {nodes[0]}) is running, but does not accept our "
+            f"messages: its definition of {whole} differs (another md5; compare with `rosmsg md5 "
+            f"{whole}{goal}`), or its machine cannot be reached (see ROS_IP and ROS_HOSTNAME)"
         )
 
 

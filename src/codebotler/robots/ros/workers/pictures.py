@@ -1,84 +1,46 @@
-"""Pictures on a graph: the last one of a camera, and on ROS 1 a topic that shows what a server saw."""
+"""Pictures of a camera."""
 
 from __future__ import annotations
 
-import base64
-import time
+from collections.abc import Callable
 from typing import Any
 
-from message_types import BUFFER, COMPRESSED, in_base64, picture_types
-
-FIELDS = ("height", "width", "encoding", "is_bigendian", "step", "format")  # of both types of pictures
+from channel import Message, SetupError
 
 
 class Camera:
-    """The last message of a topic, raw or compressed; it is unpacked only when asked for."""
+    """A topic with pictures, which is listened to only while one is awaited, since they are large.
 
-    def __init__(self, topic: str, types: dict[str, Any]) -> None:
-        self.topic, self.types = topic, types
-        self.kind = ""  # of the messages, as far as it is known
-        self._last: Any = None
+    Args:
+        topic: its name.
+        listen: calls a function with each message of a topic; it returns what ends that, or None if the
+            topic is not there.
+    """
 
-    def look(self, oldest: float) -> dict[str, Any]:
-        """The last picture as fields of its message, or `none` with the reason why there is none.
+    def __init__(self, topic: str, listen: Callable[..., Callable[[], object] | None]) -> None:
+        self._topic, self._listen = topic, listen
+        self._ignore: Callable[[], object] | None = None
+        self._seen: Message | None = None
 
-        It must have come within the last `oldest` seconds.
-        """
-        if self.kind and self.kind not in self.types:
-            known = " or ".join(self.types)
-            return {"none": f"{self.topic} has messages of {self.kind}; name one of {known}"}
-        if self._last is None:
-            return {"none": f"no picture has arrived on {self.topic} yet; is the camera's node running?"}
-        came, message = self._last
-        age = time.monotonic() - came
-        if age > oldest:
-            late = f"the last picture on {self.topic} came {age:.0f} s ago"
-            return {"none": f"{late}; has the camera's node stopped?"}
-        picture = self.unpacked(message)
-        fields = {name: getattr(picture, name) for name in FIELDS if hasattr(picture, name)}
-        return {**fields, "data": in_base64(picture.data)}
+    def look(self, *, is_new: bool) -> Message:
+        """The first picture since a look began that `is_new`, or `none` with the reason why there is none."""
+        if is_new:
+            self._end()  # a look that was cancelled
+        try:
+            if self._ignore is None:
+                self._ignore = self._listen(self._topic, self._keep, is_needed=False)
+        except SetupError as error:
+            return {"none": str(error)}
+        seen = self._seen
+        if seen is None:
+            return {"none": f"no picture has arrived on {self._topic}; is the camera's node running?"}
+        self._end()
+        return seen
 
-    def unpacked(self, message: Any) -> Any:
-        """The picture in a message."""
-        raise NotImplementedError
+    def _keep(self, message: Any) -> None:
+        self._seen = message
 
-    def keep(self, message: Any) -> None:
-        """Note the last message."""
-        self._last = time.monotonic(), message
-
-
-class Ros1Camera(Camera):
-    """A camera on ROS 1."""
-
-    def __init__(self, topic: str) -> None:
-        import rospy
-
-        super().__init__(topic, picture_types())
-        rospy.Subscriber(topic, rospy.AnyMsg, self.keep, queue_size=1, buff_size=BUFFER)
-
-    def keep(self, message: Any) -> None:
-        """Note the last message, and its type."""
-        super().keep(message)
-        self.kind = message._connection_header["type"]
-
-    def unpacked(self, message: Any) -> Any:
-        """The picture in a message."""
-        return self.types[message._connection_header["type"]]().deserialize(message._buff)
-
-
-class PictureTopic:
-    """The topic on which an action server shows what it sees: `SERVER/picture`."""
-
-    def __init__(self, server: str) -> None:
-        import rospy
-
-        self._type = picture_types()[COMPRESSED]
-        self._publisher = rospy.Publisher(f"{rospy.remap_name(server)}/picture", self._type, queue_size=4)
-
-    def show(self, picture: str) -> None:
-        """Publish a JPEG file in base64."""
-        import rospy
-
-        message = self._type(format="jpeg", data=base64.b64decode(picture))
-        message.header.stamp = rospy.Time.now()
-        self._publisher.publish(message)
+    def _end(self) -> None:
+        if self._ignore is not None:
+            self._ignore()
+        self._ignore = self._seen = None

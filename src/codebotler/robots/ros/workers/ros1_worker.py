@@ -8,11 +8,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from channel import Message, serve
+from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
-from message_types import BUFFER, COMPRESSED, as_data, installed, message_types, picture_types
-from pictures import Ros1Camera
+from message_types import as_data, installed, message_types, parts_of, type_of_sender
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
 
@@ -35,12 +34,7 @@ class Ros1Server:
         self._since = 0.0
         topic = rospy.remap_name(self.name)
         self._status = rospy.Subscriber(f"{topic}/status", actionlib_msgs.msg.GoalStatusArray, self._hear)
-        self._pictures = rospy.Subscriber(
-            f"{topic}/picture",
-            picture_types()[COMPRESSED],
-            lambda message: see(self, message.data),
-            buff_size=BUFFER,
-        )
+        self._pictures = subscribed(f"{topic}/picture", lambda message: see(self, message["data"]))
 
     def shows_pictures(self) -> bool:
         """Whether anything publishes what it sees."""
@@ -79,7 +73,7 @@ class Ros1Service:
 
     def __init__(self, graph: Ros1Graph, call: Message) -> None:
         self.graph, self.name, self.type = graph, call["server"], call["type"]
-        self._open(self.type.partition("/")[0], self.type.rpartition("/")[2])
+        self._open(*parts_of(self.type))
 
     def _open(self, package: str, name: str) -> None:
         import rospy
@@ -125,6 +119,22 @@ class Ros1Topic(Ros1Service):
         return {}
 
 
+def subscribed(topic: str, hear: Callable[[Message], object]) -> Any:
+    """A subscriber that calls `hear` with each message as plain data, of the type that its publisher has."""
+    import rospy
+
+    known: dict[str, Any] = {}
+
+    def take(message: Any) -> None:
+        header = message._connection_header
+        kind = header["type"]
+        if kind not in known:
+            known[kind] = type_of_sender(kind, header["message_definition"])
+        hear(as_data(known[kind]().deserialize(message._buff)))
+
+    return rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
+
+
 OTHERS = {"service": Ros1Service, "topic": Ros1Topic}
 
 
@@ -146,24 +156,16 @@ class Ros1Worker(SkillWorker):
             for skill, call in calls.items()
         }
         self._listen(start)
-        self.cameras = {topic: Ros1Camera(topic) for topic in start["cameras"]}
         return left_behind
 
-    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - what is missing may come later
-        """Call `hear` with each message of a topic as plain data, of the type that its publisher has."""
-        import rospy
-        from genpy.dynamic import generate_dynamic
-
-        known: dict[str, Any] = {}
-
-        def take(message: Any) -> None:
-            header = message._connection_header
-            kind = header["type"]
-            if kind not in known:
-                known[kind] = generate_dynamic(kind, header["message_definition"])[kind]
-            hear(as_data(known[kind]().deserialize(message._buff)))
-
-        rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
+    def listen(
+        self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True
+    ) -> Callable[[], object]:
+        """Call `hear` with each message of a topic as plain data; what ends that."""
+        if is_needed and not self.graph.has_publisher(topic):
+            raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
+        end: Callable[[], object] = subscribed(topic, hear).unregister
+        return end
 
     def send(self, goal: Goal, fields: Message) -> None:
         """Send a goal, unless no message can hold it."""
@@ -219,8 +221,11 @@ class Ros1Worker(SkillWorker):
 
         try:
             self.finish(goal, goal.server.perform(message))
-        except (rospy.ServiceException, rospy.ROSException) as error:
-            self.end(goal, "error", state="aborted", text=str(error))
+        except rospy.ServiceException as error:
+            if "responded with an error" in str(error):
+                self.end(goal, "error", state="aborted", text=str(error))
+            else:
+                self.end(goal, "lost", text=f"the service {goal.server.name} has died: {error}")
 
 
 if __name__ == "__main__":

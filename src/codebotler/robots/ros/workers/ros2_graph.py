@@ -13,13 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from channel import SetupError
-from message_types import parts_of
+from message_types import offer_of, parts_of
 from ros2_types import as_data, message_types
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
 LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
-OFFERS = {"action": "action server", "srv": "service", "msg": "subscriber"}
 TAKEN = "another codebotler is using this robot (the node {}); stop it first"
 
 
@@ -84,9 +83,8 @@ class Ros2Graph:
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with what a robot offers."""
         whole = type_name if type_name.count("/") > 1 else "/action/".join(parts_of(type_name))
-        what = OFFERS[whole.split("/")[1]]
         return (
-            f"there is no {what} of {whole} at {server}; start it, or compare "
+            f"there is no {offer_of(whole)} of {whole} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
@@ -105,10 +103,10 @@ class Ros2Graph:
 
     def listen(
         self, topic: str, hear: Callable[[Any], object], packages: list[str], patience: float | None
-    ) -> None:
+    ) -> Callable[[], object] | None:
         """Call `hear` with each message of a topic as plain data, of the type that its publishers have.
 
-        Without `patience`, in seconds, a topic that nobody publishes is left out.
+        It returns what ends that. Without `patience`, in seconds, a topic that nobody publishes is left out.
         """
         from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -116,7 +114,7 @@ class Ros2Graph:
         while not (publishers := self.ours.get_publishers_info_by_topic(topic)):
             if time.monotonic() > until:
                 if patience is None:
-                    return
+                    return None
                 raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
             time.sleep(0.05)
         kind, durability = publishers[0].topic_type, publishers[0].qos_profile.durability
@@ -129,7 +127,13 @@ class Ros2Graph:
             durability=durability if is_kept else DurabilityPolicy.VOLATILE,
         )
         spec = message_types([kind], map(Path, packages))[kind]
-        self.ours.create_subscription(spec, topic, lambda message: hear(as_data(message)), qos)
+        made: list[Any] = []
+
+        def subscribe() -> None:
+            made.append(self.ours.create_subscription(spec, topic, lambda m: hear(as_data(m)), qos))
+
+        self.soon(subscribe)
+        return lambda: self.soon(lambda: self.ours.destroy_subscription(made.pop()))
 
     def latched(self, spec: Any, topic: str) -> Any:
         """A publisher whose last message also those get who come later."""
@@ -146,10 +150,6 @@ class Ros2Graph:
 
         topic = f"{server}/_action/status"
         self.ours.create_subscription(GoalStatusArray, topic, lambda told: hear(server, told), qos)
-
-    def types_of(self, topic: str) -> list[str]:
-        """The types of the messages of a topic, as far as it was discovered."""
-        return [publisher.topic_type for publisher in self.ours.get_publishers_info_by_topic(topic)]
 
     def _locked(self) -> socket.socket:
         """A socket that only one process of this machine can have, for as long as it lives."""

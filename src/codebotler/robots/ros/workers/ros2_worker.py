@@ -10,7 +10,6 @@ from typing import Any
 
 from channel import Message, SetupError, serve
 from goals import TICK, Goal, SkillWorker
-from ros2_camera import Ros2Camera
 from ros2_graph import Ros2Graph
 from ros2_types import action_types, as_data, fill, message_types
 
@@ -46,7 +45,7 @@ class Ros2Server:
         self._graph, self._request = graph, CancelGoal.Request
         self._cancels = graph.ours.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         graph.ours.create_subscription(
-            CompressedImage, f"{self.name}/picture", lambda message: see(self, message.data), 10
+            CompressedImage, f"{self.name}/picture", lambda message: see(self, as_data(message.data)), 10
         )
         self.has_cancelled = False
 
@@ -159,7 +158,6 @@ class Ros2Worker(SkillWorker):
         self._latched = {
             topic: (self.graph.latched(specs[kind], topic), specs[kind]) for topic, kind in latched.items()
         }
-        self.cameras = {topic: Ros2Camera(self.graph, topic) for topic in start["cameras"]}
         self.graph.spin()
         return left_behind
 
@@ -219,9 +217,11 @@ class Ros2Worker(SkillWorker):
         goal.stop = lambda: self.graph.soon(self._cancel, goal)
         self.graph.soon(self._send, goal, message)
 
-    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:
-        """Call `hear` with each message of a topic as plain data, of the type that its publishers have."""
-        self.graph.listen(topic, hear, self._packages, self.patience if is_needed else None)
+    def listen(
+        self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True
+    ) -> Callable[[], object] | None:
+        """Call `hear` with each message of a topic as plain data; what ends that, if the topic is there."""
+        return self.graph.listen(topic, hear, self._packages, self.patience if is_needed else None)
 
     def _tell(self, text: str) -> None:
         self.channel.send("progress", text=text)
@@ -229,7 +229,7 @@ class Ros2Worker(SkillWorker):
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
         """Repeat what has no effect: a cancel may overtake its goal, and an answer may be lost."""
         super().look_after(goal, sent, now)
-        if goal.is_over:
+        if goal.is_over or goal.handle is None:  # services and topics cannot be cancelled
             return
         if goal.cancelled is not None and not goal.handle.is_cancelling and now - goal.cancelled > TICK:
             self.graph.soon(self._cancel, goal)

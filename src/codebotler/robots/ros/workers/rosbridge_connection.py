@@ -38,7 +38,7 @@ class Connection:
         self._socket = connect(address, open_timeout=OPENS, close_timeout=CLOSES, max_size=None)
         self._version: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._heard_first: dict[str, float] = {}
-        self._listeners: dict[str, Callable[[Message], object]] = {}
+        self._listeners: dict[str, tuple[Callable[[Message], object], ...]] = {}
         self.heard: dict[str, float] = {}  # when the last status of a server came, by the monotonic clock
         self.settled: set[str] = set()  # servers heard for so long that their results are connected too
         self.is_lost = self.has_ended = False
@@ -58,10 +58,17 @@ class Connection:
         with suppress(ConnectionClosed):
             self._socket.send(json.dumps(message))
 
-    def listen(self, topic: str, hear: Callable[[Message], object]) -> None:
-        """Call `hear` with each message of a topic."""
-        self._listeners[topic] = hear
-        self.send({"op": "subscribe", "topic": topic})
+    def listen(self, topic: str, hear: Callable[[Message], object]) -> Callable[[], None]:
+        """Call `hear` with each message of a topic; what ends that for all who listen to it."""
+        if topic not in self._listeners:
+            self.send({"op": "subscribe", "topic": topic})
+        self._listeners[topic] = (*self._listeners.get(topic, ()), hear)
+
+        def ignore() -> None:
+            del self._listeners[topic]
+            self.send({"op": "unsubscribe", "topic": topic})
+
+        return ignore
 
     def insist(self, message: Message) -> bool:
         """Send a message over another connection, again and again for a while; whether that was possible."""
@@ -115,8 +122,9 @@ class Connection:
                 self._version.put(ros)
             case {"op": "service_response", "id": "version"}:
                 self._version.put(1)
-            case {"op": "publish", "topic": str(topic), "msg": dict(told)} if topic in self._listeners:
-                self._listeners[topic](told)
+            case {"op": "publish", "topic": str(topic), "msg": dict(told)}:
+                for hear in self._listeners.get(topic, ()):
+                    hear(told)
             case {"op": "status", "level": "error", "msg": str(complaint)}:
                 self.complaint = complaint
         for update in (*self.protocol.updates(message), *service_updates(message)):

@@ -117,10 +117,10 @@ class Ros2Protocol:
 def service_updates(message: Message) -> Iterator[GoalUpdate]:
     """The news in the answer of a service."""
     match message:
-        case {"op": "service_response", "id": str(goal), "result": True, "values": dict(values)}:
-            yield GoalUpdate(goal, "ended", "succeeded", values=values)
-        case {"op": "service_response", "id": str(goal), "values": why}:
-            yield GoalUpdate(goal, "ended", "aborted", text=str(why))
+        case {"op": "service_response", "id": str(goal), "result": True, **more}:  # values may be left out
+            yield GoalUpdate(goal, "ended", "succeeded", values=more.get("values") or {})
+        case {"op": "service_response", "id": str(goal), **more}:
+            yield GoalUpdate(goal, "ended", "aborted", text=str(more.get("values", "")))
 
 
 ActionProtocol: TypeAlias = Ros1Protocol | Ros2Protocol

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
+from message_types import parts_of
 from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
 from rosbridge_protocol import GoalUpdate
 
@@ -22,6 +23,9 @@ class RosbridgeServer:
         self.type: str = action["type"]
         self.kind: str = action["kind"]
         self._connection = connection
+        self._since = time.monotonic()
+        if self.kind == "topic":
+            connection.send({"op": "advertise", "topic": self.name, "type": "/".join(parts_of(self.type))})
 
     @property
     def heard(self) -> float:
@@ -31,15 +35,18 @@ class RosbridgeServer:
         return time.monotonic()
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether no result of a goal would be lost."""
+        """Whether no result of a goal, and no message, would be lost."""
         if self._connection.is_lost:
             return False
+        if self.kind == "topic":
+            return time.monotonic() - self._since > SETTLES
         is_heard = self._connection.protocol.has_status and self.kind == "action"
         return not is_heard or self.name in self._connection.settled
 
     def cancel(self, goal: str = "") -> None:
         """Cancel one goal, or all goals of all clients."""
-        self._connection.send(self._connection.protocol.cancel(self.name, goal))
+        if self.kind == "action":
+            self._connection.send(self._connection.protocol.cancel(self.name, goal))
 
 
 class RosbridgeWorker(SkillWorker):
@@ -65,9 +72,12 @@ class RosbridgeWorker(SkillWorker):
         self._again = 0.0
         return False
 
-    def listen(self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True) -> None:  # noqa: ARG002 - nobody knows whether it is there
-        """Call `hear` with each message of a topic as plain data."""
-        self.graph.listen(topic, hear)
+    def listen(
+        self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True
+    ) -> Callable[[], object]:
+        """Call `hear` with each message of a topic as plain data; what ends that."""
+        del is_needed  # nobody knows whether it is there
+        return self.graph.listen(topic, hear)
 
     def missing(self) -> dict[str, str]:
         """Nothing: servers are seen only when their skills are performed."""
@@ -99,13 +109,11 @@ class RosbridgeWorker(SkillWorker):
     def _send_other(self, goal: Goal, fields: Message) -> None:
         """Perform what cannot be cancelled."""
         goal.sent, goal.is_acknowledged = time.monotonic(), True
-        name, kind = goal.server.name, goal.server.type
+        name, kind = goal.server.name, "/".join(parts_of(goal.server.type))
         if goal.server.kind == "service":
             call = {"op": "call_service", "id": goal.handle, "service": name, "type": kind, "args": fields}
             self.graph.send(call)
         else:
-            self.graph.send({"op": "advertise", "topic": name, "type": kind})
-            time.sleep(SETTLES)  # for those who listen to connect
             self.graph.send({"op": "publish", "topic": name, "msg": fields})
             self.end(goal, "result", values={})
 
@@ -148,7 +156,8 @@ class RosbridgeWorker(SkillWorker):
         goal = self.goal
         if goal is not None and goal.sent is not None and not goal.is_over:
             where = self.graph.address
-            if self.graph.insist(self.graph.protocol.cancel(goal.server.name, goal.handle)):
+            cancel = self.graph.protocol.cancel(goal.server.name, goal.handle)
+            if goal.server.kind == "action" and self.graph.insist(cancel):
                 text = f"the connection with {where} was lost; its goal was cancelled over another one"
             else:
                 text = f"the connection with {where} was lost, and its goal goes on: STOP THE ROBOT BY HAND"

@@ -1,4 +1,4 @@
-"""Action servers of a virtual robot or a camera: `python3 servers.py`, run by a Python that has rospy.
+"""Action servers of a virtual robot: `python3 servers.py`, run by a Python that has rospy.
 
 Goals and cancels are passed to the tool, which decides how each goal ends.
 """
@@ -13,15 +13,13 @@ from typing import Any
 from channel import Channel, Message, SetupError, serve
 from graph import Ros1Graph, no_master
 from message_types import message_types
-from pictures import PictureTopic, Ros1Camera
 
 
 class ActionServers:
     """One action server for each skill, and a master if none answers.
 
     The first line has the `node`, the `actions` by skill, and the `port` on which a master may be started, or
-    null. It may have the topic of a `camera` whose last picture can be asked for, and `show`: whether the
-    servers have topics for what they see.
+    null.
     """
 
     def __init__(self, channel: Channel, start: Message) -> None:
@@ -32,8 +30,6 @@ class ActionServers:
         self.master = None if self.graph.is_online() else started_master(start["port"], self.graph.uri)
         self.graph.enter()
         self.handles: dict[str, Any] = {}
-        self.topics: dict[str, PictureTopic] = {}
-        self.camera = Ros1Camera(start["camera"]) if start.get("camera") else None
         self.lock = threading.Lock()
         specs = message_types(list(start["actions"].values()))
         self.servers: list[Any] = []
@@ -43,20 +39,12 @@ class ActionServers:
             )
             server.start()
             self.servers.append(server)
-            if start.get("show"):
-                self.topics[skill] = PictureTopic(action["server"])
         channel.send("ready", has_master=self.master is not None)
 
     def obey(self, line: Message) -> None:
-        """End a goal, or look at the camera."""
-        if line["do"] == "look":
-            assert self.camera is not None, "there is no camera"
-            self.channel.send("image", **self.camera.look(line["oldest"]))
-            return
+        """End a goal."""
         with self.lock:
             handle = self.handles.pop(line["id"])
-        if "picture" in line:
-            self.topics[line["skill"]].show(line["picture"])
         result = handle.get_default_result()
         if line["do"] == "succeed":
             if result.__slots__:
