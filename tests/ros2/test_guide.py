@@ -59,20 +59,28 @@ def test_the_server_of_the_page_does_what_it_must(
     monkeypatch.setenv("PYTHONPATH", installed("robot_actions_pkg", {"GoTo": GO_TO.ros.definition}))
     code = next(block for block in blocks(ROS2, "python") if "rclpy" in block)
     script = tmp_path / "server.py"
-    script.write_text(code.replace("rclpy.spin(", "print('[\"ready\"]', flush=True)\nrclpy.spin("))
+    for line, said in {
+        "rclpy.spin(": "ready",
+        "    for _ in": "drives",
+        "            goal.canceled()": "stops",
+    }.items():
+        indent = line[: len(line) - len(line.lstrip())]
+        code = code.replace(f"\n{line}", f"\n{indent}print('[\"{said}\"]', flush=True)\n{line}")
+    script.write_text(code)
     server = Process(script, python=ROS2_PYTHON)
     try:
         server.expect("ready")
         robot = scene.robot(skills=SkillTable((GO_TO,)))
         robot.connect()
         robot.perform("go_to", ["kitchen"])
+        server.expect("drives")
         with pytest.raises(RobotError) as error:
             robot.perform("go_to", ["moon"])
         assert error.value.kind == "GoToInvalidLocation"
         with started(lambda: robot.perform("go_to", ["hallway"])) as ended:
-            while robot._number != 3:
-                pass
+            server.expect("drives")
             robot.cancel()
+            server.expect("stops")
         assert isinstance(ended["error"], CancelledError)
     finally:
         server.process.kill()
