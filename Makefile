@@ -165,7 +165,7 @@ bench: $(VENV)/installed $(ROS2_VENV)-kilted/made
 	$(BIN)/python bench/rules.py
 	$(BIN)/python bench/reward.py
 	$(BIN)/python bench/report.py
-	$(BIN)/python bench/stop.py
+	ROS2_PYTHON="$(abspath $(ROS2_VENV))-kilted/bin/python" $(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
 	ROS2_PYTHON="$(abspath $(ROS2_VENV))-kilted/bin/python" $(BIN)/python bench/ros2.py
 	$(BIN)/python bench/page.py

@@ -6,7 +6,9 @@ the robot was told (`cancel` is called; on ROS until the action server had heard
 had ended.
 """
 
+import json
 import os
+import queue
 import signal
 import socket
 import subprocess
@@ -14,10 +16,11 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, events_of
 from codebotler.missions.mission import Mission
@@ -25,13 +28,25 @@ from codebotler.robots.base import Argument, CancelledError, Feedback, Options, 
 from codebotler.robots.open import all_readiness, open_robot
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
+from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.ros2 import NEEDS, python_of
 from codebotler.robots.ros.virtual import VirtualRobot
+from codebotler.robots.ros.worker import WORKERS, lacks
 from codebotler.robots.simulated import Simulated
 
 STOPS = int(os.environ.get("STOPS", "50"))
 AIM = 100.0
 PROGRAM = "def task_program():\n    go_to('far away')\n"
 WORLD = World((Room("here", stand_at=(0.0, 0.0)), Room("far away", stand_at=(1e5, 0.0))), "here")
+TESTS = Path(__file__).parents[1] / "tests" / "ros2"
+ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or python_of())
+NAV2 = """
+places: places.yaml
+packages: [{packages}]
+velocity: {{topic: /odom}}
+skills:
+  go_to: {{action: /navigate_to_pose, type: nav2_msgs/action/NavigateToPose, goal: {{pose: $place}}}}
+"""
 Times = tuple[float, float]
 """Until the robot was told, and until it had ended what it did, in milliseconds."""
 
@@ -175,6 +190,41 @@ def by_pyrobosim(home: Path) -> Iterator[Times]:
         yield 1000 * told_after, 1000 * (times["cancelled"]["time"] - asked)
 
 
+def by_nav2(home: Path) -> Iterator[Times]:
+    """Stop missions of a robot that a file connects, with a stand-in for Nav2 that says what it hears."""
+    stand_in, packages = TESTS / "nav2_stand_in.py", TESTS / "nav2_msgs"
+    path = home / "robot.yaml"
+    path.write_text(NAV2.format(packages=packages))
+    (home / "places.yaml").write_text("places: {far away: {x: 9, y: 9}}\n")
+    options = Options(ros_python=ROS2_PYTHON, skills=SKILLS, connection=read_connection(path, SKILLS))
+    with subprocess.Popen(
+        [str(ROS2_PYTHON), str(stand_in), str(WORKERS)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as server:
+        assert server.stdout is not None
+        assert server.stdin is not None
+        heard = {name: queue.SimpleQueue[float]() for name in ("ready", "goal", "cancel", "ended")}
+        drives = threading.Event()
+
+        def read(lines: Iterable[str]) -> None:
+            for line in lines:
+                what = json.loads(line)[0]
+                if what in heard:
+                    heard[what].put(time.perf_counter())
+                if what == "goal":
+                    drives.set()
+
+        threading.Thread(target=read, args=(server.stdout,), daemon=True).start()
+        heard["ready"].get()
+        for _ in range(STOPS):
+            drives.clear()
+            start = stopped(open_robot("ros2", options), home, drives)
+            yield tuple(1000 * (heard[name].get() - start) for name in ("cancel", "ended"))  # type: ignore[misc]
+        server.stdin.close()
+
+
 def report(name: str, times: Sequence[Times]) -> bool:
     """Print the worst and the middle; whether the worst is as aimed at."""
     told, ended = [time for time, _ in times], [time for _, time in times]
@@ -195,7 +245,8 @@ def main() -> int:
             report("simulated, Ctrl-C", list(by_signal(home))),
         ]
         works = {kind.name: kind.works for kind in all_readiness()}
-        for name, rows in (("ros1", by_ros1), ("pyrobosim", by_pyrobosim)):
+        works |= {"nav2": lacks(ROS2_PYTHON, NEEDS) == []}
+        for name, rows in (("ros1", by_ros1), ("pyrobosim", by_pyrobosim), ("nav2", by_nav2)):
             if works[name]:
                 hold.append(report(f"{name}, Mission.stop", list(rows(home))))
             else:
