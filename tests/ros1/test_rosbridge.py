@@ -121,9 +121,9 @@ def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: RosRobot) ->
 
 def test_server_that_sends_no_result_is_noticed(graph: Graph, double: Bridge) -> None:
     graph.serve(GO_TO)
-    robot = behind(double.address, Waits(patience=2.0))
+    robot = behind(double.address, Waits(patience=4.0))
     robot.connect()
-    with pytest.raises(RobotLostError, match=r"/go_to_server .*no result .*2 s"):
+    with pytest.raises(RobotLostError, match=r"/go_to_server .*no result .*4 s"):
         robot.perform("go_to", ["no result"])
     robot.disconnect()
 
