@@ -244,6 +244,7 @@ class _Build:
     def __init__(self, package: str, work: Path, shares: dict[str, Path], needed: list[str]) -> None:
         self.package, self.work, self.shares, self.needed = package, work, shares, needed
         self.made = work / "made" / package
+        self.introspection = work / "introspection" / package  # other files of the same names
         self.prefixes = {shares[name].parents[1] for name in needed}
 
     def make(self, definitions: Definitions) -> None:
@@ -270,14 +271,12 @@ class _Build:
     def _generate(self, definitions: Definitions) -> None:
         from rosidl_adapter import convert_to_idl
         from rosidl_adapter.parser import InvalidSpecification
-        from rosidl_generator_c import generate_c
-        from rosidl_generator_py import generate_py
-        from rosidl_generator_type_description import generate_type_hash
-        from rosidl_typesupport_c import generate_c as generate_typesupport_c
-        from rosidl_typesupport_fastrtps_c import generate_typesupport_fastrtps_c
-        from rosidl_typesupport_introspection_c import generate_c as generate_introspection_c
+        from rosidl_generator_c.cli import GenerateC
+        from rosidl_generator_py.cli import GeneratePython
+        from rosidl_typesupport_c.cli import GenerateCTypesupport
+        from rosidl_typesupport_fastrtps_c.cli import GenerateFastRTPSCTypesupport
+        from rosidl_typesupport_introspection_c.cli import GenerateIntrospectionCTypesupport
 
-        sources = []
         for name, text in definitions.items():
             source = self.work / f"{name}.{name.partition('/')[0]}"
             source.parent.mkdir(exist_ok=True)
@@ -286,43 +285,16 @@ class _Build:
                 convert_to_idl(self.work, self.package, source.relative_to(self.work), self.made)
             except InvalidSpecification as error:
                 raise SetupError(f"{self.package}/{name} is not a ROS 2 definition: {error}") from None
-            sources.append(str(source))
-        self.names = sorted(definitions)
-        includes = [f"{name}:{self.shares[name]}" for name in self.needed]
-        generate_type_hash(self._arguments("generator_type_description", include_paths=includes))
-        hashes = [f"{name}.idl:{self.made / name}.json" for name in self.names]
-        generate_c(
-            self._arguments("generator_c", type_description_tuples=hashes, ros_interface_files=sources)
-        )
-        generate_typesupport_fastrtps_c(self._arguments("typesupport_fastrtps_c"))
-        generate_typesupport_c(self._arguments("typesupport_c"), list(SUPPORTS))
-        generate_introspection_c(
-            self._arguments(
-                "typesupport_introspection_c", output_dir=str(self.work / "introspection" / self.package)
-            )
-        )
-        generate_py(self._arguments("generator_py"), ["rosidl_typesupport_c"])
-        for generator in ("generator_c", "typesupport_fastrtps_c", "typesupport_introspection_c"):
-            header = f"rosidl_{generator}__visibility_control.h"
-            text = (self.shares["rosidl_" + generator] / "resource" / f"{header}.in").read_text()
-            text = text.replace("@PROJECT_NAME@", self.package)
-            (self.made / "msg" / header).write_text(
-                text.replace("@PROJECT_NAME_UPPER@", self.package.upper())
-            )
-
-    def _arguments(self, generator: str, **more: Any) -> str:
-        """A file of arguments, as the generators read them."""
-        arguments = {
-            "package_name": self.package,
-            "output_dir": str(self.made),
-            "template_dir": str(self.shares["rosidl_" + generator] / "resource"),
-            "idl_tuples": [f"{self.made}:{name}.idl" for name in self.names],
-            "target_dependencies": [],
-            **more,
-        }
-        path = self.work / f"{generator}.json"
-        path.write_text(json.dumps(arguments))
-        return str(path)
+        files = [f"{self.made}:{name}.idl" for name in sorted(definitions)]
+        includes = [str(self.shares[name]) for name in self.needed]
+        for generator, folder in (
+            (GenerateC("c"), self.made),
+            (GenerateFastRTPSCTypesupport("fastrtps_c"), self.made),
+            (GenerateCTypesupport("c", typesupport_implementations=list(SUPPORTS)), self.made),
+            (GenerateIntrospectionCTypesupport("introspection_c"), self.introspection),
+            (GeneratePython("py", typesupport_implementations=["rosidl_typesupport_c"]), self.made),
+        ):
+            generator.generate(self.package, files, includes, output_path=folder)
 
     def _units(self) -> Iterator[Path]:
         """What is compiled: one file for all of a language, but for descriptions, whose names collide."""
@@ -338,7 +310,7 @@ class _Build:
         from numpy import get_include
 
         headers = [prefix / "include" for prefix in self.prefixes]
-        folders = [self.work / "made", self.work / "introspection", *headers, Path(get_include())]
+        folders = [self.made.parent, self.introspection.parent, *headers, Path(get_include())]
         folders += [Path(sysconfig.get_paths()["include"])]
         folders += [path for each in headers for path in each.iterdir() if (path / path.name).is_dir()]
         done = self.work / (unit.name + ".o")
