@@ -11,7 +11,7 @@ from typing import Any
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
-from message_types import as_data, installed, message_types, parts_of, type_of_sender
+from message_types import as_data, installed, made, message_types, parts_of
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
 
@@ -129,7 +129,7 @@ def subscribed(topic: str, hear: Callable[[Message], object]) -> Any:
         header = message._connection_header
         kind = header["type"]
         if kind not in known:
-            known[kind] = type_of_sender(kind, header["message_definition"])
+            known[kind] = made(kind, header["message_definition"])
         hear(as_data(known[kind]().deserialize(message._buff)))
 
     return rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
