@@ -9,14 +9,14 @@ from collections.abc import Callable
 from typing import Any
 
 from channel import Message, SetupError, serve
-from goals import Goal, SkillWorker
+from goals import ENDS_ROS1, Goal, Server, SkillWorker
 from graph import Ros1Graph
 from message_types import as_data, installed, made, message_types, parts_of
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
 
 
-class Ros1Server:
+class Ros1Server(Server):
     """The action server of one skill, seen from a client."""
 
     def __init__(self, action: Message, spec: Any, see: Callable[[Any, Any], None]) -> None:
@@ -24,17 +24,20 @@ class Ros1Server:
         import actionlib_msgs.msg
         import rospy
 
-        self.name: str = action["server"]
-        self.type: str = action["type"]
+        super().__init__(action)
         self.client = actionlib.ActionClient(self.name, spec)
         self.message = type(spec().action_goal.goal)
-        self.heard = 0.0  # when its last status came, by the monotonic clock
+        self._heard = 0.0
         self._node: str | None = None
         self._results: Any = None  # the connection that brings them
         self._since = 0.0
         topic = rospy.remap_name(self.name)
         self._status = rospy.Subscriber(f"{topic}/status", actionlib_msgs.msg.GoalStatusArray, self._hear)
         self._pictures = subscribed(f"{topic}/picture", lambda message: see(self, message["data"]))
+
+    def heard(self) -> float:
+        """When its last status came, by the monotonic clock."""
+        return self._heard
 
     def shows_pictures(self) -> bool:
         """Whether anything publishes what it sees."""
@@ -43,7 +46,7 @@ class Ros1Server:
     def is_connected(self, silence: float) -> bool:
         """Whether goals reach it and its results reach us."""
         client, node = self.client, self._node
-        if node is None or time.monotonic() - self.heard > silence:
+        if node is None or time.monotonic() - self._heard > silence:
             return False
         results, feedback = (
             next((c for c in subscriber.impl.connections if c.callerid_pub == node), None)
@@ -64,15 +67,16 @@ class Ros1Server:
         self.client.pub_cancel.publish(actionlib_msgs.msg.GoalID(id=goal_id))
 
     def _hear(self, status: Any) -> None:
-        self.heard = time.monotonic()
+        self._heard = time.monotonic()
         self._node = status._connection_header["callerid"]
 
 
-class Ros1Service:
+class Ros1Service(Server):
     """A service that performs a skill; what it does cannot be cancelled."""
 
     def __init__(self, graph: Ros1Graph, call: Message) -> None:
-        self.graph, self.name, self.type = graph, call["server"], call["type"]
+        super().__init__(call)
+        self.graph = graph
         self._open(*parts_of(self.type))
 
     def _open(self, package: str, name: str) -> None:
@@ -82,17 +86,9 @@ class Ros1Service:
         self.message = spec._request_class
         self.client = rospy.ServiceProxy(self.name, spec)
 
-    @property
-    def heard(self) -> float:
-        """Now: a service that dies ends its call."""
-        return time.monotonic()
-
     def is_connected(self, _silence: float) -> bool:
         """Whether it is there."""
         return self.graph.has_service(self.name)
-
-    def cancel(self) -> None:
-        """Nothing."""
 
     def perform(self, message: Any) -> Message:
         """Call it, and return its answer."""
@@ -201,29 +197,20 @@ class Ros1Worker(SkillWorker):
             goal.status_ended = time.monotonic()
         if state != CommState.DONE:
             return
-        terminal = handle.get_terminal_state()
+        terminal, text = handle.get_terminal_state(), handle.get_goal_status_text()
         if terminal == TerminalState.LOST:
-            self.end(goal, "lost", text=f"{goal.server.name} no longer knows its goal; was it restarted?")
-        elif goal.cancelled is not None:
-            self.end(goal, "cancelled")
-        elif terminal == TerminalState.SUCCEEDED:
-            self.succeed(goal, as_data(handle.get_result()))
-        elif terminal in (TerminalState.ABORTED, TerminalState.REJECTED):
-            state_name = "rejected" if terminal == TerminalState.REJECTED else "aborted"
-            values = as_data(handle.get_result())
-            self.end(goal, "error", state=state_name, text=handle.get_goal_status_text(), values=values)
-        else:
-            self.end(goal, "cancelled")
+            text = f"{goal.server.name} no longer knows its goal; was it restarted?"
+        self.finish(goal, ENDS_ROS1[terminal], as_data(handle.get_result()), text)
 
     def _perform(self, goal: Goal, message: Any) -> None:
         """Perform what cannot be cancelled."""
         import rospy
 
         try:
-            self.finish(goal, goal.server.perform(message))
+            self.finish(goal, "succeeded", goal.server.perform(message))
         except rospy.ServiceException as error:
             if "responded with an error" in str(error):
-                self.end(goal, "error", state="aborted", text=str(error))
+                self.finish(goal, "aborted", {}, str(error))
             else:
                 self.end(goal, "lost", text=f"the service {goal.server.name} has died: {error}")
 
