@@ -1,4 +1,4 @@
-"""ROS 1 message types, built in memory if their packages are not installed."""
+"""ROS 1 message types, built in memory if their packages are not installed, and messages as JSON."""
 
 from __future__ import annotations
 
@@ -45,11 +45,16 @@ def installed(package: str, kind: str, name: str) -> Any:
 
 
 def as_data(value: Any) -> Any:
-    """A message of ROS 1 or the value of a field as JSON has it, with bytes in base64."""
+    """A message of ROS 1 or 2, or the value of a field, as JSON has it, with bytes in base64."""
     if hasattr(value, "__slots__"):
-        return {name: as_data(getattr(value, name)) for name in value.__slots__}
-    if isinstance(value, bytes):
-        return in_base64(value)
+        names = getattr(
+            value, "get_fields_and_field_types", lambda: value.__slots__
+        )()  # slots of ROS 2 differ
+        return {name: as_data(getattr(value, name)) for name in names}
+    if isinstance(value, bytes) or getattr(value, "typecode", "") == "B":
+        return base64.b64encode(bytes(value)).decode()
+    if hasattr(value, "tolist"):  # an array of numbers
+        return value.tolist()
     return [as_data(each) for each in value] if isinstance(value, (list, tuple)) else value
 
 
@@ -71,11 +76,6 @@ def made(kind: str, text: str) -> Any:
     spec = generate_dynamic(kind, text)[kind]
     shutil.rmtree(Path(str(sys.modules[spec.__module__].__file__)).parent)  # our end leaves no time for that
     return spec
-
-
-def in_base64(data: Any) -> str:
-    """Bytes of a message as JSON can hold them."""
-    return base64.b64encode(bytes(data)).decode()
 
 
 def action_type(package: str, name: str, definition: str) -> Any:

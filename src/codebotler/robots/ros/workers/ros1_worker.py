@@ -88,7 +88,7 @@ class Ros1Service(Server):
 
     def is_connected(self, _silence: float) -> bool:
         """Whether it is there."""
-        return self.graph.has_service(self.name)
+        return bool(self.graph.nodes_of(self.name))
 
     def perform(self, message: Any) -> Message:
         """Call it, and return its answer."""

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from channel import SetupError
-from message_types import offer_of, parts_of
-from ros2_types import as_data, message_types
+from message_types import as_data, offer_of, parts_of
+from ros2_types import message_types
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive

@@ -1,4 +1,4 @@
-"""ROS 2 types, generated and compiled once if their packages are not installed, and messages as JSON."""
+"""ROS 2 types, generated and compiled once if their packages are not installed, and messages from JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Sequence
 
 from channel import Message, SetupError
-from message_types import in_base64, parts_of
+from message_types import parts_of
 
 NEEDED = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
 """The packages whose messages are part of each action."""
@@ -97,17 +97,6 @@ def fields_of(definition: str) -> list[list[str]]:
     """Return the names of the fields of goal, result and feedback."""
     parts = (definition + "\n").split("---\n")
     return [[line.split()[1] for line in part.splitlines() if line.strip()] for part in parts]
-
-
-def as_data(value: Any) -> Any:
-    """Return a message, or the value of one of its fields, as JSON has it; bytes are in base64."""
-    if hasattr(value, "get_fields_and_field_types"):
-        return {name: as_data(getattr(value, name)) for name in value.get_fields_and_field_types()}
-    if isinstance(value, bytes) or getattr(value, "typecode", "") == "B":
-        return in_base64(value)
-    if hasattr(value, "tolist"):  # an array of numbers
-        return value.tolist()
-    return [as_data(each) for each in value] if isinstance(value, list) else value
 
 
 def fill(message: Any, values: Message, where: str = "") -> Any:
@@ -252,12 +241,12 @@ class _Build:
         (self.made / "__init__.py").write_text(PRELOADS.format(package=self.package, supports=SUPPORTS))
         self._generate(definitions)
         module = f"{self.package}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
-        objects = [self._compiled(unit) for unit in list(self._units())]
+        includes = [argument for folder in self._includes() for argument in ("-I", str(folder))]
         libraries = [f"-l{name}__rosidl_{kind}" for name in self.needed for kind in GENERATORS[1:]]
         self._run(
-            "c++", "-shared", "-s", "-Wl,--allow-shlib-undefined", f"-Wl,-soname,{module}", "-o",
-            str(self.made / module), *objects, "-Wl,--no-as-needed",
-            *(f"-L{prefix / 'lib'}" for prefix in self.prefixes), *libraries
+            "cc", "-shared", "-s", "-fPIC", "-O0", "-w", *includes, *map(str, list(self._units())), "-o",
+            str(self.made / module), f"-Wl,--allow-shlib-undefined,-soname,{module},--no-as-needed",
+            *(f"-L{prefix / 'lib'}" for prefix in self.prefixes), *libraries, "-lstdc++"
         )  # fmt: skip
         libraries = [f"lib{self.package}__{support}.so" for support in SUPPORTS]
         for library in libraries:  # empty, but leads to all symbols of the module
@@ -306,17 +295,13 @@ class _Build:
             yield unit
             yield from (path for path in files if path not in together)
 
-    def _compiled(self, unit: Path) -> str:
+    def _includes(self) -> list[Path]:
         from numpy import get_include
 
         headers = [prefix / "include" for prefix in self.prefixes]
-        folders = [self.made.parent, self.introspection.parent, *headers, Path(get_include())]
-        folders += [Path(sysconfig.get_paths()["include"])]
-        folders += [path for each in headers for path in each.iterdir() if (path / path.name).is_dir()]
-        done = self.work / (unit.name + ".o")
-        includes = [argument for path in folders for argument in ("-I", str(path))]
-        self._run(COMPILERS[unit.suffix], "-c", "-fPIC", "-O0", "-w", *includes, str(unit), "-o", str(done))
-        return str(done)
+        of_packages = [path for each in headers for path in each.iterdir() if (path / path.name).is_dir()]
+        ours, python = [self.made.parent, self.introspection.parent], sysconfig.get_paths()["include"]
+        return [*ours, *headers, *of_packages, Path(python), Path(get_include())]
 
     def _run(self, *command: str) -> None:
         done = subprocess.run(  # noqa: S603 - the compiler, on what was generated

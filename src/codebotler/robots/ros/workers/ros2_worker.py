@@ -10,8 +10,9 @@ from typing import Any
 
 from channel import Message, SetupError, serve
 from goals import ENDS_ROS2, TICK, Goal, Server, SkillWorker
+from message_types import as_data
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, as_data, fill, message_types
+from ros2_types import action_types, fill, message_types
 
 KEEPOUT = ("nav_msgs/msg/OccupancyGrid", "nav2_msgs/msg/CostmapFilterInfo")
 REJECTED = 1  # of action_msgs/srv/CancelGoal
@@ -26,7 +27,7 @@ class Ros2Goal:
 
     def __init__(self) -> None:
         self.uuid = list(uuid.uuid4().bytes)  # chosen here, so that it can be cancelled before it is accepted
-        self.is_sent = self.is_accepted = self.is_cancelling = False
+        self.is_sent = self.is_cancelling = False
         self.asked = 0.0  # when its result was asked for
 
 
@@ -234,7 +235,7 @@ class Ros2Worker(SkillWorker):
         goal.handle.is_sent = True
         goal.server.client.send_goal_async(
             message,
-            feedback_callback=lambda m: self._feedback(goal, m.feedback),
+            feedback_callback=lambda m: self.pass_on(goal, as_data(m.feedback)),
             goal_uuid=UUID(uuid=goal.handle.uuid),
         ).add_done_callback(lambda done: self._accepted(goal, done.result()))
 
@@ -258,9 +259,8 @@ class Ros2Worker(SkillWorker):
                 goal.status_ended = time.monotonic()
 
     def _accept(self, goal: Goal) -> None:
-        goal.is_acknowledged = True
-        if not goal.handle.is_accepted:
-            goal.handle.is_accepted = True
+        if not goal.is_acknowledged:
+            goal.is_acknowledged = True
             self._ask_result(goal)
 
     def _ask_result(self, goal: Goal) -> None:
@@ -289,9 +289,6 @@ class Ros2Worker(SkillWorker):
             self.end(goal, "lost", text=why)
         else:
             self.finish(goal, ENDS_ROS2.get(response.status, "cancelled"), as_data(response.result))
-
-    def _feedback(self, goal: Goal, feedback: Any) -> None:
-        self.pass_on(goal, as_data(feedback))
 
 
 def _check(message: Any, fields: Message) -> None:
