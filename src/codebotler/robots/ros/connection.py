@@ -132,7 +132,15 @@ def _action_of(skill: Skill) -> Call:
     request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
     result = "" if ros.result is None else "result"
     failure = ros.failure or f"{ros.type}Failed"
-    return Call("action", ros.server, ros.full_type, request, ros.definition, result, failure=failure)
+    return Call(
+        "action",
+        ros.server,
+        f"{ros.package}/action/{ros.type}",
+        request,
+        ros.definition,
+        result,
+        failure=failure,
+    )
 
 
 # --- fields of messages

@@ -210,9 +210,7 @@ class RosRobot:
             "keepout": here.keepout or [],
             "cancel_all": cancel_all,
             "sign": str(file_of(self.name, self.address, f"{self._node}.goal")),
-            "patience": self._waits.patience,
-            "silence": self._waits.silence,
-            "longest": self._waits.longest,
+            **vars(self._waits),
         }
         return RosWorker(self._python, self._script, start, self._environment)
 

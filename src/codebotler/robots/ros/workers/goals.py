@@ -91,6 +91,7 @@ class SkillWorker:
         self.goal: Goal | None = None
         self._sign = Path(start["sign"])
         left_behind = self.connect(start) or self._sign.exists()
+        self._listen(start)
         missing = self.missing()
         if self.graph.is_left():
             raise SetupError(self.graph.why_left())

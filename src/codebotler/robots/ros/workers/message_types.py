@@ -65,8 +65,8 @@ def parts_of(kind: str) -> tuple[str, str]:
 
 
 def offer_of(kind: str) -> str:
-    """What a robot has that takes a type, which is an action's if it does not say."""
-    return OFFERS[kind.split("/")[1]] if kind.count("/") > 1 else OFFERS["action"]
+    """What a robot has that takes a type, such as std_srvs/srv/Trigger."""
+    return OFFERS[kind.split("/")[1]]
 
 
 def made(kind: str, text: str) -> Any:

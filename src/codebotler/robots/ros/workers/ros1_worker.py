@@ -19,12 +19,13 @@ SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells
 class Ros1Server(Server):
     """The action server of one skill, seen from a client."""
 
-    def __init__(self, action: Message, spec: Any, see: Callable[[Any, Any], None]) -> None:
+    def __init__(self, worker: Ros1Worker, action: Message) -> None:
         import actionlib
         import actionlib_msgs.msg
         import rospy
 
         super().__init__(action)
+        spec = message_types([action])[self.type]
         self.client = actionlib.ActionClient(self.name, spec)
         self.message = type(spec().action_goal.goal)
         self._heard = 0.0
@@ -33,7 +34,7 @@ class Ros1Server(Server):
         self._since = 0.0
         topic = rospy.remap_name(self.name)
         self._status = rospy.Subscriber(f"{topic}/status", actionlib_msgs.msg.GoalStatusArray, self._hear)
-        self._pictures = subscribed(f"{topic}/picture", lambda message: see(self, message["data"]))
+        self._pictures = subscribed(f"{topic}/picture", lambda message: worker.see(self, message["data"]))
 
     def heard(self) -> float:
         """When its last status came, by the monotonic clock."""
@@ -74,14 +75,12 @@ class Ros1Server(Server):
 class Ros1Service(Server):
     """A service that performs a skill; what it does cannot be cancelled."""
 
-    def __init__(self, graph: Ros1Graph, call: Message) -> None:
-        super().__init__(call)
-        self.graph = graph
-        self._open(*parts_of(self.type))
-
-    def _open(self, package: str, name: str) -> None:
+    def __init__(self, worker: Ros1Worker, call: Message) -> None:
         import rospy
 
+        super().__init__(call)
+        self.graph = worker.graph
+        package, name = parts_of(self.type)
         spec = installed(package, "srv", name)
         self.message = spec._request_class
         self.client = rospy.ServiceProxy(self.name, spec)
@@ -96,12 +95,14 @@ class Ros1Service(Server):
         return answer
 
 
-class Ros1Topic(Ros1Service):
+class Ros1Topic(Server):
     """A topic whose messages perform a skill, as far as anybody can know."""
 
-    def _open(self, package: str, name: str) -> None:
+    def __init__(self, _worker: Ros1Worker, call: Message) -> None:
         import rospy
 
+        super().__init__(call)
+        package, name = parts_of(self.type)
         self.message = installed(package, "msg", name)
         self.publisher = rospy.Publisher(self.name, self.message, queue_size=10)
 
@@ -131,27 +132,22 @@ def subscribed(topic: str, hear: Callable[[Message], object]) -> Any:
     return rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
 
 
-OTHERS = {"service": Ros1Service, "topic": Ros1Topic}
+KINDS = {"action": Ros1Server, "service": Ros1Service, "topic": Ros1Topic}
 
 
 class Ros1Worker(SkillWorker):
     """Performs skills over ROS 1."""
 
+    graph: Ros1Graph
+
     def connect(self, start: Message) -> bool:
         """Register our node, and subscribe to all servers."""
         import rospy
 
-        graph, calls = Ros1Graph(start["node"]), start["calls"]
-        self.graph, left_behind = graph, graph.enter()
+        self.graph = Ros1Graph(start["node"])
+        left_behind = self.graph.enter()
         rospy.on_shutdown(self.stop)
-        specs = message_types([call for call in calls.values() if call["kind"] == "action"])
-        self.servers = {
-            skill: Ros1Server(call, specs[call["type"]], self.see)
-            if call["kind"] == "action"
-            else OTHERS[call["kind"]](graph, call)
-            for skill, call in calls.items()
-        }
-        self._listen(start)
+        self.servers = {skill: KINDS[call["kind"]](self, call) for skill, call in start["calls"].items()}
         return left_behind
 
     def listen(

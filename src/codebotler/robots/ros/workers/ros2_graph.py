@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from channel import SetupError
-from message_types import as_data, offer_of, parts_of
+from message_types import as_data, offer_of
 from ros2_types import message_types
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
@@ -83,9 +83,8 @@ class Ros2Graph:
 
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with what a robot offers."""
-        whole = type_name if type_name.count("/") > 1 else "/action/".join(parts_of(type_name))
         return (
-            f"there is no {offer_of(whole)} of {whole} at {server}; start it, or compare "
+            f"there is no {offer_of(type_name)} of {type_name} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 

@@ -145,7 +145,6 @@ class Ros2Worker(SkillWorker):
         self.servers = {
             skill: KINDS[call["kind"]](self, call, specs[call["type"]]) for skill, call in calls.items()
         }
-        self._listen(start)
         qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._latched = {
             topic: (self.graph.ours.create_publisher(specs[kind], topic, qos), specs[kind])

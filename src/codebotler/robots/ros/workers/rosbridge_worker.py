@@ -65,7 +65,6 @@ class RosbridgeWorker(SkillWorker):
                 "or name another with --address"
             ) from None
         self.servers = {skill: RosbridgeServer(self.graph, call) for skill, call in calls.items()}
-        self._listen(start)
         self._message: Message = {}
         self._again = 0.0
         return False
