@@ -28,7 +28,7 @@ def message_types(actions: list[Message]) -> dict[str, Any]:
     for action in actions:
         package, name = parts_of(action["type"])
         try:
-            found[action["type"]] = installed(package, "msg", name + "Action")
+            found[action["type"]] = installed(f"{package}/{name}Action", "msg")
         except SetupError:
             if not action["definition"]:
                 raise
@@ -36,8 +36,9 @@ def message_types(actions: list[Message]) -> dict[str, Any]:
     return found
 
 
-def installed(package: str, kind: str, name: str) -> Any:
-    """A message or service of an installed package, or a SetupError."""
+def installed(whole: str, kind: str) -> Any:
+    """A type of an installed package by its name and kind, msg or srv, or a SetupError."""
+    package, name = parts_of(whole)
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name)
     except (ImportError, AttributeError):

@@ -11,7 +11,7 @@ from typing import Any
 from channel import Message, SetupError, serve
 from goals import ENDS_ROS1, Goal, Server, SkillWorker
 from graph import Ros1Graph
-from message_types import as_data, installed, made, message_types, parts_of
+from message_types import as_data, installed, made, message_types
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
 
@@ -80,8 +80,7 @@ class Ros1Service(Server):
 
         super().__init__(call)
         self.graph = worker.graph
-        package, name = parts_of(self.type)
-        spec = installed(package, "srv", name)
+        spec = installed(self.type, "srv")
         self.message = spec._request_class
         self.client = rospy.ServiceProxy(self.name, spec)
 
@@ -102,8 +101,7 @@ class Ros1Topic(Server):
         import rospy
 
         super().__init__(call)
-        package, name = parts_of(self.type)
-        self.message = installed(package, "msg", name)
+        self.message = installed(self.type, "msg")
         self.publisher = rospy.Publisher(self.name, self.message, queue_size=10)
 
     def is_connected(self, _silence: float) -> bool:

@@ -27,7 +27,7 @@ class Ros2Goal:
 
     def __init__(self) -> None:
         self.uuid = list(uuid.uuid4().bytes)  # chosen here, so that it can be cancelled before it is accepted
-        self.is_sent = self.is_cancelling = False
+        self.is_cancelling = False
         self.asked = 0.0  # when its result was asked for
 
 
@@ -147,7 +147,7 @@ class Ros2Worker(SkillWorker):
         }
         qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._latched = {
-            topic: (self.graph.ours.create_publisher(specs[kind], topic, qos), specs[kind])
+            topic: self.graph.ours.create_publisher(specs[kind], topic, qos)
             for topic, kind in latched.items()
         }
         self.graph.spin()
@@ -155,8 +155,8 @@ class Ros2Worker(SkillWorker):
 
     def publish(self, topic: str, fields: Message) -> None:
         """Publish the last message of a topic, also for those who come later."""
-        publisher, spec = self._latched[topic]
-        self.graph.soon(publisher.publish, fill(spec(), fields))
+        publisher = self._latched[topic]
+        self.graph.soon(publisher.publish, fill(publisher.msg_type(), fields))
 
     def cancel_all(self) -> bool:
         """Cancel all goals of all clients; whether all servers that are there have confirmed it."""
@@ -231,7 +231,6 @@ class Ros2Worker(SkillWorker):
         if goal.cancelled is not None:
             self.end(goal, "cancelled")
             return
-        goal.handle.is_sent = True
         goal.server.client.send_goal_async(
             message,
             feedback_callback=lambda m: self.pass_on(goal, as_data(m.feedback)),
@@ -273,8 +272,6 @@ class Ros2Worker(SkillWorker):
         client._get_result_async(handle).add_done_callback(lambda done: self._done(goal, done.result()))
 
     def _cancel(self, goal: Goal) -> None:
-        if not goal.handle.is_sent:
-            return  # it never will be
         answer = goal.server.ask_to_cancel(goal.handle.uuid)
         answer.add_done_callback(lambda done: self._cancelling(goal, done.result()))
 
