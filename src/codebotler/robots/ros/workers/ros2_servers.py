@@ -11,7 +11,7 @@ from typing import Any
 from channel import Channel, Message, serve
 from message_types import as_data
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, fill
+from ros2_types import fill, message_types
 
 TAKEN = "there is another virtual robot (the node {}); stop it first"
 
@@ -25,7 +25,8 @@ class Ros2ActionServers:
         self.channel = channel
         self.ends: dict[str, Any] = {}  # futures by goal
         actions = start["actions"]
-        specs = action_types(list(actions.values()), lambda text: channel.send("progress", text=text))
+        texts = {action["type"]: action["definition"] for action in actions.values()}
+        specs = message_types([*texts], [], lambda text: channel.send("progress", text=text), actions=texts)
         self.graph = Ros2Graph(start["node"], TAKEN)
         self.graph.enter()
         self.servers = [

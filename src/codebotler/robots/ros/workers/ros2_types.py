@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Sequence
 
 from channel import Message, SetupError
-from message_types import parts_of
 
 NEEDED = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
 """The packages whose messages are part of each action."""
@@ -45,52 +44,43 @@ Tell = Callable[[str], object]
 Definitions = Dict[str, str]  # by kind and name, such as action/GoTo
 
 
-def message_types(names: list[str], folders: Iterable[Path], tell: Tell = lambda _: None) -> dict[str, Any]:
+def message_types(
+    names: Sequence[str],
+    folders: Iterable[Path],
+    tell: Tell = lambda _: None,
+    *,
+    actions: Definitions | None = None,
+) -> dict[str, Any]:
     """Return the Python class of each message, service and action, by names such as std_msgs/msg/String.
 
     Args:
         names: all that a process needs, since a package that is built has nothing else.
         folders: packages to build where they are not installed, with their name and action/, msg/ or srv/.
         tell: called with a sentence before a step that takes long.
+        actions: texts of .action files by names; what is installed must have the same fields.
 
     Raises:
-        SetupError: a package or a definition is missing, or cannot be built.
+        SetupError: a package or a definition is missing, differs, or cannot be built.
     """
-    sources = {folder.name: folder for folder in folders}
-    wanted: dict[str, list[str]] = {}
+    sources, texts = {folder.name: folder for folder in folders}, actions or {}
+    wanted: dict[str, Definitions] = {}
     for name in names:
         package, _, kind = name.partition("/")
         if kind.count("/") != 1:
             raise SetupError(f"{name} is not the name of a ROS 2 type; write PACKAGE/msg/NAME, srv or action")
-        wanted.setdefault(package, []).append(kind)
-    for package, kinds in wanted.items():
-        if not _is_installed(package):
+        wanted.setdefault(package, {})[kind] = texts.get(name, "")
+    for package, definitions in wanted.items():
+        if _is_installed(package):
+            continue
+        if not all(definitions.values()):
             if package not in sources:
                 raise SetupError(
                     f"the ROS 2 package {package} is not installed; source it, or list its folder in packages"
                 )
-            _install(package, _definitions(sources[package], kinds), tell)
-    return {name: _class(name) for name in names}
-
-
-def action_types(actions: list[Message], tell: Tell = lambda _: None) -> dict[str, Any]:
-    """Return action types by their `type`, from rows with this and the `definition` of an .action file.
-
-    Args:
-        actions: what a robot offers.
-        tell: called with a sentence before a step that takes long.
-
-    Raises:
-        SetupError: an installed package differs, or one that is missing cannot be built.
-    """
-    packages: dict[str, Definitions] = {}
-    for action in actions:
-        package, name = parts_of(action["type"])
-        packages.setdefault(package, {})[f"action/{name}"] = action["definition"]
-    for package, definitions in packages.items():
-        if not _is_installed(package):
-            _install(package, definitions, tell)
-    return {action["type"]: _checked(action["type"], action["definition"]) for action in actions}
+            definitions.update(_definitions(sources[package], [*definitions]))
+        sys.path.insert(0, str(built(package, definitions, tell)))
+        importlib.invalidate_caches()
+    return {name: _checked(name, texts[name]) if name in texts else _class(name) for name in names}
 
 
 def fields_of(definition: str) -> list[list[str]]:
@@ -140,11 +130,6 @@ def _is_installed(package: str) -> bool:
     return spec is not None and spec.origin is not None  # a folder of definitions on the path has none
 
 
-def _install(package: str, definitions: Definitions, tell: Tell) -> None:
-    sys.path.insert(0, str(built(package, definitions, tell)))
-    importlib.invalidate_caches()
-
-
 def _definitions(folder: Path, wanted: list[str]) -> Definitions:
     """Return the texts of what is wanted of a package, and of the messages of its own that this uses."""
     found: Definitions = {}
@@ -171,14 +156,13 @@ def _class(name: str) -> Any:
         ) from None
 
 
-def _checked(kind: str, definition: str) -> Any:
-    package, name = parts_of(kind)
-    spec = _class(f"{package}/action/{name}")
+def _checked(name: str, definition: str) -> Any:
+    spec = _class(name)
     for part, fields in zip((spec.Goal, spec.Result), fields_of(definition)):
         installed = list(part.get_fields_and_field_types())
         if installed != fields:
             raise SetupError(
-                f"{package}/action/{name} has the fields {', '.join(installed) or 'none'}, "
+                f"{name} has the fields {', '.join(installed) or 'none'}, "
                 f"but {', '.join(fields) or 'none'} are needed; build it again"
             )
     return spec

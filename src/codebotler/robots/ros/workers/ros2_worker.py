@@ -12,7 +12,7 @@ from channel import Message, SetupError, serve
 from goals import ENDS_ROS2, TICK, Goal, Server, SkillWorker
 from message_types import as_data
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, fill, message_types
+from ros2_types import fill, message_types
 
 KEEPOUT = ("nav_msgs/msg/OccupancyGrid", "nav2_msgs/msg/CostmapFilterInfo")
 REJECTED = 1  # of action_msgs/srv/CancelGoal
@@ -135,11 +135,10 @@ class Ros2Worker(SkillWorker):
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         calls, self._packages = start["calls"], start["packages"]
-        given = [call for call in calls.values() if call["definition"]]
         latched = dict(zip(start["keepout"], KEEPOUT))
-        names = [call["type"] for call in calls.values() if not call["definition"]] + list(latched.values())
-        specs = action_types(given, self._tell)
-        specs.update(message_types(names, map(Path, self._packages), self._tell))
+        names = [*(call["type"] for call in calls.values()), *latched.values()]
+        actions = {call["type"]: call["definition"] for call in calls.values() if call["definition"]}
+        specs = message_types(names, map(Path, self._packages), self._tell, actions=actions)
         self.graph = Ros2Graph(start["node"])
         left_behind = self.graph.enter()
         self.servers = {
