@@ -53,7 +53,11 @@ class Scene:
     def serve(self, *skills: Skill) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
         self.served.extend(skill for skill in skills if skill not in self.served)
-        actions = [[s.ros.full_type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
+        actions = [
+            [f"{s.ros.package}/action/{s.ros.type}", s.ros.server, s.ros.definition]
+            for s in skills
+            if s.ros is not None
+        ]
         return self.serve_as(actions)
 
     def serve_as(self, actions: list[list[str]]) -> Process:

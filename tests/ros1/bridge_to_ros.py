@@ -41,7 +41,7 @@ def type_of(kind: str, types: dict[str, Any], folder: str = "msg") -> Any:
     if kind in types:
         return types[kind]
     try:
-        return installed(kind.partition("/")[0], folder, kind.partition("/")[2])
+        return installed(kind, folder)
     except SetupError:
         tell(op="status", level="error", msg=f"Unable to import {kind}")
         return None

@@ -139,8 +139,12 @@ def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
 INSTALLED = """
 import sys
 sys.path.insert(0, {worker!r})
-from message_types import build
-build(sys.modules[__name__], {name!r}, {definition!r})
+from message_types import action_type
+action = action_type("robot_actions_pkg", {name!r}, {definition!r})()
+wholes = (action.action_goal, action.action_result, action.action_feedback)
+parts = (action.action_goal.goal, action.action_result.result, action.action_feedback.feedback)
+for part in (action, *wholes, *parts):
+    globals()[part._type.partition("/")[2]] = type(part)
 """
 
 

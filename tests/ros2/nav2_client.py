@@ -23,7 +23,8 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from ros2_types import as_data, message_types
+from message_types import as_data
+from ros2_types import message_types
 
 HERE = Path(__file__).parent
 NAVIGATE, FILTER = "nav2_msgs/action/NavigateToPose", "nav2_msgs/msg/CostmapFilterInfo"

@@ -18,7 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from ros2_types import action_types, fields_of
+from ros2_types import fields_of, message_types
 
 REFUSES = "never, whatever you say"
 NEVER = ("never", REFUSES, "late", "slow", "by somebody else")
@@ -98,7 +98,8 @@ class Server:
 
 rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
 node = rclpy.create_node(f"servers_{os.getpid()}")
-SPECS = action_types([{"type": kind, "definition": text} for kind, _, text in actions])
+TEXTS = {kind: text for kind, _, text in actions}
+SPECS = message_types([*TEXTS], [], actions=TEXTS)
 servers = [Server(*action) for action in actions]
 executor = SingleThreadedExecutor()
 executor.add_node(node)

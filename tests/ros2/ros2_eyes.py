@@ -15,9 +15,9 @@ from rclpy.executors import MultiThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import CompressedImage
 
-from ros2_types import action_types
+from ros2_types import message_types
 
-KIND = "robot_actions_pkg/IsInRoom"
+KIND = "robot_actions_pkg/action/IsInRoom"
 
 
 def show(size: int) -> None:
@@ -48,7 +48,7 @@ def look(handle: Any) -> Any:
 
 rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
 node = rclpy.create_node(f"eyes_{os.getpid()}")
-spec = action_types([{"type": KIND, "definition": json.loads(sys.argv[2])}])[KIND]
+spec = message_types([KIND], [], actions={KIND: json.loads(sys.argv[2])})[KIND]
 pictures = node.create_publisher(CompressedImage, "/is_in_room_server/picture", 4)
 server = rclpy.action.ActionServer(
     node, spec, "/is_in_room_server", look, cancel_callback=lambda _: rclpy.action.CancelResponse.ACCEPT

@@ -275,7 +275,7 @@ def test_installed_package_is_preferred_and_its_feedback_is_told(
     assert GO_TO.ros is not None
     definition = "string location\n---\n---\nstring near\n"
     monkeypatch.setenv("PYTHONPATH", installed("robot_actions_pkg", {"GoTo": definition}))
-    scene.serve_as([["GoTo", "/go_to_server", definition]])
+    scene.serve_as([["robot_actions_pkg/action/GoTo", "/go_to_server", definition]])
     robot = scene.robot(skills=SkillTable((GO_TO,)))
     robot.connect()
     told: list[str | Picture] = []

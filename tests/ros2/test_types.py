@@ -18,7 +18,8 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from channel import SetupError
 from rclpy.serialization import deserialize_message, serialize_message
-from ros2_types import as_data, fill, message_types
+from message_types import as_data
+from ros2_types import fill, message_types
 
 names, folders, fillings = json.loads(sys.argv[2])
 try:

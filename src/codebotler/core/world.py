@@ -158,14 +158,11 @@ _ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact i
 def is_within(point: Point, corners: Sequence[Point]) -> bool:
     """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
     x, y = point
-    odd = False
     size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
-    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
-            return True
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
-            odd = not odd
-    return odd
+    edges = zip(corners, [*corners[1:], corners[0]], strict=True)
+    if any(_distance(point, *edge) <= _ON_EDGE * size for edge in edges):
+        return True
+    return sum(x < crossing for crossing in crossings(y, corners)) % 2 == 1
 
 
 def _distance(point: Point, start: Point, end: Point) -> float:

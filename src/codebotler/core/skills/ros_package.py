@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
 
-VERSION = "1.0.0"
 PACKAGE_XML = """\
 <?xml version="1.0"?>
 <package format="3">
   <name>{package}</name>
-  <version>{version}</version>
+  <version>1.0.0</version>
   <description>Actions of a robot's skills.</description>
   <maintainer email="robot@example.com">The makers of the robot</maintainer>
   <license>MIT</license>
@@ -56,7 +55,11 @@ def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
         if skill.ros is not None:
             actions = packages.setdefault(skill.ros.package, {})
             actions[f"action/{skill.ros.type}.action"] = skill.ros.definition
-    return {package: dict(_files(package, actions)) for package, actions in packages.items()}
+    for package, files in packages.items():
+        names = "\n".join(f'  "{name}"' for name in sorted(files))
+        files["package.xml"] = PACKAGE_XML.format(package=package)
+        files["CMakeLists.txt"] = CMAKE.format(package=package, files=names)
+    return packages
 
 
 def write_ros_packages(skills: SkillTable, folder: Path) -> list[Path]:
@@ -79,10 +82,3 @@ def write_ros_packages(skills: SkillTable, folder: Path) -> list[Path]:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
     return [folder / package for package in packages]
-
-
-def _files(package: str, actions: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    names = sorted(actions)
-    yield "package.xml", PACKAGE_XML.format(package=package, version=VERSION)
-    yield "CMakeLists.txt", CMAKE.format(package=package, files="\n".join(f'  "{name}"' for name in names))
-    yield from ((name, actions[name]) for name in names)

@@ -71,11 +71,6 @@ class RosAction:
     package: str = PACKAGE
 
     @property
-    def full_type(self) -> str:
-        """Its name, with the package if that is another one."""
-        return self.type if self.package == PACKAGE else f"{self.package}/{self.type}"
-
-    @property
     def definition(self) -> str:
         """The text of its .action file; names and order decide whether robots understand it."""
         result = "" if self.result is None else f"{self.result} result\n"

@@ -23,6 +23,7 @@ from codebotler.robots.base import (
     no_feedback,
 )
 from codebotler.robots.places import Place, Places
+from codebotler.robots.ros.connection import Call
 from codebotler.robots.ros.keepout import keepout
 from codebotler.robots.ros.motion import Pose
 from codebotler.robots.ros.robot import RosRobot, Waits
@@ -155,13 +156,8 @@ class ConnectedRobot(RosRobot):
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
         """Look for something in a camera's next picture, unless the robot is stopped."""
-        until = time.monotonic() + self._waits.patience
-        order = {"do": "look", "topic": topic, "is_new": True}
-        while "none" in (seen := self._awaited(order, no_feedback)["values"]):
-            if time.monotonic() > until:
-                raise RobotError("IsInRoomFailed", seen["none"])
-            time.sleep(BEAT)
-            order["is_new"] = False
+        call = Call("topic", topic, "", failure="IsInRoomFailed")
+        seen = self._received(call, {"do": "look", "topic": topic}, no_feedback)
         found, detector = Future[tuple[bool, bytes]](), self._detectors[model]
 
         def look() -> None:
@@ -179,7 +175,7 @@ class ConnectedRobot(RosRobot):
         try:
             is_there, picture = found.result()
         except (UserError, PerceptionError) as error:
-            raise RobotError("IsInRoomFailed", str(error)) from None
+            raise RobotError(call.failure, str(error)) from None
         feedback(Picture(picture))
         return is_there
 

@@ -132,7 +132,15 @@ def _action_of(skill: Skill) -> Call:
     request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
     result = "" if ros.result is None else "result"
     failure = ros.failure or f"{ros.type}Failed"
-    return Call("action", ros.server, ros.full_type, request, ros.definition, result, failure=failure)
+    return Call(
+        "action",
+        ros.server,
+        f"{ros.package}/action/{ros.type}",
+        request,
+        ros.definition,
+        result,
+        failure=failure,
+    )
 
 
 # --- fields of messages
@@ -163,16 +171,9 @@ def _put(fields: dict[str, Any], path: str, value: Any) -> None:  # noqa: ANN401
         fields[first] = value
 
 
-def variables_in(request: Any) -> set[str]:  # noqa: ANN401 - as in a message
+def variables_in(request: Values) -> set[str]:
     """The names of the variables in what is sent."""
-    match request:
-        case dict():
-            return {name for value in request.values() for name in variables_in(value)}
-        case list():
-            return {name for value in request for name in variables_in(value)}
-        case str():
-            return set(VARIABLE.findall(request))
-    return set()
+    return set(VARIABLE.findall(str(request)))
 
 
 def _at(received: Any, path: str) -> Any:  # noqa: ANN401 - as in a message

@@ -10,16 +10,14 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import NotReadyError
 from codebotler.robots.ros import ros1, ros2
+from codebotler.robots.ros.connection import connection_of
 from codebotler.robots.ros.worker import RosWorker
 
 
 def _own_actions() -> Iterator[tuple[str, str, str, str]]:
-    for skill in SKILLS.rows:
-        assert skill.ros is not None, "all of them have an action"
-        names = [field.split()[1] for field in skill.ros.goal]
-        goal = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
-        text = f"{ACTION}{goal}{', result: result' if skill.ros.result else ''}".replace("'", "")
-        yield rf"action \S+ {skill.ros.package}/{skill.ros.type}", skill.name, text, ""
+    for skill, call in connection_of(SKILLS).calls.items():
+        text = f"{ACTION}{call.request}{', result: result' if call.result else ''}".replace("'", "")
+        yield rf"action \S+ {call.type.replace('/action/', '/')}", skill, text, ""
 
 
 ACTION, SERVICE = "action: NAME, type: TYPE, goal: ", "service: NAME, type: TYPE, request: "

@@ -121,9 +121,22 @@ class RosRobot:
         call = self.connection.calls.get(skill)
         if call is None:
             raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
-        return self._result(
-            call, self._awaited({"do": "perform", "skill": skill, "fields": call.fields(values)}, feedback)
-        )
+        order = {"do": "perform", "skill": skill, "fields": call.fields(values)}
+        result: Result = call.answer(self._received(call, order, feedback))
+        return result
+
+    def _received(self, call: Call, order: Message, feedback: Feedback) -> Values:
+        """Send an order to perform a call, and return what the robot answers."""
+        message = self._awaited(order, feedback)
+        match message:
+            case {"is": "result", "values": dict(values)}:
+                return values
+            case {"is": "error", "text": str(text), "state": str(state)}:
+                raise error_of(call, text or call.why(message.get("values", {})), state)
+            case {"is": "cancelled"}:
+                raise CancelledError
+        self._in_doubt = self._in_doubt or message["is"] == "lost"
+        raise RobotLostError(message["text"])
 
     def _awaited(self, order: Message, feedback: Feedback) -> Message:
         """Send an order, and return the worker's last message about it."""
@@ -186,30 +199,20 @@ class RosRobot:
             self._in_doubt = True
 
     def _start(self, *, cancel_all: bool) -> RosWorker:
-        start = {
+        here = self.connection
+        start: Message = {
             "address": self.address,
             "node": self._node,
-            "calls": calls_data(self.connection),
-            **reports_data(self.connection),
+            "calls": calls_data(here),
+            "packages": here.packages,
+            "pose": here.pose and vars(here.pose),
+            "velocity": here.velocity and vars(here.velocity),
+            "keepout": here.keepout or [],
             "cancel_all": cancel_all,
             "sign": str(file_of(self.name, self.address, f"{self._node}.goal")),
-            "patience": self._waits.patience,
-            "silence": self._waits.silence,
-            "longest": self._waits.longest,
+            **vars(self._waits),
         }
         return RosWorker(self._python, self._script, start, self._environment)
-
-    def _result(self, call: Call, message: Message) -> Result:
-        match message:
-            case {"is": "result", "values": dict(values)}:
-                result: Result = call.answer(values)
-                return result
-            case {"is": "error", "text": str(text), "state": str(state)}:
-                raise error_of(call, text or call.why(message.get("values", {})), state)
-            case {"is": "cancelled"}:
-                raise CancelledError
-        self._in_doubt = self._in_doubt or message["is"] == "lost"
-        raise RobotLostError(message["text"])
 
     def _rescue(self, worker: RosWorker) -> str:
         """Replace a lost worker by one that cancels all goals; the outcome as a clause."""
@@ -256,17 +259,6 @@ def calls_data(connection: Connection) -> Message:
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()
-    }
-
-
-def reports_data(connection: Connection) -> Message:
-    """What a worker must listen to besides."""
-    return {
-        "packages": connection.packages,
-        "pose": connection.pose and vars(connection.pose),
-        "velocity": connection.velocity and vars(connection.velocity),
-        "keepout": connection.keepout or [],
-        "cameras": sorted({topic for topic, _ in connection.cameras.values()}),
     }
 
 

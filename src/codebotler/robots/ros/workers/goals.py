@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from channel import Channel, Message, SetupError
-from pictures import Camera
 from reports import MotionReports
 
 TICK = 0.1  # seconds between two rounds of the watchdog
@@ -19,6 +18,12 @@ TELLS_AGAIN = 0.5  # seconds between two feedbacks that are passed on
 LAST_WORDS = 1.0  # seconds for a cancelled goal to end when the worker does
 LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
 LARGEST_PICTURE = 2_000_000  # bytes
+
+ENDS_ROS1 = {2: "cancelled", 3: "succeeded", 4: "aborted", 5: "rejected", 8: "cancelled", 9: "lost"}
+"""How a goal ended, by the status of actionlib_msgs/GoalStatus."""
+
+ENDS_ROS2 = {4: "succeeded", 5: "cancelled", 6: "aborted"}
+"""How a goal ended, by the status of action_msgs/msg/GoalStatus."""
 
 
 class Goal:
@@ -44,12 +49,33 @@ class Goal:
                 self.stop()
 
 
+class Server:
+    """What performs one skill, seen from a client; what it does need not be possible to cancel."""
+
+    has_cancelled = True  # as far as it can
+
+    def __init__(self, call: Message) -> None:
+        self.name: str = call["server"]
+        self.type: str = call["type"]
+
+    def heard(self) -> float:
+        """When it last gave a sign of life, by the monotonic clock; now, if its death shows otherwise."""
+        return time.monotonic()
+
+    def shows_pictures(self) -> bool:
+        """Whether anything publishes what it sees."""
+        return False
+
+    def cancel(self) -> None:
+        """Cancel all goals of all clients."""
+
+
 class SkillWorker:
     """Performs skills, one at a time; `connect` and `send` belong to one kind of robot.
 
     The first line has the `address`, the `node`, the `calls` by skill, folders of `packages`, the topics of
-    the `pose`, the `velocity`, the `cameras` and `keepout`, whether to `cancel_all` goals, the `sign`, a file
-    that is there while a goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
+    the `pose`, the `velocity` and `keepout`, whether to `cancel_all` goals, the `sign`, a file that is there
+    while a goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -63,9 +89,9 @@ class SkillWorker:
         self.silence: float = start["silence"]
         self.longest: float = start["longest"]
         self.goal: Goal | None = None
-        self.cameras = {topic: Camera(topic, self.listen) for topic in start["cameras"]}
         self._sign = Path(start["sign"])
         left_behind = self.connect(start) or self._sign.exists()
+        self._listen(start)
         missing = self.missing()
         if self.graph.is_left():
             raise SetupError(self.graph.why_left())
@@ -115,8 +141,9 @@ class SkillWorker:
             else:
                 threading.Thread(target=self._wait_and_send, args=(goal, line["fields"]), daemon=True).start()
         elif line["do"] == "look":
-            picture = self.cameras[line["topic"]].look(is_new=line["is_new"])
-            self.channel.send("result", id=line["id"], values=picture)
+            self.goal = looking = Goal(line["id"], None)
+            looking.stop = lambda: self.end(looking, "cancelled")
+            threading.Thread(target=self._look, args=(looking, line["topic"]), daemon=True).start()
         elif line["do"] == "publish":
             self.publish(line["topic"], line["fields"])
         elif line["do"] == "cancel":
@@ -139,7 +166,16 @@ class SkillWorker:
             time.sleep(TICK)  # ROS sends in threads of its own
 
     def missing(self) -> dict[str, str]:
-        """Why servers cannot be reached, by skill, after waiting for those that are on the graph."""
+        """Why servers cannot be reached, by skill."""
+        self.wait_for_servers()
+        return {
+            skill: self.graph.why_missing(server.name, server.type)
+            for skill, server in self.servers.items()
+            if not server.is_connected(self.silence)
+        }
+
+    def wait_for_servers(self) -> None:
+        """Wait for those that are on the graph."""
         until = time.monotonic() + self.patience
         awaited = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
         # Each is asked each time, since it settles from when it was first found connected.
@@ -147,11 +183,6 @@ class SkillWorker:
             if self.graph.is_left():
                 break
             time.sleep(0.005)
-        return {
-            skill: self.graph.why_missing(server.name, server.type)
-            for skill, server in self.servers.items()
-            if not server.is_connected(self.silence)
-        }
 
     def cancel_all(self) -> bool:
         """Cancel all goals of all clients; whether that is possible."""
@@ -191,12 +222,18 @@ class SkillWorker:
             goal.told = now
             self.channel.send("feedback", id=goal.number, text=text)
 
-    def finish(self, goal: Goal, values: Message) -> None:
-        """End what cannot be cancelled, with the fields of its answer."""
-        if goal.cancelled is None:
+    def finish(self, goal: Goal, state: str, values: Message, text: str = "") -> None:
+        """End a goal as its server says: succeeded, aborted, rejected, cancelled or lost."""
+        if state == "lost":
+            self.end(goal, "lost", text=text)
+        elif state == "cancelled" or goal.cancelled is not None:
+            self.end(goal, "cancelled")
+        elif state != "succeeded":
+            self.end(goal, "error", state=state, text=text, values=values)
+        elif goal.seen.is_set() or not goal.server.shows_pictures():
             self.end(goal, "result", values=values)
         else:
-            self.end(goal, "cancelled")
+            threading.Thread(target=self._end_with_picture, args=(goal, values), daemon=True).start()
 
     def see(self, server: Any, data: str) -> None:
         """Pass on a picture, in base64, that a server shows while its goal goes on."""
@@ -211,17 +248,28 @@ class SkillWorker:
             self.channel.send("picture", id=goal.number, data=data)
         goal.seen.set()
 
-    def succeed(self, goal: Goal, values: Message) -> None:
-        """End a goal, with its picture, which may come a moment after the result."""
-        if goal.seen.is_set() or not goal.server.shows_pictures():
-            self.end(goal, "result", values=values)
-            return
+    def _end_with_picture(self, goal: Goal, values: Message) -> None:
+        """End a goal when its picture has come, or has had its time."""
+        goal.seen.wait(LAST_PICTURE)
+        self.end(goal, "result", values=values)
 
-        def wait() -> None:
-            goal.seen.wait(LAST_PICTURE)
-            self.end(goal, "result", values=values)
-
-        threading.Thread(target=wait, daemon=True).start()
+    def _look(self, goal: Goal, topic: str) -> None:
+        """Send the next picture of a topic, which is listened to only meanwhile, since pictures are large."""
+        seen: list[Message] = []
+        ignore, until = None, time.monotonic() + self.patience
+        text = f"no picture has arrived on {topic}; is the camera's node running?"
+        try:
+            while not (seen or goal.is_over) and time.monotonic() < until:
+                ignore = ignore or self.listen(topic, seen.append, is_needed=False)
+                time.sleep(0.01)
+        except SetupError as error:
+            text = str(error)
+        if ignore is not None:
+            ignore()
+        if seen:
+            self.end(goal, "result", values=seen[0])
+        else:
+            self.end(goal, "error", state="aborted", text=text)
 
     def _listen(self, start: Message) -> None:
         """Listen to what tells where the robot is, and how fast it moves."""
@@ -268,7 +316,7 @@ class SkillWorker:
     def _fault(self, goal: Goal, sent: float, now: float) -> str | None:
         """Why a goal is not worth waiting for any longer."""
         server, late = goal.server.name, now - self.patience
-        if max(goal.server.heard, sent) < now - self.silence:
+        if max(goal.server.heard(), sent) < now - self.silence:
             why = self.silence_says or f"no status for {self.silence:g} s"
             return f"the action server at {server} has died: {why}"
         if goal.cancelled is not None and goal.cancelled < late:

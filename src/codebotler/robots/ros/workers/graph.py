@@ -94,13 +94,6 @@ class Ros1Graph:
         name = self._rosgraph.names.resolve_name(topic, self.node)
         return name in (one for one, _ in self._master.getSystemState()[0])
 
-    def has_service(self, name: str) -> bool:
-        """Whether a service is registered."""
-        try:
-            return bool(self._master.lookupService(name))
-        except self._rosgraph.MasterException:
-            return False
-
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with what a robot offers."""
         if not self.is_online():

@@ -9,32 +9,36 @@ from collections.abc import Callable
 from typing import Any
 
 from channel import Message, SetupError, serve
-from goals import Goal, SkillWorker
+from goals import ENDS_ROS1, Goal, Server, SkillWorker
 from graph import Ros1Graph
-from message_types import as_data, installed, message_types, parts_of, type_of_sender
+from message_types import as_data, installed, made, message_types
 
 SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
 
 
-class Ros1Server:
+class Ros1Server(Server):
     """The action server of one skill, seen from a client."""
 
-    def __init__(self, action: Message, spec: Any, see: Callable[[Any, Any], None]) -> None:
+    def __init__(self, worker: Ros1Worker, action: Message) -> None:
         import actionlib
         import actionlib_msgs.msg
         import rospy
 
-        self.name: str = action["server"]
-        self.type: str = action["type"]
+        super().__init__(action)
+        spec = message_types([action])[self.type]
         self.client = actionlib.ActionClient(self.name, spec)
         self.message = type(spec().action_goal.goal)
-        self.heard = 0.0  # when its last status came, by the monotonic clock
+        self._heard = 0.0
         self._node: str | None = None
         self._results: Any = None  # the connection that brings them
         self._since = 0.0
         topic = rospy.remap_name(self.name)
         self._status = rospy.Subscriber(f"{topic}/status", actionlib_msgs.msg.GoalStatusArray, self._hear)
-        self._pictures = subscribed(f"{topic}/picture", lambda message: see(self, message["data"]))
+        self._pictures = subscribed(f"{topic}/picture", lambda message: worker.see(self, message["data"]))
+
+    def heard(self) -> float:
+        """When its last status came, by the monotonic clock."""
+        return self._heard
 
     def shows_pictures(self) -> bool:
         """Whether anything publishes what it sees."""
@@ -43,7 +47,7 @@ class Ros1Server:
     def is_connected(self, silence: float) -> bool:
         """Whether goals reach it and its results reach us."""
         client, node = self.client, self._node
-        if node is None or time.monotonic() - self.heard > silence:
+        if node is None or time.monotonic() - self._heard > silence:
             return False
         results, feedback = (
             next((c for c in subscriber.impl.connections if c.callerid_pub == node), None)
@@ -64,35 +68,25 @@ class Ros1Server:
         self.client.pub_cancel.publish(actionlib_msgs.msg.GoalID(id=goal_id))
 
     def _hear(self, status: Any) -> None:
-        self.heard = time.monotonic()
+        self._heard = time.monotonic()
         self._node = status._connection_header["callerid"]
 
 
-class Ros1Service:
+class Ros1Service(Server):
     """A service that performs a skill; what it does cannot be cancelled."""
 
-    def __init__(self, graph: Ros1Graph, call: Message) -> None:
-        self.graph, self.name, self.type = graph, call["server"], call["type"]
-        self._open(*parts_of(self.type))
-
-    def _open(self, package: str, name: str) -> None:
+    def __init__(self, worker: Ros1Worker, call: Message) -> None:
         import rospy
 
-        spec = installed(package, "srv", name)
+        super().__init__(call)
+        self.graph = worker.graph
+        spec = installed(self.type, "srv")
         self.message = spec._request_class
         self.client = rospy.ServiceProxy(self.name, spec)
 
-    @property
-    def heard(self) -> float:
-        """Now: a service that dies ends its call."""
-        return time.monotonic()
-
     def is_connected(self, _silence: float) -> bool:
         """Whether it is there."""
-        return self.graph.has_service(self.name)
-
-    def cancel(self) -> None:
-        """Nothing."""
+        return bool(self.graph.nodes_of(self.name))
 
     def perform(self, message: Any) -> Message:
         """Call it, and return its answer."""
@@ -100,13 +94,14 @@ class Ros1Service:
         return answer
 
 
-class Ros1Topic(Ros1Service):
+class Ros1Topic(Server):
     """A topic whose messages perform a skill, as far as anybody can know."""
 
-    def _open(self, package: str, name: str) -> None:
+    def __init__(self, _worker: Ros1Worker, call: Message) -> None:
         import rospy
 
-        self.message = installed(package, "msg", name)
+        super().__init__(call)
+        self.message = installed(self.type, "msg")
         self.publisher = rospy.Publisher(self.name, self.message, queue_size=10)
 
     def is_connected(self, _silence: float) -> bool:
@@ -129,33 +124,28 @@ def subscribed(topic: str, hear: Callable[[Message], object]) -> Any:
         header = message._connection_header
         kind = header["type"]
         if kind not in known:
-            known[kind] = type_of_sender(kind, header["message_definition"])
+            known[kind] = made(kind, header["message_definition"])
         hear(as_data(known[kind]().deserialize(message._buff)))
 
     return rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=10)
 
 
-OTHERS = {"service": Ros1Service, "topic": Ros1Topic}
+KINDS = {"action": Ros1Server, "service": Ros1Service, "topic": Ros1Topic}
 
 
 class Ros1Worker(SkillWorker):
     """Performs skills over ROS 1."""
 
+    graph: Ros1Graph
+
     def connect(self, start: Message) -> bool:
         """Register our node, and subscribe to all servers."""
         import rospy
 
-        graph, calls = Ros1Graph(start["node"]), start["calls"]
-        self.graph, left_behind = graph, graph.enter()
+        self.graph = Ros1Graph(start["node"])
+        left_behind = self.graph.enter()
         rospy.on_shutdown(self.stop)
-        specs = message_types([call for call in calls.values() if call["kind"] == "action"])
-        self.servers = {
-            skill: Ros1Server(call, specs[call["type"]], self.see)
-            if call["kind"] == "action"
-            else OTHERS[call["kind"]](graph, call)
-            for skill, call in calls.items()
-        }
-        self._listen(start)
+        self.servers = {skill: KINDS[call["kind"]](self, call) for skill, call in start["calls"].items()}
         return left_behind
 
     def listen(
@@ -201,29 +191,20 @@ class Ros1Worker(SkillWorker):
             goal.status_ended = time.monotonic()
         if state != CommState.DONE:
             return
-        terminal = handle.get_terminal_state()
+        terminal, text = handle.get_terminal_state(), handle.get_goal_status_text()
         if terminal == TerminalState.LOST:
-            self.end(goal, "lost", text=f"{goal.server.name} no longer knows its goal; was it restarted?")
-        elif goal.cancelled is not None:
-            self.end(goal, "cancelled")
-        elif terminal == TerminalState.SUCCEEDED:
-            self.succeed(goal, as_data(handle.get_result()))
-        elif terminal in (TerminalState.ABORTED, TerminalState.REJECTED):
-            state_name = "rejected" if terminal == TerminalState.REJECTED else "aborted"
-            values = as_data(handle.get_result())
-            self.end(goal, "error", state=state_name, text=handle.get_goal_status_text(), values=values)
-        else:
-            self.end(goal, "cancelled")
+            text = f"{goal.server.name} no longer knows its goal; was it restarted?"
+        self.finish(goal, ENDS_ROS1[terminal], as_data(handle.get_result()), text)
 
     def _perform(self, goal: Goal, message: Any) -> None:
         """Perform what cannot be cancelled."""
         import rospy
 
         try:
-            self.finish(goal, goal.server.perform(message))
+            self.finish(goal, "succeeded", goal.server.perform(message))
         except rospy.ServiceException as error:
             if "responded with an error" in str(error):
-                self.end(goal, "error", state="aborted", text=str(error))
+                self.finish(goal, "aborted", {}, str(error))
             else:
                 self.end(goal, "lost", text=f"the service {goal.server.name} has died: {error}")
 

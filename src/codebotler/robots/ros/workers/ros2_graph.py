@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from channel import SetupError
-from message_types import offer_of, parts_of
-from ros2_types import as_data, message_types
+from message_types import as_data, offer_of
+from ros2_types import message_types
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
@@ -28,10 +28,11 @@ class Ros2Graph:
     def __init__(self, name: str, taken: str = TAKEN) -> None:
         import rclpy
         import rclpy.executors
+        from rclpy.signals import SignalHandlerOptions
 
         self._rclpy, self.node, self._taken = rclpy, name, taken
         self._is_left_behind = self._has_ended = False
-        rclpy.init(args=None, **_without_signals())
+        rclpy.init(args=None, signal_handler_options=SignalHandlerOptions.NO)  # the robot must stop first
 
     def enter(self) -> bool:
         """Start our node; whether an earlier one of its name had died without leaving.
@@ -82,9 +83,8 @@ class Ros2Graph:
 
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with what a robot offers."""
-        whole = type_name if type_name.count("/") > 1 else "/action/".join(parts_of(type_name))
         return (
-            f"there is no {offer_of(whole)} of {whole} at {server}; start it, or compare "
+            f"there is no {offer_of(type_name)} of {type_name} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
@@ -117,15 +117,12 @@ class Ros2Graph:
                     return None
                 raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
             time.sleep(0.05)
-        kind, durability = publishers[0].topic_type, publishers[0].qos_profile.durability
-        is_kept = (
-            durability == DurabilityPolicy.TRANSIENT_LOCAL
-        )  # the last message is sent to who comes later
-        qos = QoSProfile(
-            depth=10,
-            reliability=ReliabilityPolicy.RELIABLE if is_kept else ReliabilityPolicy.BEST_EFFORT,
-            durability=durability if is_kept else DurabilityPolicy.VOLATILE,
-        )
+        kind, offered = publishers[0].topic_type, publishers[0].qos_profile
+        qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+        if (
+            offered.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        ):  # the last message is sent to who comes later
+            qos = QoSProfile(depth=10, durability=offered.durability)
         spec = message_types([kind], map(Path, packages))[kind]
         made: list[Any] = []
 
@@ -134,22 +131,6 @@ class Ros2Graph:
 
         self.soon(subscribe)
         return lambda: self.soon(lambda: self.ours.destroy_subscription(made.pop()))
-
-    def latched(self, spec: Any, topic: str) -> Any:
-        """A publisher whose last message also those get who come later."""
-        from rclpy.qos import DurabilityPolicy, QoSProfile
-
-        return self.ours.create_publisher(
-            spec, topic, QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        )
-
-    def hear_statuses(self, server: str, hear: Callable[[str, Any], None]) -> None:
-        """Call `hear` with an action server's name and each list of statuses that it publishes."""
-        from action_msgs.msg import GoalStatusArray
-        from rclpy.qos import qos_profile_action_status_default as qos
-
-        topic = f"{server}/_action/status"
-        self.ours.create_subscription(GoalStatusArray, topic, lambda told: hear(server, told), qos)
 
     def _locked(self) -> socket.socket:
         """A socket that only one process of this machine can have, for as long as it lives."""
@@ -193,12 +174,3 @@ class Ros2Graph:
             return
         finally:
             self._has_ended = True
-
-
-def _without_signals() -> dict[str, Any]:
-    """Options that keep a recent rclpy from ending at a signal before the robot has stopped."""
-    try:
-        from rclpy.signals import SignalHandlerOptions
-    except ImportError:
-        return {}
-    return {"signal_handler_options": SignalHandlerOptions.NO}

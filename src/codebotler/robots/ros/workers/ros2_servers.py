@@ -9,8 +9,9 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from channel import Channel, Message, serve
+from message_types import as_data
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, as_data, fields_of, fill
+from ros2_types import fill, message_types
 
 TAKEN = "there is another virtual robot (the node {}); stop it first"
 
@@ -24,7 +25,8 @@ class Ros2ActionServers:
         self.channel = channel
         self.ends: dict[str, Any] = {}  # futures by goal
         actions = start["actions"]
-        specs = action_types(list(actions.values()), lambda text: channel.send("progress", text=text))
+        texts = {action["type"]: action["definition"] for action in actions.values()}
+        specs = message_types([*texts], [], lambda text: channel.send("progress", text=text), actions=texts)
         self.graph = Ros2Graph(start["node"], TAKEN)
         self.graph.enter()
         self.servers = [
@@ -32,7 +34,7 @@ class Ros2ActionServers:
                 self.graph.ours,
                 specs[action["type"]],
                 action["server"],
-                self._executor(skill, specs[action["type"]], action["definition"]),
+                self._executor(skill, specs[action["type"]]),
                 cancel_callback=self._cancel,
             )
             for skill, action in actions.items()
@@ -48,21 +50,18 @@ class Ros2ActionServers:
         """Leave the graph."""
         self.graph.leave()
 
-    def _executor(self, skill: str, spec: Any, definition: str) -> Callable[[Any], Awaitable[Any]]:
-        goals, results, _ = fields_of(definition)
-
+    def _executor(self, skill: str, spec: Any) -> Callable[[Any], Awaitable[Any]]:
         async def execute(handle: Any) -> Any:
             from rclpy.task import Future
 
             number = _number_of(handle)
             self.ends[number] = end = Future(executor=self.graph.executor)
-            arguments = [as_data(getattr(handle.request, field)) for field in goals]
+            arguments = [*as_data(handle.request).values()]
             self.channel.send("goal", id=number, skill=skill, arguments=arguments)
             line = await end
             result = spec.Result()
             if line["do"] == "succeed":
-                if results:
-                    fill(result, {results[0]: line["value"]})
+                fill(result, dict.fromkeys(result.get_fields_and_field_types(), line["value"]))
                 handle.succeed()
             elif line["do"] == "abort":
                 handle.abort()

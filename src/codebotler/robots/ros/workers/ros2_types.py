@@ -1,4 +1,4 @@
-"""ROS 2 types, generated and compiled once if their packages are not installed, and messages as JSON."""
+"""ROS 2 types, generated and compiled once if their packages are not installed, and messages from JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Sequence
 
 from channel import Message, SetupError
-from message_types import in_base64, parts_of
 
 NEEDED = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
 """The packages whose messages are part of each action."""
@@ -45,69 +44,49 @@ Tell = Callable[[str], object]
 Definitions = Dict[str, str]  # by kind and name, such as action/GoTo
 
 
-def message_types(names: list[str], folders: Iterable[Path], tell: Tell = lambda _: None) -> dict[str, Any]:
+def message_types(
+    names: Sequence[str],
+    folders: Iterable[Path],
+    tell: Tell = lambda _: None,
+    *,
+    actions: Definitions | None = None,
+) -> dict[str, Any]:
     """Return the Python class of each message, service and action, by names such as std_msgs/msg/String.
 
     Args:
         names: all that a process needs, since a package that is built has nothing else.
         folders: packages to build where they are not installed, with their name and action/, msg/ or srv/.
         tell: called with a sentence before a step that takes long.
+        actions: texts of .action files by names; what is installed must have the same fields.
 
     Raises:
-        SetupError: a package or a definition is missing, or cannot be built.
+        SetupError: a package or a definition is missing, differs, or cannot be built.
     """
-    sources = {folder.name: folder for folder in folders}
-    wanted: dict[str, list[str]] = {}
+    sources, texts = {folder.name: folder for folder in folders}, actions or {}
+    wanted: dict[str, Definitions] = {}
     for name in names:
         package, _, kind = name.partition("/")
         if kind.count("/") != 1:
             raise SetupError(f"{name} is not the name of a ROS 2 type; write PACKAGE/msg/NAME, srv or action")
-        wanted.setdefault(package, []).append(kind)
-    for package, kinds in wanted.items():
-        if not _is_installed(package):
+        wanted.setdefault(package, {})[kind] = texts.get(name, "")
+    for package, definitions in wanted.items():
+        if _is_installed(package):
+            continue
+        if not all(definitions.values()):
             if package not in sources:
                 raise SetupError(
                     f"the ROS 2 package {package} is not installed; source it, or list its folder in packages"
                 )
-            _install(package, _definitions(sources[package], kinds), tell)
-    return {name: _class(name) for name in names}
-
-
-def action_types(actions: list[Message], tell: Tell = lambda _: None) -> dict[str, Any]:
-    """Return action types by their `type`, from rows with this and the `definition` of an .action file.
-
-    Args:
-        actions: what a robot offers.
-        tell: called with a sentence before a step that takes long.
-
-    Raises:
-        SetupError: an installed package differs, or one that is missing cannot be built.
-    """
-    packages: dict[str, Definitions] = {}
-    for action in actions:
-        package, name = parts_of(action["type"])
-        packages.setdefault(package, {})[f"action/{name}"] = action["definition"]
-    for package, definitions in packages.items():
-        if not _is_installed(package):
-            _install(package, definitions, tell)
-    return {action["type"]: _checked(action["type"], action["definition"]) for action in actions}
+            definitions.update(_definitions(sources[package], [*definitions]))
+        sys.path.insert(0, str(built(package, definitions, tell)))
+        importlib.invalidate_caches()
+    return {name: _checked(name, texts[name]) if name in texts else _class(name) for name in names}
 
 
 def fields_of(definition: str) -> list[list[str]]:
     """Return the names of the fields of goal, result and feedback."""
     parts = (definition + "\n").split("---\n")
     return [[line.split()[1] for line in part.splitlines() if line.strip()] for part in parts]
-
-
-def as_data(value: Any) -> Any:
-    """Return a message, or the value of one of its fields, as JSON has it; bytes are in base64."""
-    if hasattr(value, "get_fields_and_field_types"):
-        return {name: as_data(getattr(value, name)) for name in value.get_fields_and_field_types()}
-    if isinstance(value, bytes) or getattr(value, "typecode", "") == "B":
-        return in_base64(value)
-    if hasattr(value, "tolist"):  # an array of numbers
-        return value.tolist()
-    return [as_data(each) for each in value] if isinstance(value, list) else value
 
 
 def fill(message: Any, values: Message, where: str = "") -> Any:
@@ -151,11 +130,6 @@ def _is_installed(package: str) -> bool:
     return spec is not None and spec.origin is not None  # a folder of definitions on the path has none
 
 
-def _install(package: str, definitions: Definitions, tell: Tell) -> None:
-    sys.path.insert(0, str(built(package, definitions, tell)))
-    importlib.invalidate_caches()
-
-
 def _definitions(folder: Path, wanted: list[str]) -> Definitions:
     """Return the texts of what is wanted of a package, and of the messages of its own that this uses."""
     found: Definitions = {}
@@ -182,14 +156,13 @@ def _class(name: str) -> Any:
         ) from None
 
 
-def _checked(kind: str, definition: str) -> Any:
-    package, name = parts_of(kind)
-    spec = _class(f"{package}/action/{name}")
+def _checked(name: str, definition: str) -> Any:
+    spec = _class(name)
     for part, fields in zip((spec.Goal, spec.Result), fields_of(definition)):
         installed = list(part.get_fields_and_field_types())
         if installed != fields:
             raise SetupError(
-                f"{package}/action/{name} has the fields {', '.join(installed) or 'none'}, "
+                f"{name} has the fields {', '.join(installed) or 'none'}, "
                 f"but {', '.join(fields) or 'none'} are needed; build it again"
             )
     return spec
@@ -244,6 +217,7 @@ class _Build:
     def __init__(self, package: str, work: Path, shares: dict[str, Path], needed: list[str]) -> None:
         self.package, self.work, self.shares, self.needed = package, work, shares, needed
         self.made = work / "made" / package
+        self.introspection = work / "introspection" / package  # other files of the same names
         self.prefixes = {shares[name].parents[1] for name in needed}
 
     def make(self, definitions: Definitions) -> None:
@@ -251,12 +225,12 @@ class _Build:
         (self.made / "__init__.py").write_text(PRELOADS.format(package=self.package, supports=SUPPORTS))
         self._generate(definitions)
         module = f"{self.package}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
-        objects = [self._compiled(unit) for unit in list(self._units())]
+        includes = [argument for folder in self._includes() for argument in ("-I", str(folder))]
         libraries = [f"-l{name}__rosidl_{kind}" for name in self.needed for kind in GENERATORS[1:]]
         self._run(
-            "c++", "-shared", "-s", "-Wl,--allow-shlib-undefined", f"-Wl,-soname,{module}", "-o",
-            str(self.made / module), *objects, "-Wl,--no-as-needed",
-            *(f"-L{prefix / 'lib'}" for prefix in self.prefixes), *libraries
+            "cc", "-shared", "-s", "-fPIC", "-O0", "-w", *includes, *map(str, list(self._units())), "-o",
+            str(self.made / module), f"-Wl,--allow-shlib-undefined,-soname,{module},--no-as-needed",
+            *(f"-L{prefix / 'lib'}" for prefix in self.prefixes), *libraries, "-lstdc++"
         )  # fmt: skip
         libraries = [f"lib{self.package}__{support}.so" for support in SUPPORTS]
         for library in libraries:  # empty, but leads to all symbols of the module
@@ -270,14 +244,12 @@ class _Build:
     def _generate(self, definitions: Definitions) -> None:
         from rosidl_adapter import convert_to_idl
         from rosidl_adapter.parser import InvalidSpecification
-        from rosidl_generator_c import generate_c
-        from rosidl_generator_py import generate_py
-        from rosidl_generator_type_description import generate_type_hash
-        from rosidl_typesupport_c import generate_c as generate_typesupport_c
-        from rosidl_typesupport_fastrtps_c import generate_typesupport_fastrtps_c
-        from rosidl_typesupport_introspection_c import generate_c as generate_introspection_c
+        from rosidl_generator_c.cli import GenerateC
+        from rosidl_generator_py.cli import GeneratePython
+        from rosidl_typesupport_c.cli import GenerateCTypesupport
+        from rosidl_typesupport_fastrtps_c.cli import GenerateFastRTPSCTypesupport
+        from rosidl_typesupport_introspection_c.cli import GenerateIntrospectionCTypesupport
 
-        sources = []
         for name, text in definitions.items():
             source = self.work / f"{name}.{name.partition('/')[0]}"
             source.parent.mkdir(exist_ok=True)
@@ -286,43 +258,16 @@ class _Build:
                 convert_to_idl(self.work, self.package, source.relative_to(self.work), self.made)
             except InvalidSpecification as error:
                 raise SetupError(f"{self.package}/{name} is not a ROS 2 definition: {error}") from None
-            sources.append(str(source))
-        self.names = sorted(definitions)
-        includes = [f"{name}:{self.shares[name]}" for name in self.needed]
-        generate_type_hash(self._arguments("generator_type_description", include_paths=includes))
-        hashes = [f"{name}.idl:{self.made / name}.json" for name in self.names]
-        generate_c(
-            self._arguments("generator_c", type_description_tuples=hashes, ros_interface_files=sources)
-        )
-        generate_typesupport_fastrtps_c(self._arguments("typesupport_fastrtps_c"))
-        generate_typesupport_c(self._arguments("typesupport_c"), list(SUPPORTS))
-        generate_introspection_c(
-            self._arguments(
-                "typesupport_introspection_c", output_dir=str(self.work / "introspection" / self.package)
-            )
-        )
-        generate_py(self._arguments("generator_py"), ["rosidl_typesupport_c"])
-        for generator in ("generator_c", "typesupport_fastrtps_c", "typesupport_introspection_c"):
-            header = f"rosidl_{generator}__visibility_control.h"
-            text = (self.shares["rosidl_" + generator] / "resource" / f"{header}.in").read_text()
-            text = text.replace("@PROJECT_NAME@", self.package)
-            (self.made / "msg" / header).write_text(
-                text.replace("@PROJECT_NAME_UPPER@", self.package.upper())
-            )
-
-    def _arguments(self, generator: str, **more: Any) -> str:
-        """A file of arguments, as the generators read them."""
-        arguments = {
-            "package_name": self.package,
-            "output_dir": str(self.made),
-            "template_dir": str(self.shares["rosidl_" + generator] / "resource"),
-            "idl_tuples": [f"{self.made}:{name}.idl" for name in self.names],
-            "target_dependencies": [],
-            **more,
-        }
-        path = self.work / f"{generator}.json"
-        path.write_text(json.dumps(arguments))
-        return str(path)
+        files = [f"{self.made}:{name}.idl" for name in sorted(definitions)]
+        includes = [str(self.shares[name]) for name in self.needed]
+        for generator, folder in (
+            (GenerateC("c"), self.made),
+            (GenerateFastRTPSCTypesupport("fastrtps_c"), self.made),
+            (GenerateCTypesupport("c", typesupport_implementations=list(SUPPORTS)), self.made),
+            (GenerateIntrospectionCTypesupport("introspection_c"), self.introspection),
+            (GeneratePython("py", typesupport_implementations=["rosidl_typesupport_c"]), self.made),
+        ):
+            generator.generate(self.package, files, includes, output_path=folder)
 
     def _units(self) -> Iterator[Path]:
         """What is compiled: one file for all of a language, but for descriptions, whose names collide."""
@@ -334,17 +279,13 @@ class _Build:
             yield unit
             yield from (path for path in files if path not in together)
 
-    def _compiled(self, unit: Path) -> str:
+    def _includes(self) -> list[Path]:
         from numpy import get_include
 
         headers = [prefix / "include" for prefix in self.prefixes]
-        folders = [self.work / "made", self.work / "introspection", *headers, Path(get_include())]
-        folders += [Path(sysconfig.get_paths()["include"])]
-        folders += [path for each in headers for path in each.iterdir() if (path / path.name).is_dir()]
-        done = self.work / (unit.name + ".o")
-        includes = [argument for path in folders for argument in ("-I", str(path))]
-        self._run(COMPILERS[unit.suffix], "-c", "-fPIC", "-O0", "-w", *includes, str(unit), "-o", str(done))
-        return str(done)
+        of_packages = [path for each in headers for path in each.iterdir() if (path / path.name).is_dir()]
+        ours, python = [self.made.parent, self.introspection.parent], sysconfig.get_paths()["include"]
+        return [*ours, *headers, *of_packages, Path(python), Path(get_include())]
 
     def _run(self, *command: str) -> None:
         done = subprocess.run(  # noqa: S603 - the compiler, on what was generated

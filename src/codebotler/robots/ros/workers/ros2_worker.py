@@ -9,16 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from channel import Message, SetupError, serve
-from goals import TICK, Goal, SkillWorker
+from goals import ENDS_ROS2, TICK, Goal, Server, SkillWorker
+from message_types import as_data
 from ros2_graph import Ros2Graph
-from ros2_types import action_types, as_data, fill, message_types
+from ros2_types import fill, message_types
 
-SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
 KEEPOUT = ("nav_msgs/msg/OccupancyGrid", "nav2_msgs/msg/CostmapFilterInfo")
 REJECTED = 1  # of action_msgs/srv/CancelGoal
 DISCOVERS = 3  # times the patience, for the first server to be discovered
 TELLS = 2.0  # seconds after which a search for servers is told
 AGAIN = 1.0  # seconds after which a result is asked for again
+ALL = [0] * 16  # in a request to cancel, the number of a goal that stands for all
 
 
 class Ros2Goal:
@@ -26,30 +27,37 @@ class Ros2Goal:
 
     def __init__(self) -> None:
         self.uuid = list(uuid.uuid4().bytes)  # chosen here, so that it can be cancelled before it is accepted
-        self.is_sent = self.is_accepted = self.is_cancelling = False
+        self.is_cancelling = False
         self.asked = 0.0  # when its result was asked for
 
 
-class Ros2Server:
+class Ros2Server(Server):
     """The action server of one skill, seen from a client."""
 
-    def __init__(self, graph: Ros2Graph, action: Message, spec: Any, see: Callable[[Any, Any], None]) -> None:
+    def __init__(self, worker: Ros2Worker, action: Message, spec: Any) -> None:
         import rclpy.action
+        from action_msgs.msg import GoalStatusArray
         from action_msgs.srv import CancelGoal
+        from rclpy.qos import qos_profile_action_status_default
         from sensor_msgs.msg import CompressedImage
 
-        self.name: str = action["server"]
-        self.type: str = action["type"]
+        super().__init__(action)
+        graph = worker.graph
         self.spec, self.message = spec, spec.Goal
         self.client = rclpy.action.ActionClient(graph.ours, spec, self.name)
         self._graph, self._request = graph, CancelGoal.Request
         self._cancels = graph.ours.create_client(CancelGoal, f"{self.name}/_action/cancel_goal")
         graph.ours.create_subscription(
-            CompressedImage, f"{self.name}/picture", lambda message: see(self, as_data(message.data)), 10
+            CompressedImage, f"{self.name}/picture", lambda m: worker.see(self, as_data(m.data)), 10
+        )
+        graph.ours.create_subscription(
+            GoalStatusArray,
+            f"{self.name}/_action/status",
+            lambda statuses: worker.hear(self, statuses),
+            qos_profile_action_status_default,
         )
         self.has_cancelled = False
 
-    @property
     def heard(self) -> float:
         """Now, by the monotonic clock, if it is there: DDS has already waited for one that is not."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
@@ -64,44 +72,30 @@ class Ros2Server:
 
     def cancel(self) -> None:
         """Ask to cancel all goals of all clients; `has_cancelled` tells when the server has."""
-        self._graph.soon(self._cancel_all)
-
-    def _cancel_all(self) -> None:
-        self._cancels.call_async(self._request()).add_done_callback(self._confirm)
+        self._graph.soon(lambda: self.ask_to_cancel(ALL).add_done_callback(self._confirm))
 
     def _confirm(self, done: Any) -> None:
         if done.result() is not None and done.result().return_code != REJECTED:
             self.has_cancelled = True
 
-    def cancel_one(self, number: list[int]) -> Any:
-        """Ask to cancel a goal; the answer will be in what is returned. For the executor's thread."""
+    def ask_to_cancel(self, number: list[int]) -> Any:
+        """Ask to cancel a goal, or ALL; the answer will be in what is returned. For the executor's thread."""
         request = self._request()
         request.goal_info.goal_id.uuid = number
         return self._cancels.call_async(request)
 
 
-class Ros2Service:
+class Ros2Service(Server):
     """A service that performs a skill; what it does cannot be cancelled."""
 
-    has_cancelled = True
-
-    def __init__(self, graph: Ros2Graph, call: Message, spec: Any) -> None:
-        self.name: str = call["server"]
-        self.type: str = call["type"]
+    def __init__(self, worker: Ros2Worker, call: Message, spec: Any) -> None:
+        super().__init__(call)
         self.message = spec.Request
-        self.client = graph.ours.create_client(spec, self.name)
-
-    @property
-    def heard(self) -> float:
-        """Now, since its end shows in `is_connected`, and it answers then all the same or never."""
-        return time.monotonic()
+        self.client = worker.graph.ours.create_client(spec, self.name)
 
     def is_connected(self, _silence: float) -> bool:
         """Whether it is there."""
         return bool(self.client.service_is_ready())
-
-    def cancel(self) -> None:
-        """Nothing."""
 
     def perform(self, message: Any, end: Callable[[Message], None]) -> None:
         """Call it, and end with its answer."""
@@ -109,12 +103,13 @@ class Ros2Service:
         answer.add_done_callback(lambda done: end(as_data(done.result())))
 
 
-class Ros2Topic(Ros2Service):
+class Ros2Topic(Server):
     """A topic whose messages perform a skill, as far as anybody can know."""
 
-    def __init__(self, graph: Ros2Graph, call: Message, spec: Any) -> None:
-        self.name, self.type, self.message = call["server"], call["type"], spec
-        self.publisher = graph.ours.create_publisher(spec, self.name, 10)
+    def __init__(self, worker: Ros2Worker, call: Message, spec: Any) -> None:
+        super().__init__(call)
+        self.message = spec
+        self.publisher = worker.graph.ours.create_publisher(spec, self.name, 10)
 
     def is_connected(self, _silence: float) -> bool:
         """Whether anybody listens."""
@@ -126,7 +121,7 @@ class Ros2Topic(Ros2Service):
         end({})
 
 
-OTHERS = {"service": Ros2Service, "topic": Ros2Topic}
+KINDS = {"action": Ros2Server, "service": Ros2Service, "topic": Ros2Topic}
 
 
 class Ros2Worker(SkillWorker):
@@ -137,34 +132,30 @@ class Ros2Worker(SkillWorker):
 
     def connect(self, start: Message) -> bool:
         """Start our node, and a client for each server; whether an earlier worker died without leaving."""
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
         calls, self._packages = start["calls"], start["packages"]
-        given = [call for call in calls.values() if call["definition"]]
         latched = dict(zip(start["keepout"], KEEPOUT))
-        names = [call["type"] for call in calls.values() if not call["definition"]] + list(latched.values())
-        specs = action_types(given, self._tell)
-        specs.update(message_types(names, map(Path, self._packages), self._tell))
+        names = [*(call["type"] for call in calls.values()), *latched.values()]
+        actions = {call["type"]: call["definition"] for call in calls.values() if call["definition"]}
+        specs = message_types(names, map(Path, self._packages), self._tell, actions=actions)
         self.graph = Ros2Graph(start["node"])
         left_behind = self.graph.enter()
         self.servers = {
-            skill: Ros2Server(self.graph, call, specs[call["type"]], self.see)
-            if call["kind"] == "action"
-            else OTHERS[call["kind"]](self.graph, call, specs[call["type"]])
-            for skill, call in calls.items()
+            skill: KINDS[call["kind"]](self, call, specs[call["type"]]) for skill, call in calls.items()
         }
-        for server in self.servers.values():
-            if isinstance(server, Ros2Server):
-                self.graph.hear_statuses(server.name, self._hear)
-        self._listen(start)
+        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._latched = {
-            topic: (self.graph.latched(specs[kind], topic), specs[kind]) for topic, kind in latched.items()
+            topic: self.graph.ours.create_publisher(specs[kind], topic, qos)
+            for topic, kind in latched.items()
         }
         self.graph.spin()
         return left_behind
 
     def publish(self, topic: str, fields: Message) -> None:
         """Publish the last message of a topic, also for those who come later."""
-        publisher, spec = self._latched[topic]
-        self.graph.soon(publisher.publish, fill(spec(), fields))
+        publisher = self._latched[topic]
+        self.graph.soon(publisher.publish, fill(publisher.msg_type(), fields))
 
     def cancel_all(self) -> bool:
         """Cancel all goals of all clients; whether all servers that are there have confirmed it."""
@@ -177,8 +168,8 @@ class Ros2Worker(SkillWorker):
             there = [server for server in there if not server.has_cancelled]
         return not there
 
-    def missing(self) -> dict[str, str]:
-        """Why servers cannot be reached, by skill; servers are discovered one after the other."""
+    def wait_for_servers(self) -> None:
+        """Wait while servers are discovered, one after the other."""
         begun = changed = time.monotonic()
         found, is_told = 0, False
         while found < len(self.servers) and not self.graph.is_left():
@@ -191,11 +182,6 @@ class Ros2Worker(SkillWorker):
                 self.channel.send("progress", text="looking for the robot's action servers")
                 is_told = True
             time.sleep(0.01)
-        return {
-            skill: self.graph.why_missing(server.name, server.type)
-            for skill, server in self.servers.items()
-            if not server.is_connected(self.silence)
-        }
 
     def send(self, goal: Goal, fields: Message) -> None:
         """Have the executor's thread send a goal, unless no message can hold it.
@@ -211,7 +197,9 @@ class Ros2Worker(SkillWorker):
         goal.sent = time.monotonic()
         if not isinstance(goal.server, Ros2Server):
             goal.is_acknowledged = True
-            self.graph.soon(goal.server.perform, message, lambda values: self.finish(goal, values))
+            self.graph.soon(
+                goal.server.perform, message, lambda values: self.finish(goal, "succeeded", values)
+            )
             return
         goal.handle = Ros2Goal()
         goal.stop = lambda: self.graph.soon(self._cancel, goal)
@@ -242,10 +230,9 @@ class Ros2Worker(SkillWorker):
         if goal.cancelled is not None:
             self.end(goal, "cancelled")
             return
-        goal.handle.is_sent = True
         goal.server.client.send_goal_async(
             message,
-            feedback_callback=lambda m: self._feedback(goal, m.feedback),
+            feedback_callback=lambda m: self.pass_on(goal, as_data(m.feedback)),
             goal_uuid=UUID(uuid=goal.handle.uuid),
         ).add_done_callback(lambda done: self._accepted(goal, done.result()))
 
@@ -256,22 +243,21 @@ class Ros2Worker(SkillWorker):
         else:
             self.end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
 
-    def _hear(self, server: str, statuses: Any) -> None:
+    def hear(self, server: Ros2Server, statuses: Any) -> None:
         """Note the status of the current goal, which the server publishes besides its answers."""
         goal = self.goal
-        if goal is None or goal.is_over or goal.handle is None or goal.server.name != server:
+        if goal is None or goal.is_over or goal.handle is None or goal.server is not server:
             return
         for status in statuses.status_list:
             if list(status.goal_info.goal_id.uuid) != goal.handle.uuid:
                 continue
             self._accept(goal)
-            if status.status in {SUCCEEDED, CANCELED, ABORTED} and goal.status_ended is None:
+            if status.status in ENDS_ROS2 and goal.status_ended is None:
                 goal.status_ended = time.monotonic()
 
     def _accept(self, goal: Goal) -> None:
-        goal.is_acknowledged = True
-        if not goal.handle.is_accepted:
-            goal.handle.is_accepted = True
+        if not goal.is_acknowledged:
+            goal.is_acknowledged = True
             self._ask_result(goal)
 
     def _ask_result(self, goal: Goal) -> None:
@@ -285,9 +271,7 @@ class Ros2Worker(SkillWorker):
         client._get_result_async(handle).add_done_callback(lambda done: self._done(goal, done.result()))
 
     def _cancel(self, goal: Goal) -> None:
-        if not goal.handle.is_sent:
-            return  # it never will be
-        answer = goal.server.cancel_one(goal.handle.uuid)
+        answer = goal.server.ask_to_cancel(goal.handle.uuid)
         answer.add_done_callback(lambda done: self._cancelling(goal, done.result()))
 
     def _cancelling(self, goal: Goal, response: Any) -> None:
@@ -295,19 +279,11 @@ class Ros2Worker(SkillWorker):
             goal.handle.is_cancelling = True
 
     def _done(self, goal: Goal, response: Any) -> None:
-        if goal.cancelled is not None or response.status == CANCELED:
-            self.end(goal, "cancelled")
-        elif response.status == SUCCEEDED:
-            self.succeed(goal, as_data(response.result))
-        elif response.status == ABORTED:
-            self.end(goal, "error", state="aborted", text="", values=as_data(response.result))
+        if goal.cancelled is None and response.status not in ENDS_ROS2:
+            why = f"{goal.server.name} ended its goal with the status {response.status}"
+            self.end(goal, "lost", text=why)
         else:
-            self.end(
-                goal, "lost", text=f"{goal.server.name} ended its goal with the status {response.status}"
-            )
-
-    def _feedback(self, goal: Goal, feedback: Any) -> None:
-        self.pass_on(goal, as_data(feedback))
+            self.finish(goal, ENDS_ROS2.get(response.status, "cancelled"), as_data(response.result))
 
 
 def _check(message: Any, fields: Message) -> None:

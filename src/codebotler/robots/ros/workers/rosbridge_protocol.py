@@ -7,17 +7,12 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from channel import Message
+from goals import ENDS_ROS1, ENDS_ROS2
 from message_types import parts_of
 
 AT_ONCE = {"secs": 0, "nsecs": 0}
-ENDS_ROS1 = {2: "cancelled", 3: "succeeded", 4: "aborted", 5: "rejected", 8: "cancelled", 9: "lost"}
-"""How a goal ended, by the status of actionlib_msgs/GoalStatus."""
-
 RECALLING = 7
 """The status of a goal that was cancelled before it began, perhaps even before the server heard of it."""
-
-ENDS_ROS2 = {4: "succeeded", 5: "cancelled", 6: "aborted"}
-"""How a goal ended, by the status of action_msgs/msg/GoalStatus."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import uuid
 from collections.abc import Callable
 
 from channel import Message, SetupError, serve
-from goals import Goal, SkillWorker
+from goals import Goal, Server, SkillWorker
 from message_types import parts_of
 from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
 from rosbridge_protocol import GoalUpdate
@@ -15,19 +15,17 @@ from rosbridge_protocol import GoalUpdate
 AGAIN = 0.5  # seconds after which a message without any effect is sent again
 
 
-class RosbridgeServer:
+class RosbridgeServer(Server):
     """The action server of one skill, seen through a rosbridge."""
 
     def __init__(self, connection: Connection, action: Message) -> None:
-        self.name: str = action["server"]
-        self.type: str = action["type"]
+        super().__init__(action)
         self.kind: str = action["kind"]
         self._connection = connection
         self._since = time.monotonic()
         if self.kind == "topic":
             connection.send({"op": "advertise", "topic": self.name, "type": "/".join(parts_of(self.type))})
 
-    @property
     def heard(self) -> float:
         """When its last status came, by the monotonic clock; now, if there are none."""
         if self._connection.protocol.has_status and self.kind == "action":
@@ -67,7 +65,6 @@ class RosbridgeWorker(SkillWorker):
                 "or name another with --address"
             ) from None
         self.servers = {skill: RosbridgeServer(self.graph, call) for skill, call in calls.items()}
-        self._listen(start)
         self._message: Message = {}
         self._again = 0.0
         return False
@@ -141,15 +138,12 @@ class RosbridgeWorker(SkillWorker):
         elif update.what == "status":
             if update.state and goal.status_ended is None:
                 goal.status_ended = time.monotonic()
-        elif update.state == "lost":
-            why = update.text or "it does not say why"
-            self.end(goal, "lost", text=f"rosbridge could not perform a goal of {goal.server.name}: {why}")
-        elif update.state == "cancelled" or goal.cancelled is not None:
-            self.end(goal, "cancelled")
-        elif update.state == "succeeded":
-            self.end(goal, "result", values=update.values)
         else:
-            self.end(goal, "error", state=update.state, text=update.text, values=update.values)
+            text = update.text
+            if update.state == "lost":
+                why = text or "it does not say why"
+                text = f"rosbridge could not perform a goal of {goal.server.name}: {why}"
+            self.finish(goal, update.state, update.values, text)
 
     def _lost(self) -> None:
         """Cancel the goal that goes on over another connection."""
