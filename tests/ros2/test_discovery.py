@@ -45,7 +45,7 @@ def test_file_has_what_robots_offer(scene: Scene, tmp_path: Path, monkeypatch: p
         },
         "say": {"topic": "/speech", "type": "std_msgs/msg/String", "message": {"data": "$message"}},
     }
-    assert "# door_open: {service: /door/open, type: std_srvs/srv/Trigger, " in text
+    assert "# open_door: {service: /door/open, type: std_srvs/srv/Trigger, " in text
     assert text.partition("# Not mapped:")[2].splitlines() == ["", "#   /battery std_msgs/msg/String"]
     assert CliRunner().invoke(app, command).exception
     assert file.read_text() == text

@@ -71,6 +71,7 @@ def generate(
 def check(
     program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
     world: options.WorldOption = None,
+    connect: options.ConnectOption = None,
     samples: Annotated[
         int, typer.Option(min=1, max=10_000, help="How many imagined worlds to run it in.")
     ] = 5,
@@ -92,22 +93,30 @@ def check(
 
     It reads the program and runs it in imagined worlds. The exit status is 1 if there are problems.
     """
+    from dataclasses import replace
+
     from codebotler.checking import check
     from codebotler.cli.check import check_view, read_program
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
-    from codebotler.core.world import World
     from codebotler.simulator.sampled_robot import RoomMap
 
     table = skills_from(*(skills or ()))
-    known = None if world is None else World.read(world, table)
+    _, connection = options.connected(connect, None, table)
+    table = table if connection is None else connection.skills(table)
+    known = options.world_or_office("", world, table, connection)
     house_rules = rules_for(known, rules, table)
     source = read_program(program)
+    room_map = None if known is None else RoomMap.of(known)
+    if known is not None and world is None:  # places of a robot, which finds its own ways
+        names = tuple(room.name for room in known.rooms)
+        plan = tuple(replace(room, stand_at=None) for room in known.rooms)
+        room_map = RoomMap(names, names[0], plain=True, plan=plan)
     with busy("checking"):
         found = check.check(
             source,
-            room_map=None if known is None else RoomMap.of(known),
+            room_map=room_map,
             samples=samples,
             seed=seed,
             strict=strict,

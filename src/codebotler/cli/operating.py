@@ -20,7 +20,7 @@ def run(
             metavar="PROGRAM|INSTRUCTION", help="A program file, - for standard input, or an instruction."
         ),
     ],
-    robot: options.RobotOption = "sim",
+    robot: options.RobotOption = None,
     world: Annotated[
         Path | None,
         typer.Option(help="The world file of a simulated robot; by default an office for --robot sim."),
@@ -57,12 +57,12 @@ def run(
 
     chosen = chosen_model(model, base_url)
     table = skills_from(*(skills or ()))
-    robot, connection = options.connected(connect, robot, table)
-    known = options.world_or_office(robot, world, table, connection)
+    kind, connection = options.connected(connect, robot, table)
+    known = options.world_or_office(kind, world, table, connection)
     house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
     request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
     asked = chosen.with_its_server(model_settings(**sampling))
-    options.note_office(robot, world)
+    options.note_office(kind, world)
     settings = Options(
         world=known,
         speed=speed or None,
@@ -71,7 +71,7 @@ def run(
         skills=table,
         connection=connection,
     )
-    body = open_robot(robot, settings)
+    body = open_robot(kind, settings)
     raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
 
 
@@ -165,7 +165,7 @@ def serve_page(
     behind_proxy: options.BehindProxyOption = None,
     token: options.TokenOption = None,
     no_token: options.NoTokenOption = False,
-    robot: options.RobotOption = "sim",
+    robot: options.RobotOption = None,
     world: options.MapOption = None,
     model: options.ModelsOption = None,
     base_url: options.BaseUrlOption = None,
@@ -209,17 +209,17 @@ def serve_page(
     from codebotler.web.server import serve
 
     table = skills_from(*(skills or ()))
-    robot, connection = options.connected(connect, robot, table)
-    known = options.world_or_office(robot, world, table, connection)
+    kind, connection = options.connected(connect, robot, table)
+    known = options.world_or_office(kind, world, table, connection)
     house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
     place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
-    options.note_office(robot, world)
+    options.note_office(kind, world)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
     settings = Options(known, speed or None, address, ros_python, table, connection)
     shown = Face(face_timeout) if face else None
     opened = opener(models, base_url, model_settings(**sampling))
-    body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
+    body = open_robot(kind, settings) if shown is None else open_with_face(kind, settings, shown)
     tell_missing(body)
     console = Console(body, home(), opened, models=models, world=known, face=shown, rules=house_rules)
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)

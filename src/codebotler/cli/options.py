@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from codebotler import __version__
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, print_text
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ def robot_names(incomplete: str) -> list[str]:
 
 
 RobotOption = Annotated[
-    str,
+    str | None,
     typer.Option(
-        help="Which robot: sim, another that `codebotler robots` lists, or your own: FILE.py:CLASS.",
+        help="Which robot: sim by default, another that `codebotler robots` lists, or yours: FILE.py:CLASS.",
         autocompletion=robot_names,
     ),
 ]
@@ -136,14 +137,16 @@ NoTokenOption = Annotated[
 ]
 
 
-def connected(file: Path | None, robot: str, skills: SkillTable) -> tuple[str, Connection | None]:
+def connected(file: Path | None, robot: str | None, skills: SkillTable) -> tuple[str, Connection | None]:
     """The kind of robot, and what it offers where a file says that."""
     if file is None:
-        return robot, None
+        return robot or "sim", None
     from codebotler.robots.ros.connection_file import read_connection
 
     connection = read_connection(file, skills)
-    return connection.robot if robot == "sim" else robot, connection
+    if robot not in {None, connection.robot}:
+        raise UserError(f"it connects a robot of the kind {connection.robot}, not {robot}", file=file)
+    return connection.robot, connection
 
 
 def world_or_office(

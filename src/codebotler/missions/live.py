@@ -65,11 +65,14 @@ class LiveRobot:
         self._place, self._held = place, ""
         self._here = [place]  # where the robot may be, as rules name it
         self._at: Point | None = None  # where the robot said it is
+        self._guarding = threading.RLock()  # poses come from a thread of the robot
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
         self._stopped, self._told = threading.Event(), threading.Event()
-        self._fault: OSError | None = None
+        self._fault: OSError | RobotLostError | None = None
+        watch = getattr(robot, "watch", None) if guard is not None and guard.judges_poses else None
+        self._is_watched = watch is not None and watch(self._moved)
 
     @property
     def now(self) -> float:
@@ -97,7 +100,7 @@ class LiveRobot:
         """Return why the robot could not be stopped after a request; empty if it was, as far as it knows."""
         if self._stopped.is_set():
             self._told.wait(TELLING)
-        return str(getattr(self.robot, "failed_stop", ""))  # which only robots of users have
+        return str(getattr(self.robot, "failed_stop", ""))  # which some robots have
 
     def sleep_until(self, now: float) -> None:
         """Let time pass by the robot's clock, or raise StoppedError."""
@@ -165,7 +168,10 @@ class LiveRobot:
         rooms = self._meant(event.text) if is_drive else []
         texts = [event.text, *(names_of(room, event.text) for room in rooms if room != event.text)]
         try:
-            guard.judge(*(replace(event, text=text, place=place) for text in texts for place in self._here))
+            with self._guarding:
+                guard.judge(
+                    *(replace(event, text=text, place=place) for text in texts for place in self._here)
+                )
         except RuleViolationError as broken:
             self._end_by(broken)
             raise
@@ -178,23 +184,32 @@ class LiveRobot:
         if is_drive:
             texts = self._driven(event.text, failed=failed)
         try:
-            self._guard.happened(
-                *(replace(event, text=text, place=place) for text in texts for place in places)
-            )
+            with self._guarding:
+                self._guard.happened(
+                    *(replace(event, text=text, place=place) for text in texts for place in places)
+                )
         except RuleViolationError as broken:
             self._end_by(broken)
             raise
 
-    def _moved(self, feedback: str) -> None:
-        """Tell the guard which rooms the robot has entered, as if it drove straight between its reports."""
-        if self._guard is not None and not self._stopped.is_set() and (found := AT.search(feedback)):
-            at = float(found[1]), float(found[2])
-            before, self._at = self._at or at, at
-            try:
+    def _moved(self, at: Point | None) -> None:
+        """Tell the guard which rooms the robot has entered, as if it drove straight between its reports.
+
+        None says that it drives without telling where.
+        """
+        if self._guard is None or self._stopped.is_set():
+            return
+        if at is None:
+            self._fault = RobotLostError("it drove on without telling where it is, which a rule needs")
+            self.stop()
+            return
+        before, self._at = self._at or at, at
+        try:
+            with self._guarding:
                 self._guard.moved(before, at, self._held)
-            except RuleViolationError as broken:
-                with suppress(StoppedError):  # this may be a thread of the robot
-                    self._end_by(broken)
+        except RuleViolationError as broken:
+            with suppress(StoppedError):  # this may be a thread of the robot
+                self._end_by(broken)
 
     def _end_by(self, broken: RuleViolationError) -> None:
         """Stop the robot, and only then log which rule was broken, unless the program may go on."""
@@ -275,7 +290,8 @@ class LiveRobot:
                 if isinstance(what, Picture):
                     self._note("picture", **which, picture=what.data)
                 else:
-                    self._moved(what)
+                    if not self._is_watched and (found := AT.fullmatch(what)):
+                        self._moved((float(found[1]), float(found[2])))
                     self._note("feedback", **which, text=what)
             except OSError as error:  # on a thread of the robot, where it would be lost
                 self._fault = error

@@ -13,6 +13,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Recording, Skill, SkillTable
 from codebotler.core.words import counted
+from codebotler.core.world import Point
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
 from codebotler.robots.clock import Clock
 
@@ -222,6 +223,11 @@ class RobotWithFace:
     def failed_stop(self) -> str:
         """Why the other robot could not be stopped; empty if it could, or does not say."""
         return str(getattr(self._robot, "failed_stop", ""))
+
+    def watch(self, told: Callable[[Point | None], None]) -> bool:
+        """Have the other robot tell its poses, if it can."""
+        watch = getattr(self._robot, "watch", None)
+        return watch is not None and bool(watch(told))
 
     def cancel(self) -> None:
         """Withdraw the question, and stop the other robot."""

@@ -88,7 +88,7 @@ class PlacesMapping(_Form):
     polygon: str = "polygon"
     yaw: Literal["radians", "degrees"] = "radians"
     resolution: Metres | None = None  # metres a pixel of an image, if places are pixels from its top left
-    origin: Corner = (0.0, 0.0)  # its lower left corner in metres
+    origin: Corner | tuple[Metres, Metres, Metres] = (0.0, 0.0)  # its lower left corner in metres
     height: Metres = 0.0  # in pixels
     skip: list[str] = []
 
@@ -172,7 +172,7 @@ def _place(name: str, entry: object, mapping: PlacesMapping, others: Mapping[str
     x, y, *turn = _numbers(pose)
     points = [(x, y), *polygon]
     if size is not None:
-        (left, low), high = mapping.origin, mapping.height
+        (left, low, *_), high = mapping.origin, mapping.height
         points = [(left + size * x, low + size * (high - y)) for x, y in points]
     yaw = [*turn, 0.0][0] * (math.pi / 180 if mapping.yaw == "degrees" else 1)
     if turn[1:]:

@@ -205,6 +205,11 @@ class RuleGuard:
             before, self._inside = self._inside, here
             yield from (Event(INSIDE, r, place=r, holding=holding) for r in here if r not in before)
 
+    @property
+    def judges_poses(self) -> bool:
+        """Whether a rule is about where the robot is."""
+        return any(rule.inside for rule in self.rules)
+
     def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
         caught: RuleViolationError | None = None

@@ -10,12 +10,12 @@ import pytest
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.base import RobotLostError
 from codebotler.robots.ros.connection import Call, Connection, connection_of
 from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.motion import Motion
 
 GO_TO = "go_to: {action: /drive, type: nav2_msgs/action/NavigateToPose, goal: {pose: $place}}"
+SAY = "say: {topic: /speech, type: std_msgs/msg/String, message: {data: $message}}"
 PLACES = "frame: map\nplaces: {lab: {x: 1, y: 2}}\n"
 
 
@@ -55,8 +55,11 @@ def test_what_a_file_maps_is_what_the_robot_has(tmp_path: Path) -> None:
         ("skills:\n  ask: {service: /a, type: a/srv/B}\n", 2, "result"),
         ("skills:\n  is_in_room: {detector: m}\n", 2, "image"),
         ("skills:\n  say: {detector: m, image: /a}\n", 2, "detector"),
-        ("packages: [nothing]\nskills:\n  say: {topic: /a, type: a/msg/B}\n", 1, "folder"),
-        ("keepout: {mask: /a, info: /b}\nskills:\n  say: {topic: /a, type: a/msg/B}\n", 1, "keepout"),
+        ("skills:\n  say: {topic: /a, type: a/msg/B}\n", 2, "$message"),
+        ("skills:\n  say: {topic: /a, type: a/msg/B, message: {data: $place.x}}\n", 2, "$message"),
+        ("skills:\n  say: {topic: /a, type: a/msg/B, message: {a: $message, a.b: 1}}\n", 2, "path"),
+        (f"packages: [nothing]\nskills:\n  {SAY}\n", 1, "folder"),
+        (f"keepout: {{mask: /a, info: /b}}\nskills:\n  {SAY}\n", 1, "keepout"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, line: int, words: str) -> None:
@@ -79,12 +82,16 @@ def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, line: in
     ],
 )
 def test_types_are_written_as_on_ros_1_or_2(tmp_path: Path, kind: str, text: str, whole: str) -> None:
-    assert read(tmp_path, f"skills:\n  say: {{{kind}: /a, type: {text}}}\n").calls["say"].type == whole
+    sent = {"action": "goal", "service": "request", "topic": "message"}[kind]
+    skill = f"{{{kind}: /a, type: {text}, {sent}: {{data: $message}}}}"
+    assert read(tmp_path, f"skills:\n  say: {skill}\n").calls["say"].type == whole
 
 
 def test_actions_of_ours_need_no_package(tmp_path: Path) -> None:
     for text in ("robot_actions_pkg/Say", "robot_actions_pkg/action/Say"):
-        call = read(tmp_path, f"skills:\n  say: {{action: /a, type: {text}}}\n").calls["say"]
+        call = read(tmp_path, f"skills:\n  say: {{action: /a, type: {text}, goal: {{m: $message}}}}\n").calls[
+            "say"
+        ]
         assert call.definition == "string message\n---\n---\n"
 
 
@@ -124,7 +131,7 @@ def test_result_is_at_the_path_of_a_field() -> None:
     call = Call("action", "/look", "a/action/B", result="found.0.name", reason="detail.text")
     assert call.answer({"found": [{"name": "mug"}]}) == "mug"
     assert call.why({"detail": {"text": "too dark"}, "message": "other"}) == "too dark"
-    with pytest.raises(RobotLostError, match=r"found\.0\.name"):
+    with pytest.raises(RobotError, match=r"found\.0\.name"):
         call.answer({"found": []})
 
 
@@ -147,4 +154,10 @@ def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None
     now += 1.5
     states.append((seen.is_still, seen.is_moving))  # it says no more
     assert seen.is_silent
+    for _ in range(4):
+        now += 0.3
+        seen.take({"is": "velocity", "speed": 1.0})
+    assert seen.is_unseen  # it drove on for a metre
+    seen.take(pose)
+    assert not seen.is_unseen
     assert states == [(False, False), *[(False, True)] * 3, (True, False), (False, True), (False, False)]

@@ -86,7 +86,7 @@ def test_other_texts_are_no_speech(offer: str) -> None:
 def test_services_are_suggested_as_own_skills() -> None:
     offers = ("service /door/open std_srvs/srv/Trigger", "service /lamp/on std_srvs/srv/SetBool")
     assert written(*offers)["skills"] is None
-    door, lamp = in_comment("door_open", *offers), in_comment("lamp_on", *offers)
+    door, lamp = in_comment("open_door", *offers), in_comment("on_lamp", *offers)
     assert door == {
         "service": "/door/open",
         "type": "std_srvs/srv/Trigger",

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
 from codebotler.core.errors import RobotError, UserError
+from codebotler.core.world import Point
 from codebotler.perception import Detector, PerceptionError, boxed, image_from_ros, jpeg_of, open_detector
 from codebotler.robots.base import (
     Argument,
@@ -19,7 +20,6 @@ from codebotler.robots.base import (
     Options,
     Picture,
     Result,
-    RobotLostError,
     no_feedback,
 )
 from codebotler.robots.places import Place, Places
@@ -98,11 +98,41 @@ class ConnectedRobot(RosRobot):
         values: dict[str, Any] = dict(zip(names, arguments, strict=True))
         if connection.places is not None and arguments and self.skills[skill].is_drive:
             values |= _of_place(connection.places, str(arguments[0]))
-        try:
-            return self._called(skill, values, feedback)
-        except CancelledError:
-            self._confirm_standing(feedback)
-            raise
+        return self._called(skill, values, feedback)
+
+    @property
+    def failed_stop(self) -> str:
+        """After a stop: that the robot goes on moving; empty if it stands still, or nothing tells."""
+        worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
+        if worker is None or (self.connection.pose is None and self.connection.velocity is None):
+            return ""
+        motion = worker.motion
+        while not motion.is_still and not motion.is_silent and time.monotonic() < until:
+            time.sleep(BEAT)
+        return f"it was told to stop, but goes on moving: {BY_HAND}" if motion.is_moving else ""
+
+    def watch(self, told: Callable[[Point | None], None]) -> bool:
+        """Call `told` with each pose until the connection ends, and None where it moves without any.
+
+        Returns:
+            whether it has poses.
+        """
+        worker = self._worker
+
+        def watch() -> None:
+            last: Pose | None = None
+            while worker is not None and worker is self._worker:
+                pose = worker.motion.pose
+                if worker.motion.is_unseen:
+                    told(None)
+                elif pose is not None and pose is not last:
+                    told((pose.x, pose.y))
+                    last = pose
+                time.sleep(BEAT)
+
+        if self.has_pose:
+            threading.Thread(target=watch, daemon=True).start()
+        return self.has_pose
 
     def disconnect(self) -> None:
         """Have the worker cancel what goes on, and end it; close what looks at pictures."""
@@ -144,8 +174,8 @@ class ConnectedRobot(RosRobot):
     def _place(self, places: Places, feedback: Feedback) -> Place:
         """The place where the robot is: whose polygon holds it, or else the nearest, which is said."""
         pose = self._pose()
-        if pose is None:
-            raise RobotError("UnknownPose", f"no pose has come on {self._topic}")
+        if pose is None or (self._worker is not None and self._worker.motion.is_unseen):
+            raise RobotError("UnknownPose", f"no pose has come on {self._topic} since the robot moved")
         within = places.room_at(pose.x, pose.y)
         if within is not None:
             return within
@@ -178,19 +208,6 @@ class ConnectedRobot(RosRobot):
             raise RobotError(call.failure, str(error)) from None
         feedback(Picture(picture))
         return is_there
-
-    def _confirm_standing(self, feedback: Feedback) -> None:
-        """Wait until the robot stands still after a stop; RobotLostError if it goes on moving."""
-        worker = self._worker
-        if worker is None or (self.connection.pose is None and self.connection.velocity is None):
-            return
-        motion, until = worker.motion, time.monotonic() + self._waits.patience
-        while not motion.is_still and not motion.is_silent and time.monotonic() < until:
-            time.sleep(BEAT)
-        if motion.is_moving:
-            raise RobotLostError(f"its goal was cancelled, but the robot goes on moving: {BY_HAND}")
-        if not motion.is_still:
-            feedback("its goal was cancelled; nothing on the graph tells whether the robot stands still")
 
 
 def _seen(detector: Detector, message: Mapping[str, Any], label: str, topic: str) -> tuple[bool, bytes]:

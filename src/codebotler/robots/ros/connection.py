@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.robots.base import RobotLostError
 
 if TYPE_CHECKING:
     from codebotler.robots.places import Places
@@ -62,14 +62,18 @@ class Call:
         Raises:
             RobotError: it says that the skill has failed.
         """
-        if self.success and not _at(received, self.success):
-            raise RobotError(self.failure, self.why(received) or f"{self.name} says that it failed")
-        return _at(received, self.result) if self.result else None
+        try:
+            if self.success and not _at(received, self.success):
+                raise RobotError(self.failure, self.why(received) or f"{self.name} says that it failed")
+            return _at(received, self.result) if self.result else None
+        except LookupError as error:
+            raise RobotError(self.failure, str(error.args[0])) from None
 
     def why(self, received: Values) -> str:
         """Why something failed, as far as a message says it: its words, and its number of an error."""
         if self.reason:
-            return str(_at(received, self.reason))
+            with suppress(LookupError):
+                return str(_at(received, self.reason))
         words = next((text for name in REASONS if isinstance(text := received.get(name), str) and text), "")
         code = received.get("error_code")
         return f"{words} (error {code})".strip() if code else words
@@ -182,5 +186,5 @@ def _at(received: Any, path: str) -> Any:  # noqa: ANN401 - as in a message
         try:
             received = received[int(step) if isinstance(received, list) else step]
         except (LookupError, TypeError, ValueError):
-            raise RobotLostError(f'what the robot answered has no field "{path}"') from None
+            raise LookupError(f'what the robot answered has no field "{path}"') from None
     return received

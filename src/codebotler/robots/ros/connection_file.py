@@ -162,12 +162,19 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     if skill.returns.annotation != "None" and not form.result:
         raise file.wrong(f'say in "result" which field {skill.signature} returns', *at)
     request = getattr(form, SENT[kind])
-    known = {parameter.name for parameter in skill.parameters} | ({*OF_PLACE} if places else set())
+    known = {parameter.name for parameter in skill.parameters}
+    known |= {*OF_PLACE} if places and skill.is_drive else set()
+    if known and not request:
+        raise file.wrong(f'say in "{SENT[kind]}" what is sent, such as {{data: ${min(known)}}}', *at)
     for variable in variables_in(request):
         if variable not in known:
-            lacks = "; name a file under places" if variable in OF_PLACE else ""
+            lacks = "; name a file under places" if variable in OF_PLACE and skill.is_drive else ""
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"
             raise file.wrong(f"${variable} is unknown here{lacks}; known are: {given}", *at, SENT[kind])
+    try:
+        Call("topic", "", "", request).fields(dict.fromkeys(known, ""))
+    except (AttributeError, TypeError):
+        raise file.wrong("a field is both a value and the start of a path", *at, SENT[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _whole(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"

@@ -47,6 +47,9 @@ OF_ROS = re.compile(
 )
 """Offers that nobody maps, such as the services for parameters that each node has."""
 
+COMMON = ("geometry_msgs", "nav_msgs", "robot_actions_pkg", "sensor_msgs", "std_msgs", "std_srvs")
+"""Packages that come with CodeBotler's ROS 2, or that it builds by itself."""
+
 ABOUT = ("pose", "velocity")  # the keys that are not skills
 EXPECTED = {
     "places": "places (name a file of them)",
@@ -94,11 +97,13 @@ def first_connection(robot: str, offers: Iterable[str]) -> str:
     ]
     rest = {by_form[form].partition(" ")[2] for form in forms}
     ready: set[str] = set()
+    packages: set[str] = set()
     lines: list[tuple[bool, str]] = []  # whether each is about a skill
     for pattern, use, text, first in USES:
         for form in (form for form in forms if re.fullmatch(pattern, form)):
             _, name, kind = by_form[form].split()
-            key = use or name.strip("/").replace("/", "_").lower()
+            key = use or "_".join(reversed(name.strip("/").lower().split("/")))
+            packages.add(kind.partition("/")[0])
             line = f"{key}: {{{text.replace('TYPE', kind).replace('NAME', name)}}}"
             why = first or "another one" * (key in ready)
             ready |= set() if why else {key}
@@ -106,6 +111,7 @@ def first_connection(robot: str, offers: Iterable[str]) -> str:
             rest.discard(f"{name} {kind}")
     if "get_all_rooms" in ready:
         ready.add("places")
+    rare = sorted(packages - {*COMMON}) if robot == "ros2" else []
     lacks = [what for key, what in EXPECTED.items() if key not in ready]
     return "".join(
         f"{line}\n"
@@ -114,6 +120,7 @@ def first_connection(robot: str, offers: Iterable[str]) -> str:
             *([f"# Missing: {', '.join(lacks)}"] if lacks else []),
             f"robot: {robot}",
             *([] if "places" in ready else ["# places: places.yaml"]),
+            *([f"# packages: [{', '.join(rare)}]  # where they are not installed"] if rare else []),
             *(line for is_skill, line in lines if not is_skill),
             "skills:",
             *(f"  {line}" for is_skill, line in lines if is_skill),

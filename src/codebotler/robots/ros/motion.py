@@ -10,6 +10,8 @@ from typing import Any
 
 STILL = 0.5  # seconds without a movement, after which it stands still
 METRES, RADIANS = 0.02, 0.05  # by which it must have moved
+UNSEEN = 1.0  # metres, or radians, of motion without a pose, after which nobody knows where it is
+LONGEST = 0.5  # seconds between two velocities that count as one motion
 SPEED = 0.02  # metres or radians per second at which it moves
 
 
@@ -29,14 +31,18 @@ class Motion:
     def __init__(self) -> None:
         self.pose: Pose | None = None
         self._rested: Pose | None = None  # since it last moved
-        self._heard = self._moved = -math.inf
+        self._heard = self._moved = self._sped = -math.inf
+        self._unseen = 0.0  # how far it has moved since its last pose
 
     def take(self, message: Mapping[str, Any]) -> None:
         """Take a pose or a velocity."""
         self._heard = now = time.monotonic()
         if message["is"] == "velocity":
             self._moved = now if message["speed"] > SPEED else self._moved
+            self._unseen += message["speed"] * min(now - self._sped, LONGEST)
+            self._sped = now
             return
+        self._unseen = 0.0
         self.pose = here = Pose(message["x"], message["y"], message["yaw"], message["frame"])
         if self._rested is None or _is_apart(here, self._rested):
             self._rested, self._moved = here, now
@@ -46,6 +52,11 @@ class Motion:
         """Whether it reports that it stands still."""
         now = time.monotonic()
         return self._heard > now - STILL > self._moved
+
+    @property
+    def is_unseen(self) -> bool:
+        """Whether it has moved on without telling where it is, as its velocity says."""
+        return self._unseen > UNSEEN
 
     @property
     def is_silent(self) -> bool:

@@ -74,8 +74,8 @@ class SkillWorker:
     """Performs skills, one at a time; `connect` and `send` belong to one kind of robot.
 
     The first line has the `address`, the `node`, the `calls` by skill, folders of `packages`, the topics of
-    the `pose`, the `velocity` and `keepout`, whether to `cancel_all` goals, the `sign`, a file that is there
-    while a goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
+    the `pose`, the `velocity` and `keepout`, whether to `cancel_all` goals, the `sign`, a file that names
+    the server whose goal may go on, and the seconds to wait: `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -90,7 +90,13 @@ class SkillWorker:
         self.longest: float = start["longest"]
         self.goal: Goal | None = None
         self._sign = Path(start["sign"])
-        left_behind = self.connect(start) or self._sign.exists()
+        going_on = self._sign.read_text() if self._sign.exists() else ""
+        left_behind = self.connect(start) or bool(going_on)
+        if going_on and going_on not in {server.name for server in self.servers.values()}:
+            raise SetupError(
+                f"an earlier tool was killed while {going_on} went on, which this connection cannot cancel; "
+                f"connect as then, or stop the robot by hand and delete {self._sign}"
+            )
         self._listen(start)
         missing = self.missing()
         if self.graph.is_left():
@@ -128,7 +134,7 @@ class SkillWorker:
             if goal.cancelled is not None:
                 self.end(goal, "cancelled")
             else:
-                self._sign.touch()
+                self._sign.write_text(goal.server.name)
                 self.send(goal, fields)
 
     def obey(self, line: Message) -> None:
