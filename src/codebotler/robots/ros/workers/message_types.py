@@ -48,9 +48,8 @@ def installed(whole: str, kind: str) -> Any:
 def as_data(value: Any) -> Any:
     """A message of ROS 1 or 2, or the value of a field, as JSON has it, with bytes in base64."""
     if hasattr(value, "__slots__"):
-        names = getattr(
-            value, "get_fields_and_field_types", lambda: value.__slots__
-        )()  # slots of ROS 2 differ
+        fields = getattr(value, "get_fields_and_field_types", None)  # ROS 2 has other names for its slots
+        names = value.__slots__ if fields is None else fields()
         return {name: as_data(getattr(value, name)) for name in names}
     if isinstance(value, bytes) or getattr(value, "typecode", "") == "B":
         return base64.b64encode(bytes(value)).decode()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 import time
 from typing import Any
@@ -46,18 +47,14 @@ class MotionReports:
             parent = each["header"]["frame_id"].lstrip("/")
             self._links[each["child_frame_id"].lstrip("/")] = parent, turn
         frame, robot = self._frames
-        x = y = yaw = 0.0
+        at, yaw = 0j, 0.0  # where the robot is in the frame that the loop has come to, x + iy
         for _ in self._links:
             if robot not in self._links:
                 return None
-            robot, (left, up, turned) = self._links[robot]
-            x, y = (
-                left + math.cos(turned) * x - math.sin(turned) * y,
-                up + math.sin(turned) * x + math.cos(turned) * y,
-            )
-            yaw += turned
+            robot, (x, y, turned) = self._links[robot]
+            at, yaw = complex(x, y) + at * cmath.rect(1.0, turned), yaw + turned
             if robot == frame:
-                return frame, (x, y, yaw)
+                return frame, (at.real, at.imag, yaw)
         return None
 
     def _tell(self, what: str, **values: Any) -> None:

@@ -92,26 +92,20 @@ class RosbridgeWorker(SkillWorker):
     def send(self, goal: Goal, fields: Message) -> None:
         """Send a goal, call a service, or publish a message."""
         server, protocol = goal.server, self.graph.protocol
-        name = goal.handle = str(uuid.uuid4())
-        if server.kind != "action":
-            self._send_other(goal, fields)
-            return
-        self._message = protocol.goal(server.name, server.type, name, fields)
-        goal.is_acknowledged = not protocol.has_status
+        number = goal.handle = str(uuid.uuid4())
+        if server.kind == "action":
+            self._message = protocol.goal(server.name, server.type, number, fields)
+            goal.stop = lambda: server.cancel(number)
+        elif server.kind == "service":
+            about = {"id": number, "service": server.name, "type": "/".join(parts_of(server.type))}
+            self._message = {"op": "call_service", **about, "args": fields}
+        else:
+            self._message = {"op": "publish", "topic": server.name, "msg": fields}
+        goal.is_acknowledged = server.kind != "action" or not protocol.has_status
         goal.sent = time.monotonic()
         self._again = goal.sent + AGAIN
         self.graph.send(self._message)
-        goal.stop = lambda: server.cancel(name)
-
-    def _send_other(self, goal: Goal, fields: Message) -> None:
-        """Perform what cannot be cancelled."""
-        goal.sent, goal.is_acknowledged = time.monotonic(), True
-        name, kind = goal.server.name, "/".join(parts_of(goal.server.type))
-        if goal.server.kind == "service":
-            call = {"op": "call_service", "id": goal.handle, "service": name, "type": kind, "args": fields}
-            self.graph.send(call)
-        else:
-            self.graph.send({"op": "publish", "topic": name, "msg": fields})
+        if server.kind == "topic":
             self.end(goal, "result", values={})
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
