@@ -254,12 +254,39 @@ def test_planner_keeps_out_of_rooms_that_rules_forbid(robots: Robots) -> None:
 
 def test_mission_ends_where_the_robot_enters_a_forbidden_room(robots: Robots) -> None:
     nav2 = robots.nav2("--speed", "2", "--acceleration", "9")
-    robots.robot()
+    status, said = mission(robots, "    go_to('hall')\n    say('there')\n")
+    assert status == 1, said
+    assert "not-the-cellar" in said
+    told(nav2, "goal")
+    told(nav2, "cancel")
+
+
+LATCHED = """\
+import time
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+rclpy.init()
+node = rclpy.create_node("localization")
+qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+pose = PoseStamped()
+pose.header.frame_id = "map"
+publisher = node.create_publisher(PoseStamped, "/once", qos)
+publisher.publish(pose)
+print('["ready"]', flush=True)
+time.sleep(60)
+"""
+
+
+def mission(robots: Robots, program: str, connection: str = CONNECTION) -> tuple[int, str]:
+    """Run a program under the rule; the exit status, and what is said."""
+    robots.robot(connection)
     (robots.folder / "rules.yaml").write_text(RULE)
-    (robots.folder / "drive.py").write_text("def task_program():\n    go_to('hall')\n    say('there')\n")
+    (robots.folder / "drive.py").write_text(f"def task_program():\n{program}")
     files = [str(robots.folder / name) for name in ("robot.yaml", "door.py", "rules.yaml", "drive.py")]
     command = ["run", files[3], "--connect", files[0], "--skills", files[1], "--rules", files[2], "--yes"]
-    environment = {**os.environ, "CODEBOTLER_HOME": str(robots.folder / "home")}
+    environment, python = {**os.environ, "CODEBOTLER_HOME": str(robots.folder / "home")}, str(ROS2_PYTHON)
     done = subprocess.run(
         [
             sys.executable,
@@ -275,7 +302,18 @@ def test_mission_ends_where_the_robot_enters_a_forbidden_room(robots: Robots) ->
         check=False,
         env=environment,
     )
-    assert done.returncode == 1, done.stderr
-    assert "not-the-cellar" in done.stdout + done.stderr
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_robot_that_drives_on_without_a_pose_is_stopped(robots: Robots, tmp_path: Path) -> None:
+    nav2 = robots.nav2("--speed", "2", "--acceleration", "9")
+    (tmp_path / "once.py").write_text(LATCHED)
+    localization = Process(tmp_path / "once.py", python=ROS2_PYTHON)
+    robots.scene.processes.append(localization)
+    localization.expect("ready")
+    connection = CONNECTION.replace("/amcl_pose", "/once")
+    status, said = mission(robots, "    go_to('hall')\n    say('there')\n", connection)
+    assert status == 1
+    assert "without telling where" in said
     told(nav2, "goal")
     told(nav2, "cancel")

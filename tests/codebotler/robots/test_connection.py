@@ -154,10 +154,16 @@ def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None
     now += 1.5
     states.append((seen.is_still, seen.is_moving))  # it says no more
     assert seen.is_silent
+    assert states == [(False, False), *[(False, True)] * 3, (True, False), (False, True), (False, False)]
+
+
+def test_robot_is_unseen_when_it_drives_on_without_a_pose(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr("time.monotonic", lambda: now)
+    seen, unseen = Motion(), []
     for _ in range(4):
         now += 0.3
-        seen.take({"is": "velocity", "speed": 1.0})
-    assert seen.is_unseen  # it drove on for a metre
-    seen.take(pose)
-    assert not seen.is_unseen
-    assert states == [(False, False), *[(False, True)] * 3, (True, False), (False, True), (False, False)]
+        seen.take({"is": "velocity", "speed": 1.5})
+        unseen.append(seen.is_unseen)
+    seen.take({"is": "pose", "x": 1.0, "y": 0.0, "yaw": 0.0, "frame": "map"})
+    assert [*unseen, seen.is_unseen] == [False, True, True, True, False]

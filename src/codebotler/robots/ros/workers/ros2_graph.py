@@ -34,24 +34,29 @@ class Ros2Graph:
         self._is_left_behind = self._has_ended = False
         rclpy.init(args=None, signal_handler_options=SignalHandlerOptions.NO)  # the robot must stop first
 
-    def enter(self) -> bool:
+    def enter(self, *, is_rescue: bool = False) -> bool:
         """Start our node; whether an earlier one of its name had died without leaving.
 
         On one machine, no two workers pass; between machines, two that start together may, and then both
-        notice each other and stop.
+        notice each other and stop. In a rescue, which must not wait, it was the tool that killed the other.
         """
         self._lock = self._locked()
-        probe = self._rclpy.create_node(f"{self.node}_looks_{os.getpid()}")
-        time.sleep(DISCOVERY)
-        self._is_left_behind = self.node in probe.get_node_names()
-        if self._is_left_behind and self._answers(probe):
-            self._rclpy.shutdown()
-            raise SetupError(self._taken.format(self.node))
-        probe.destroy_node()
+        self._is_left_behind = is_rescue or self._has_left()
         self.ours = self._rclpy.create_node(self.node)
         self.executor = self._rclpy.executors.SingleThreadedExecutor()
         self.executor.add_node(self.ours)
         return self._is_left_behind
+
+    def _has_left(self) -> bool:
+        """Whether a node of our name is on the graph, but dead; SetupError if it is alive."""
+        probe = self._rclpy.create_node(f"{self.node}_looks_{os.getpid()}")
+        time.sleep(DISCOVERY)
+        is_there = self.node in probe.get_node_names()
+        if is_there and self._answers(probe):
+            self._rclpy.shutdown()
+            raise SetupError(self._taken.format(self.node))
+        probe.destroy_node()
+        return is_there
 
     def spin(self) -> None:
         """Start the executor's thread, once all clients and servers are made.

@@ -140,7 +140,7 @@ class Ros2Worker(SkillWorker):
         actions = {call["type"]: call["definition"] for call in calls.values() if call["definition"]}
         specs = message_types(names, map(Path, self._packages), self._tell, actions=actions)
         self.graph = Ros2Graph(start["node"])
-        left_behind = self.graph.enter()
+        left_behind = self.graph.enter(is_rescue=start["cancel_all"])
         self.servers = {
             skill: KINDS[call["kind"]](self, call, specs[call["type"]]) for skill, call in calls.items()
         }
