@@ -11,6 +11,7 @@ from tempfile import gettempdir
 import pytest
 
 from codebotler.core.skills.paper import SKILLS
+from codebotler.robots.reservation import lock_folder
 from codebotler.robots.ros.ros2 import INSTALL, NEEDS
 from codebotler.robots.ros.worker import lacks
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
@@ -58,3 +59,5 @@ def scene() -> Iterator[Scene]:
         yield scene
     finally:
         scene.end()
+        for sign in lock_folder().glob("*.goal"):  # of goals that ended with their servers
+            sign.unlink()

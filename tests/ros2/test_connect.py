@@ -286,7 +286,7 @@ def mission(robots: Robots, program: str, connection: str = CONNECTION) -> tuple
     (robots.folder / "drive.py").write_text(f"def task_program():\n{program}")
     files = [str(robots.folder / name) for name in ("robot.yaml", "door.py", "rules.yaml", "drive.py")]
     command = ["run", files[3], "--connect", files[0], "--skills", files[1], "--rules", files[2], "--yes"]
-    environment, python = {**os.environ, "CODEBOTLER_HOME": str(robots.folder / "home")}, str(ROS2_PYTHON)
+    environment = {**os.environ, "CODEBOTLER_HOME": str(robots.folder / "home")}
     done = subprocess.run(
         [
             sys.executable,
