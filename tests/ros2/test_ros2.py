@@ -231,6 +231,8 @@ def test_goals_of_a_worker_that_was_killed_with_its_tool_are_cancelled_by_the_ne
         tool.kill()
         os.kill(worker, signal.SIGKILL)
     time.sleep(4)  # the worker has left the graph, and its lock is free
+    with pytest.raises(NotReadyError, match="/go_to_server"):
+        scene.robot(skills=SkillTable((SAY,))).connect()  # which could not cancel it
     robot = scene.robot()
     robot.connect()
     server.expect("cancel", "never")

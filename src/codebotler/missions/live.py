@@ -71,8 +71,7 @@ class LiveRobot:
         self._began: float | None = None
         self._stopped, self._told = threading.Event(), threading.Event()
         self._fault: OSError | RobotLostError | None = None
-        watch = getattr(robot, "watch", None) if guard is not None and guard.judges_poses else None
-        self._is_watched = watch is not None and watch(self._moved)
+        self._is_watched = False
 
     @property
     def now(self) -> float:
@@ -305,6 +304,9 @@ class LiveRobot:
         """Raise what ends the program, if anything does."""
         if self._began is None:
             self._began = self.robot.clock.now
+            watch = getattr(self.robot, "watch", None)  # which some robots have
+            if watch is not None and self._guard is not None and self._guard.judges_poses:
+                self._is_watched = watch(self._moved)
         if self._fault is not None:
             raise self._fault
         if self._stopped.is_set():

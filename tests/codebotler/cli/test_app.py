@@ -152,6 +152,25 @@ def test_a_world_that_shows_a_problem_is_shown_or_else_one_in_which_all_goes_wel
     assert both.index("→ No") < both.index("→ Yes")
 
 
+def test_a_connected_robot_is_checked_by_what_its_file_maps(files: Path) -> None:
+    (files / "places.yaml").write_text("places: {lab: {x: 1, y: 2}}\n")
+    (files / "robot.yaml").write_text(
+        "places: places.yaml\nskills:\n"
+        "  go_to: {topic: /goal, type: geometry_msgs/msg/PoseStamped, message: {pose: $place.pose}}\n"
+    )
+    (files / "drive.py").write_text("def task_program():\n    go_to('lab')\n")
+    (files / "talk.py").write_text("def task_program():\n    go_to('attic')\n    say('hello')\n")
+    assert codebotler("check", files / "drive.py", "--connect", files / "robot.yaml")[0] == 0
+    status, out, _ = codebotler("check", files / "talk.py", "--connect", files / "robot.yaml")
+    assert status == 1
+    assert "say" in out
+    status, _, error = codebotler(
+        "run", files / "drive.py", "--robot", "sim", "--connect", files / "robot.yaml", "--yes"
+    )
+    assert status == 2
+    assert "ros2" in error
+
+
 def test_strict_and_seed_reach_the_check(files: Path) -> None:
     (files / "asks.py").write_text('def task_program():\n    ask("", "Tea?", ["Yes", "No"])\n')
     assert codebotler("check", files / "asks.py")[0] == 0

@@ -37,7 +37,7 @@ BY_HAND = "STOP THE ROBOT BY HAND"
 class ConnectedRobot(RosRobot):
     """A robot on ROS whose skills are what its connection maps them to; the options name the connection.
 
-    After a stop, it is held to stand still by its pose or velocity, not only by the answer to a cancel.
+    Whether it stands still after a stop is seen from its pose or velocity, not from the answer to a cancel.
     """
 
     def __init__(
@@ -84,8 +84,8 @@ class ConnectedRobot(RosRobot):
 
         Raises:
             RobotError: the robot cannot do it.
-            CancelledError: it was cancelled, and the robot stands still.
-            RobotLostError: something died or does not answer, or the robot goes on moving.
+            CancelledError: it was cancelled; `failed_stop` tells whether the robot stands still.
+            RobotLostError: something died or does not answer.
         """
         connection = self.connection
         if skill in connection.cameras:
