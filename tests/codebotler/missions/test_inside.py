@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import pytest
 
@@ -14,7 +17,7 @@ from codebotler.core.skills.declaration import POSE
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event
-from codebotler.core.world import Room, World, laid_out, rooms_along
+from codebotler.core.world import Point, Room, World, laid_out, rooms_along
 from codebotler.missions.log import EVENTS, Line, State
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import expect_poses, preflight
@@ -38,6 +41,7 @@ WORLD = World.read(OFFICE)
 MAP = RoomMap.of(WORLD)
 AS_WRITTEN = Rules(literals="as-written")
 THROUGH = "def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n    say('done')\n"
+SLEEPS = "import time\n\n\ndef task_program():\n    time.sleep(60)\n"
 AROUND = THROUGH.replace("1')\n", "1')\n    go_to('start_loc')\n    go_to('supply room')\n").replace(
     "room 3", "room 1"
 )
@@ -280,6 +284,54 @@ def test_only_the_robot_that_drives_straight_is_checked_along_straight_ways() ->
     )
     assert in_grid is not None
     assert in_grid.plan[0].footprint == laid_out(World((Room("hall"),), "hall")).rooms[0].footprint
+
+
+# --- poses that a robot tells at any time, also between skills
+
+
+class Followed(Simulated):
+    """A robot that somebody else pushes from pose to pose, once the program has begun."""
+
+    def __init__(self, *poses: Point | None) -> None:
+        super().__init__(WORLD, speed=20.0)
+        self.poses = poses
+
+    def watch(self, told: Callable[[Point | None], None]) -> bool:
+        def push() -> None:
+            for pose in self.poses:
+                told(pose)
+
+        threading.Thread(target=push, daemon=True).start()
+        return True
+
+
+def spelling(robot: Robot) -> Robot:
+    return cast("Robot", SpellingRobot(robot))
+
+
+def with_face(robot: Robot) -> Robot:
+    return RobotWithFace(robot, Face())
+
+
+@pytest.mark.parametrize("around", [spelling, with_face])
+def test_a_pose_is_judged_also_while_no_skill_is_performed(
+    tmp_path: Path, around: Callable[[Robot], Robot]
+) -> None:
+    mission, lines = ran(tmp_path, around(Followed((2.0, 3.0), (7.0, 3.0))), SLEEPS, NEVER)
+    assert mission.state is State.STOPPED
+    assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
+
+
+def test_robot_that_moves_without_telling_where_is_stopped_and_lost(tmp_path: Path) -> None:
+    mission, lines = ran(tmp_path, Followed((2.0, 3.0), None), SLEEPS, NEVER)
+    assert mission.state is State.FAILED
+    assert not [line for line in lines if line["event"] == "rule"]
+
+
+def test_poses_are_not_asked_for_where_no_rule_is_about_them(tmp_path: Path) -> None:
+    short = "def task_program():\n    say('hello')\n"
+    mission, _ = ran(tmp_path, Followed((2.0, 3.0), None), short, rule('not tr.Exists(goto("vault"))'))
+    assert mission.state is State.DONE
 
 
 # --- for Nav2
