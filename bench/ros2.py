@@ -32,7 +32,7 @@ LOST = (NotReadyError, RobotError, RobotLostError)
 
 
 class Figures:
-    """What goals and connections took, in seconds, and what was lost."""
+    """Times of goals and connections in seconds, and the errors of those that were lost."""
 
     def __init__(self) -> None:
         self.goals: list[float] = []
@@ -69,7 +69,7 @@ def busy() -> Iterator[None]:
             loop.wait()
 
 
-def told(name: str, idle: list[float], loaded: list[float]) -> None:
+def print_ratios(name: str, idle: list[float], loaded: list[float]) -> None:
     """Print one row."""
     middle = median(loaded) / median(idle)
     most = quantiles(loaded, n=20)[-1] / quantiles(idle, n=20)[-1]
@@ -96,8 +96,8 @@ def main() -> int:
     goal, connection = 1000 * median(idle.goals), median(idle.connections)
     print(f"  idle: a goal {goal:.1f} ms, a connection {connection:.2f} s (median)")
     print("  with a busy loop on each core, compared to that:")
-    told("goal", idle.goals, loaded.goals)
-    told("connection", idle.connections, loaded.connections)
+    print_ratios("goal", idle.goals, loaded.goals)
+    print_ratios("connection", idle.connections, loaded.connections)
     for why in idle.lost + loaded.lost:
         print(f"  lost: {why}")
     return int(bool(idle.lost or loaded.lost))

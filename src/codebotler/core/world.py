@@ -156,7 +156,7 @@ _ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact i
 
 
 def is_within(point: Point, corners: Sequence[Point]) -> bool:
-    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
+    """Whether a point is in a polygon or on its edge."""
     x, y = point
     size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
     edges = zip(corners, [*corners[1:], corners[0]], strict=True)
