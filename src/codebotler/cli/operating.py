@@ -202,7 +202,7 @@ def serve_page(
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
-    from codebotler.web.access import Access, Place
+    from codebotler.web.access import Access, PageAddress
     from codebotler.web.console import Console
     from codebotler.web.frame import installed_pages
     from codebotler.web.proxy import proxies_in_front
@@ -212,7 +212,7 @@ def serve_page(
     kind, connection = options.connected(connect, robot, table)
     known = options.world_or_office(kind, world, table, connection)
     house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
-    place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
+    place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
     options.note_office(kind, world)
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))

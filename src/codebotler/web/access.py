@@ -116,7 +116,7 @@ class GuardRules:
 
 
 @dataclass(frozen=True)
-class Place:
+class PageAddress:
     """The address of the page."""
 
     host: str = "127.0.0.1"

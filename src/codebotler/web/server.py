@@ -30,7 +30,7 @@ from codebotler.core.terminal import note
 from codebotler.core.words import listed
 from codebotler.missions.mission import SHUTTING_DOWN
 from codebotler.web import api, api_page, face, page
-from codebotler.web.access import Access, Place, Role
+from codebotler.web.access import Access, PageAddress, Role
 from codebotler.web.console import Console
 from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
 from codebotler.web.guard import MOST_BYTES, NO_PAGE, Guard, refusal
@@ -49,7 +49,7 @@ LINGER = 3
 
 def serve(
     console: Console | None,
-    place: Place,
+    place: PageAddress,
     access: Access,
     further: Sequence[Pages] = (),
     runs: Path = RUNS,
@@ -82,7 +82,7 @@ def serve(
         _Server(settings, console).run([bound])
 
 
-def _links(place: Place, port: int, access: Access, console: Console | None) -> str:
+def _links(place: PageAddress, port: int, access: Access, console: Console | None) -> str:
     shown = "localhost" if place.is_loopback else socket.gethostname()
     addresses = [*(proxy.page for proxy in place.proxies), f"http://{shown}:{port}/"]
 
@@ -102,7 +102,7 @@ def _links(place: Place, port: int, access: Access, console: Console | None) -> 
     return "\n".join(lines)
 
 
-def _check_prefixes(app: FastAPI, place: Place) -> None:
+def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
     """Refuse prefixes that begin like an address of ours, since proxies may or may not remove them."""
     routes = (*app.routes, *nicegui.app.routes)
     own = {path.split("/")[1] for route in routes if (path := getattr(route, "path", ""))}

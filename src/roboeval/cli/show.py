@@ -240,12 +240,12 @@ def serve(
     """
     from codebotler.core.errors import UserError
     from codebotler.web import server
-    from codebotler.web.access import Access, Place
+    from codebotler.web.access import Access, PageAddress
     from codebotler.web.proxy import proxies_in_front
     from roboeval.web.pages import pages
     from roboeval.web.run_store import RunStore
 
-    place = Place(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
+    place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.asked_for(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
         raise UserError("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)

@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.ros.connection import Call, Connection, connection_of
+from codebotler.robots.ros.connection import Connection, SkillCall, connection_of
 from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.motion import Motion
 
@@ -97,7 +97,7 @@ def test_actions_of_ours_need_no_package(tmp_path: Path) -> None:
 
 def test_fields_are_filled_from_arguments() -> None:
     request = {"pose.x": "$place.x", "pose.y": 2, "names": ["$who", "to $who"], "plain": {"who": "$who"}}
-    fields = Call("topic", "/a", "a/msg/B", request).fields({"who": "ann", "place.x": 1.5})
+    fields = SkillCall("topic", "/a", "a/msg/B", request).fields({"who": "ann", "place.x": 1.5})
     assert fields == {
         "pose": {"x": 1.5, "y": 2},
         "names": ["ann", "to ann"],
@@ -121,14 +121,14 @@ def test_actions_of_the_skill_table_are_calls_as_well() -> None:
     ],
 )
 def test_why_a_skill_failed(received: dict[str, Any], message: str) -> None:
-    call = Call("service", "/open", "a/srv/B", success="ok", failure="OpenFailed")
+    call = SkillCall("service", "/open", "a/srv/B", success="ok", failure="OpenFailed")
     with pytest.raises(RobotError) as error:
         call.answer(received)
     assert (error.value.kind, str(error.value)) == ("OpenFailed", message)
 
 
 def test_result_is_at_the_path_of_a_field() -> None:
-    call = Call("action", "/look", "a/action/B", result="found.0.name", reason="detail.text")
+    call = SkillCall("action", "/look", "a/action/B", result="found.0.name", reason="detail.text")
     assert call.answer({"found": [{"name": "mug"}]}) == "mug"
     assert call.why({"detail": {"text": "too dark"}, "message": "other"}) == "too dark"
     with pytest.raises(RobotError, match=r"found\.0\.name"):

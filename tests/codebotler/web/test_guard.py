@@ -15,7 +15,16 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from codebotler.core.errors import UserError
-from codebotler.web.access import LOOPBACK, TRIES, WINDOW, Access, GuardRules, Place, Role, TooManyTriesError
+from codebotler.web.access import (
+    LOOPBACK,
+    TRIES,
+    WINDOW,
+    Access,
+    GuardRules,
+    PageAddress,
+    Role,
+    TooManyTriesError,
+)
 from codebotler.web.guard import MOST_BYTES, Guard, _is_same
 from codebotler.web.proxy import OuterAddress, proxies_in_front
 from command_line import ENVIRONMENT
@@ -473,9 +482,9 @@ def test_a_face_cannot_run_programs(path: str) -> None:
 
 
 def test_names_by_which_the_page_may_be_called() -> None:
-    here = Place().rules(Access(), 1)
+    here = PageAddress().rules(Access(), 1)
     assert (here.any_address, "localhost" in here.hosts) == (False, True)
-    everywhere = Place("0.0.0.0", names=("Robot.Local",)).rules(Access(), 2)
+    everywhere = PageAddress("0.0.0.0", names=("Robot.Local",)).rules(Access(), 2)
     assert (everywhere.any_address, "robot.local" in everywhere.hosts) == (True, True)
     assert here.cookie != everywhere.cookie
 
@@ -483,14 +492,14 @@ def test_names_by_which_the_page_may_be_called() -> None:
 def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with Place(port=0).listening() as first, Place(port=0).listening() as other:
+    with PageAddress(port=0).listening() as first, PageAddress(port=0).listening() as other:
         taken, free = first.getsockname()[1], other.getsockname()[1]
         other.close()
         monkeypatch.setattr("codebotler.web.access.PORTS", (taken, free))
-        with Place().listening() as found:
+        with PageAddress().listening() as found:
             assert found.getsockname()[1] == free
         with pytest.raises(UserError, match=f"port {taken} is already in use"):
-            Place(port=taken).listening()
+            PageAddress(port=taken).listening()
 
 
 # --- behind a proxy

@@ -23,7 +23,7 @@ from codebotler.robots.base import (
     no_feedback,
 )
 from codebotler.robots.places import Place, Places
-from codebotler.robots.ros.connection import Call
+from codebotler.robots.ros.connection import SkillCall
 from codebotler.robots.ros.keepout import keepout
 from codebotler.robots.ros.motion import Pose
 from codebotler.robots.ros.robot import RosRobot, Waits
@@ -109,7 +109,7 @@ class ConnectedRobot(RosRobot):
         motion = worker.motion
         while not motion.is_still and not motion.is_silent and time.monotonic() < until:
             time.sleep(BEAT)
-        return f"it was told to stop, but goes on moving: {BY_HAND}" if motion.is_moving else ""
+        return f"it was told to stop but is still moving: {BY_HAND}" if motion.is_moving else ""
 
     def watch(self, told: Callable[[Point | None], None]) -> bool:
         """Call `told` with each pose until the connection ends, and None where it moves without any.
@@ -186,7 +186,7 @@ class ConnectedRobot(RosRobot):
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
         """Look for something in a camera's next picture, unless the robot is stopped."""
-        call = Call("topic", topic, "", failure="IsInRoomFailed")
+        call = SkillCall("topic", topic, "", failure="IsInRoomFailed")
         seen = self._received(call, {"do": "look", "topic": topic}, no_feedback)
         found, detector = Future[tuple[bool, bytes]](), self._detectors[model]
 

@@ -1,4 +1,4 @@
-"""How a robot is told to perform its skills: the actions of the skill table, or what a file says."""
+"""The action, service or topic that performs each skill: from the skill table, or from a file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FROM_PLACES = {"get_all_rooms": False, "get_current_location": True}
 
 
 @dataclass(frozen=True)
-class Call:
+class SkillCall:
     """How a robot is told to perform one skill.
 
     Args:
@@ -107,7 +107,7 @@ class Connection:
         keepout: the topics of a mask of where it must not be, and of what describes the mask.
     """
 
-    calls: Mapping[str, Call]
+    calls: Mapping[str, SkillCall]
     robot: str = "ros2"
     places: Places | None = None
     pose: Watched | None = None
@@ -129,14 +129,14 @@ def connection_of(skills: SkillTable) -> Connection:
     return Connection({row.name: _action_of(row) for row in skills.rows if row.ros is not None})
 
 
-def _action_of(skill: Skill) -> Call:
+def _action_of(skill: Skill) -> SkillCall:
     ros = skill.ros
     assert ros is not None, "it has an action"
     names = [line.split()[1] for line in ros.goal]
     request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
     result = "" if ros.result is None else "result"
     failure = ros.failure or f"{ros.type}Failed"
-    return Call(
+    return SkillCall(
         "action",
         ros.server,
         f"{ros.package}/action/{ros.type}",

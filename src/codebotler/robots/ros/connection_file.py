@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.yaml_files import YamlFile
 from codebotler.robots.places import Places, read_places
-from codebotler.robots.ros.connection import OF_PLACE, Call, Connection, Watched, variables_in
+from codebotler.robots.ros.connection import OF_PLACE, Connection, SkillCall, Watched, variables_in
 
 
 def _as_topic(text: str) -> str:
@@ -150,7 +150,7 @@ def _camera(file: YamlFile, name: str, form: SkillForm, skill: Skill) -> tuple[s
     return form.image, form.detector
 
 
-def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) -> Call:
+def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) -> SkillCall:
     at = ("skills", skill.name)
     named = [(kind, name) for kind in SENT if (name := getattr(form, kind)) is not None]
     if len(named) != 1 or form.type is None:
@@ -172,14 +172,14 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"
             raise file.wrong(f"${variable} is unknown here{lacks}; known are: {given}", *at, SENT[kind])
     try:
-        Call("topic", "", "", request).fields(dict.fromkeys(known, ""))
+        SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
         raise file.wrong("a field is both a value and the start of a path", *at, SENT[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _whole(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
     definition = ros.definition if ros is not None and is_ours else ""
-    return Call(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]
+    return SkillCall(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]
 
 
 def _whole(kind: str, text: str) -> str:

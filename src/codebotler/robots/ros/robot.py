@@ -25,7 +25,7 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import file_of
-from codebotler.robots.ros.connection import Call, Connection, Values, connection_of
+from codebotler.robots.ros.connection import Connection, SkillCall, Values, connection_of
 from codebotler.robots.ros.worker import Message, RosWorker, lacks
 
 OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
@@ -125,7 +125,7 @@ class RosRobot:
         result: Result = call.answer(self._received(call, order, feedback))
         return result
 
-    def _received(self, call: Call, order: Message, feedback: Feedback) -> Values:
+    def _received(self, call: SkillCall, order: Message, feedback: Feedback) -> Values:
         """Send an order to perform a call, and return what the robot answers."""
         message = self._awaited(order, feedback)
         match message:
@@ -262,7 +262,7 @@ def calls_data(connection: Connection) -> Message:
     }
 
 
-def error_of(call: Call, text: str, state: str) -> RobotError:
+def error_of(call: SkillCall, text: str, state: str) -> RobotError:
     """The error of a goal that was rejected or aborted (`state`), in the server's words.
 
     They may begin with the kind, as in `PickInvalidObject: there is no mug`.

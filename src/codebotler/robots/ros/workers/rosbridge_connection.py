@@ -24,7 +24,7 @@ OPENS, CLOSES = 5.0, 1.0  # seconds that a rosbridge may take for that
 FAULTS = (OSError, ValueError, WebSocketException)
 
 
-class Connection:
+class RosbridgeConnection:
     """Sends messages, and calls `hear` with news of goals, and `lost` once, in a thread of its own."""
 
     def __init__(

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from channel import Message, SetupError, serve
 from goals import Goal, Server, SkillWorker
 from message_types import parts_of
-from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
+from rosbridge_connection import FAULTS, INSISTS, SETTLES, RosbridgeConnection
 from rosbridge_protocol import GoalUpdate
 
 AGAIN = 0.5  # seconds after which a message without any effect is sent again
@@ -18,7 +18,7 @@ AGAIN = 0.5  # seconds after which a message without any effect is sent again
 class RosbridgeServer(Server):
     """The action server of one skill, seen through a rosbridge."""
 
-    def __init__(self, connection: Connection, action: Message) -> None:
+    def __init__(self, connection: RosbridgeConnection, action: Message) -> None:
         super().__init__(action)
         self.kind: str = action["kind"]
         self._connection = connection
@@ -50,7 +50,7 @@ class RosbridgeServer(Server):
 class RosbridgeWorker(SkillWorker):
     """Performs skills over a rosbridge."""
 
-    graph: Connection
+    graph: RosbridgeConnection
     settles = SETTLES
 
     def connect(self, start: Message) -> bool:
@@ -58,7 +58,7 @@ class RosbridgeWorker(SkillWorker):
         calls = start["calls"]
         actions = [call for call in calls.values() if call["kind"] == "action"]
         try:
-            self.graph = Connection(start["address"], actions, self._hear, self._lost)
+            self.graph = RosbridgeConnection(start["address"], actions, self._hear, self._lost)
         except FAULTS as error:
             raise SetupError(
                 f"no rosbridge answers at {start['address']} ({error}); start it, "
