@@ -93,8 +93,6 @@ def check(
 
     It reads the program and runs it in imagined worlds. The exit status is 1 if there are problems.
     """
-    from dataclasses import replace
-
     from codebotler.checking import check
     from codebotler.cli.check import check_view, read_program
     from codebotler.cli.rules import rules_for
@@ -108,11 +106,7 @@ def check(
     known = options.world_or_office("", world, table, connection)
     house_rules = rules_for(known, rules, table)
     source = read_program(program)
-    room_map = None if known is None else RoomMap.of(known)
-    if known is not None and world is None:  # places of a robot, which finds its own ways
-        names = tuple(room.name for room in known.rooms)
-        plan = tuple(replace(room, stand_at=None) for room in known.rooms)
-        room_map = RoomMap(names, names[0], plain=True, plan=plan)
+    room_map = None if known is None else (RoomMap.of_places if world is None else RoomMap.of)(known)
     with busy("checking"):
         found = check.check(
             source,

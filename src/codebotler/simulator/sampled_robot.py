@@ -57,6 +57,13 @@ class RoomMap:
         plan = [Room(room.name, (), (), room.footprint, room.stand_at) for room in laid_out(world).rooms]
         return cls(tuple(room.name for room in world.rooms), world.robot, plan=tuple(plan))
 
+    @classmethod
+    def of_places(cls, world: World) -> RoomMap:
+        """The places of a robot that finds its own ways between them, beginning at the first."""
+        names = tuple(room.name for room in world.rooms)
+        plan = tuple(Room(room.name, (), (), room.footprint) for room in world.rooms)
+        return cls(names, names[0], plain=True, plan=plan)
+
     def room(self, request: str) -> str | None:
         """The room that a request finds; None if there is no such room."""
         if not (self.guessed or self.plain):

@@ -153,14 +153,22 @@ def test_a_world_that_shows_a_problem_is_shown_or_else_one_in_which_all_goes_wel
 
 
 def test_a_connected_robot_is_checked_by_what_its_file_maps(files: Path) -> None:
-    (files / "places.yaml").write_text("places: {lab: {x: 1, y: 2}}\n")
+    cellar = "{polygon: [[2, -1], [4, -1], [4, 1], [2, 1]]}"
+    places = f"places: {{dock: {{x: 0, y: 0}}, cellar: {cellar}, lab: {{x: 6, y: 0}}}}\n"
+    (files / "places.yaml").write_text(places)
+    (files / "rules.yaml").write_text(
+        "rules: [{name: cellar, says: Never be there., always: not tr.Exists(inside('cellar'))}]\n"
+    )
     (files / "robot.yaml").write_text(
         "places: places.yaml\nskills:\n"
         "  go_to: {topic: /goal, type: geometry_msgs/msg/PoseStamped, message: {pose: $place.pose}}\n"
     )
-    (files / "drive.py").write_text("def task_program():\n    go_to('lab')\n")
+    (files / "drive.py").write_text("def task_program():\n    go_to('dock')\n    go_to('lab')\n")
+    (files / "down.py").write_text("def task_program():\n    go_to('cellar')\n")
     (files / "talk.py").write_text("def task_program():\n    go_to('attic')\n    say('hello')\n")
-    assert codebotler("check", files / "drive.py", "--connect", files / "robot.yaml")[0] == 0
+    options = ("--connect", files / "robot.yaml", "--rules", files / "rules.yaml")
+    assert codebotler("check", files / "drive.py", *options)[0] == 0  # the robot finds its own way
+    assert codebotler("check", files / "down.py", *options)[0] == 1
     status, out, _ = codebotler("check", files / "talk.py", "--connect", files / "robot.yaml")
     assert status == 1
     assert "say" in out
