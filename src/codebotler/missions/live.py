@@ -211,12 +211,17 @@ class LiveRobot:
                 self._end_by(broken)
 
     def _end_by(self, broken: RuleViolationError) -> None:
-        """Stop the robot, and only then log which rule was broken, unless the program may go on."""
+        """Stop the mission, or log which call a rule has prevented where the program may go on."""
         if broken.ends_run:
             self.on_broken(broken)
+        else:
+            self.log_rule(broken)
+        self._check_end()
+
+    def log_rule(self, broken: RuleViolationError) -> None:
+        """Log which rule was broken, and in which line of the program."""
         at = {} if self.line is None else {"line": self.line}
         self._note("rule", **at, **_told(broken))
-        self._check_end()
 
     def report_unkept(self) -> str:
         """Log the first rule that is not kept at the end, and return the sentence; empty if all are."""

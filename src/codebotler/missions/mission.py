@@ -74,6 +74,9 @@ class Mission:
         self._has_program = False  # which may be empty
         self._stopped_by: str | None = None
         self._broken_at: int | None = None  # the line that asked for what a rule forbade
+        self._unlogged: RuleViolationError | None = (
+            None  # the rule was broken, and the log does not say so yet
+        )
         self._asked, self._passed_on = 0.0, math.inf  # when a stop was first asked for; when the robot knew
         self._live: LiveRobot | None = None
         self._worker: Worker | None = None
@@ -234,8 +237,11 @@ class Mission:
         live = LiveRobot(reserved.robot, self._write, place=place, guard=guard, room_map=room_map)
 
         def on_broken(broken: RuleViolationError) -> None:
-            self._broken_at = live.line
-            self.stop(f"rule {broken.rule.name}")
+            self._broken_at, self._unlogged = live.line, broken
+            try:
+                self.stop(f"rule {broken.rule.name}")
+            finally:
+                self._log_rule(live)
 
         live.on_broken = on_broken
         with self._writing:
@@ -295,6 +301,7 @@ class Mission:
                     return
                 if self._live is not None:
                     self.trace = self._live.trace
+                    self._log_rule(self._live)  # the thread that stops the robot may not have come to it
                 if self._stopped_by is not None and reason != UNCONFIRMED and not is_lost:
                     state, reason, line = State.STOPPED, stop_text(self._stopped_by), self._broken_at
                 if self._stopped_by is not None and self.state is State.RUNNING:
@@ -312,6 +319,13 @@ class Mission:
         by = self._stopped_by or ""
         self._write("stop", by=by, seconds_to_cancel=round(passed_on - self._asked, 6))
         self._step(State.STOPPING, "be stopped", reason=stop_text(by))
+
+    def _log_rule(self, live: LiveRobot) -> None:
+        """Log the broken rule once: after the stop, and before the mission's end closes the log."""
+        with self._writing:
+            broken, self._unlogged = self._unlogged, None
+            if broken is not None:
+                live.log_rule(broken)
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state.is_moving:

@@ -35,6 +35,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.worker import Worker
 from doubles import Answering
 
 WORLD = World.read(OFFICE)
@@ -318,6 +319,21 @@ def test_a_pose_is_judged_also_while_no_skill_is_performed(
     tmp_path: Path, around: Callable[[Robot], Robot]
 ) -> None:
     mission, lines = ran(tmp_path, around(Followed((2.0, 3.0), (7.0, 3.0))), SLEEPS, NEVER)
+    assert mission.state is State.STOPPED
+    assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
+
+
+def test_a_broken_rule_is_logged_where_the_mission_ends_before_its_stop_returns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop_late(worker: Worker) -> None:
+        ended.wait(5)
+        stop(worker)
+
+    stop, ended = Worker.stop, threading.Event()
+    monkeypatch.setattr(Worker, "stop", stop_late)
+    monkeypatch.setattr(Mission, "__exit__", lambda *_: ended.set())
+    mission, lines = ran(tmp_path, Followed((2.0, 3.0), (7.0, 3.0)), SLEEPS, NEVER)
     assert mission.state is State.STOPPED
     assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
 
