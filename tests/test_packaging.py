@@ -21,6 +21,7 @@ PACKAGING = ROOT / "packaging"
 ON_TOP = {
     *(
         "CHANGELOG.md",
+        "CONTRIBUTING.md",
         "CITATION.cff",
         "LICENSE",
         "Makefile",
