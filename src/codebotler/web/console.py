@@ -71,8 +71,7 @@ class Console:
     def __exit__(self, *_: object) -> None:
         session = self._session
         if session is not None:
-            if not session.view.is_over:
-                session.stop(SHUTTING_DOWN)
+            session.stop(SHUTTING_DOWN)
             session.join(GRACE + 1)
         with self._checking:
             self._held.close()
@@ -123,8 +122,8 @@ class Console:
                 before=before,
                 world=self.world,
             )
-        if before is not None and not before.view.is_over:
-            threading.Thread(target=before.stop, args=("another instruction",), daemon=True).start()
+        if before is not None:
+            before.stop_soon("another instruction")
         session.start()
         self.notifier.change()
         return session
@@ -147,18 +146,12 @@ class Console:
         self.interrupted = ()
         self.notifier.change()
 
-    def stop(self, by: str) -> None:
-        """Stop the mission at hand, if there is one; returns when the robot has been told."""
-        session = self._session
-        if session is not None and not session.view.is_over:
-            session.stop(by)
-
-    def stop_soon(self, by: str, *, only_moving: bool = False) -> bool:
+    def stop(self, by: str, *, only_moving: bool = False) -> bool:
         """Stop the mission, or only a robot that runs, without waiting; whether there is anything to stop."""
-        view = self.view
-        if view.is_over or (only_moving and not view.is_running):
+        session, view = self._session, self.view
+        if session is None or view.is_over or (only_moving and not view.is_running):
             return False
-        threading.Thread(target=self.stop, args=(by,), daemon=True).start()
+        session.stop_soon(by)
         return True
 
     def check(self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()) -> Check:
