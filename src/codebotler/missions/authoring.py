@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from codebotler.generation.generate import Generation, write_program
 from codebotler.missions.view import SessionView
@@ -13,19 +13,6 @@ from codebotler.models.base import Heard, Model
 from codebotler.models.open import open_model
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.robots.base import Robot
-
-
-@dataclass(frozen=True)
-class Again:
-    """A person's wish for another program.
-
-    Args:
-        repair: whether the model is shown what was wrong before.
-        max_tokens: the limit for this reply and later ones; None for the last one.
-    """
-
-    repair: bool = False
-    max_tokens: int | None = None
 
 
 class ModelAuthor:
@@ -39,23 +26,18 @@ class ModelAuthor:
     def __init__(self, open_model: Callable[[str], Model], name: str) -> None:
         self._open_model, self._name = open_model, name
         self._model: Model | None = None  # the last one
-        self._max_tokens: int | None = None  # that a person has chosen
+        self.max_tokens: int | None = None  # the limit for a reply that a person has chosen
         self._request: tuple[asyncio.AbstractEventLoop, asyncio.Task[Generation]] | None = None
         self._is_cancelled = False
 
-    def model(self, max_tokens: int | None) -> Model:
-        """Open the model, with another limit for its replies from now on if a person has chosen one."""
-        self._max_tokens = max_tokens or self._max_tokens
-        if self._max_tokens is None or self._model is None:
+    def write(self, prompt: Prompt, heard: Heard) -> tuple[str, Generation]:
+        """Ask for a program; return it with the model's name, or raise asyncio.CancelledError."""
+        if self.max_tokens is None or self._model is None:
             self._model = self._open_model(self._name)
-        if self._max_tokens is not None:
-            settings = replace(self._model.settings, max_tokens=self._max_tokens)
+        if self.max_tokens is not None:
+            settings = replace(self._model.settings, max_tokens=self.max_tokens)
             self._model = open_model(self._model.name, settings)
-        return self._model
-
-    def write(self, model: Model, prompt: Prompt, heard: Heard) -> Generation:
-        """Ask the model for a program; asyncio.CancelledError if that was cancelled."""
-        return asyncio.run(self._write(model, prompt, heard))
+        return self._model.name, asyncio.run(self._write(self._model, prompt, heard))
 
     def cancel(self) -> None:
         """End the request that is under way, and let no other begin."""

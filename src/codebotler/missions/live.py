@@ -40,7 +40,7 @@ class LiveRobot:
     """Answers what `Worker.run_live` asks of a robot, by a connected real or simulated one.
 
     The program's clock starts at `clock_starts`, by default the time of day here, since programs speak of the
-    time to people. `stop_button` is pressed where a rule is broken.
+    time to people. `button` is pressed where a rule is broken.
     """
 
     is_live = True
@@ -54,13 +54,12 @@ class LiveRobot:
         clock_starts: datetime | None = None,
         guard: RuleGuard | None = None,
         room_map: RoomMap | None = None,
-        stop_button: StopButton | None = None,
+        button: StopButton | None = None,
     ) -> None:
         self.robot, self.skills, self._note = robot, robot.skills, note
         self._guard, self._room_map = guard, room_map
-        self._stop_button = stop_button or StopButton(robot)
+        self._button = button or StopButton(robot)
         self.broken_rule: dict[str, object] = {}  # the log entry of the rule that stopped the mission
-        self.broken_line: int | None = None  # of the program, which broke it
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
         self.rules = Rules(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # of the program, which calls a skill there
@@ -71,7 +70,7 @@ class LiveRobot:
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
-        self._stopped = self._stop_button.ended
+        self._stopped = self._button.ended
         self._fault: OSError | RobotLostError | None = None
         self._is_watched = False
 
@@ -87,7 +86,7 @@ class LiveRobot:
 
     def stop(self) -> None:
         """Cancel the robot's work and start nothing more; from any thread, any number of times."""
-        self._stop_button.cancel_robot()
+        self._button.cancel_robot()
 
     def sleep_until(self, now: float) -> None:
         """Let time pass by the robot's clock, or raise StoppedError."""
@@ -203,9 +202,8 @@ class LiveRobot:
         at = {} if self.line is None else {"line": self.line}
         entry = at | _rule_entry(broken)
         if broken.ends_run:
-            self.broken_line = self.line
             self.broken_rule = entry  # the mission logs it, since this may not be the program's thread
-            self._stop_button.press(f"rule {broken.rule.name}")
+            self._button.press(f"rule {broken.rule.name}")
         else:
             self._note("rule", **entry)
         self._check_end()
@@ -276,21 +274,21 @@ class LiveRobot:
     def _done(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         which = {"number": self._number, "skill": skill.name}
 
-        def log_feedback(feedback: str | Picture) -> None:
+        def told(what: str | Picture) -> None:
             try:
-                if isinstance(feedback, Picture):
-                    self._note("picture", **which, picture=feedback.data)
+                if isinstance(what, Picture):
+                    self._note("picture", **which, picture=what.data)
                 else:
-                    if not self._is_watched and (found := AT.fullmatch(feedback)):
+                    if not self._is_watched and (found := AT.fullmatch(what)):
                         self._moved((float(found[1]), float(found[2])))
-                    self._note("feedback", **which, text=feedback)
+                    self._note("feedback", **which, text=what)
             except OSError as error:  # on a thread of the robot, where it would be lost
                 self._fault = error
                 self.stop()
 
         if event is not None and skill.recording and skill.recording.options and not event.options:
             raise RobotError("AskEmptyOptions", f'the question "{event.text}" offers no options')
-        return answered(skill, self.robot.perform(skill.name, given, log_feedback))
+        return answered(skill, self.robot.perform(skill.name, given, told))
 
     def _check_end(self) -> None:
         """Raise what ends the program, if anything does."""

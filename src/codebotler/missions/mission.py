@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +13,7 @@ from typing import Self, TypeAlias
 
 from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
-from codebotler.core.trace import Outcome, RunError, Status, Trace
+from codebotler.core.trace import RunError, Status, Trace
 from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event, log_of
@@ -180,8 +180,7 @@ class Mission:
     def stop(self, by: str = "somebody") -> None:
         """Stop the robot and the program, from any thread; nothing else starts.
 
-        Returns when the robot has the request and the log has it; `run` returns when the robot has ended its
-        work.
+        Returns when the robot was stopped and that is logged; `run` returns when all has ended.
 
         Args:
             by: the person or thing that stops it, in words such as `Ctrl-C`.
@@ -222,18 +221,12 @@ class Mission:
         """
         guard = RuleGuard(rules, () if room_map is None else room_map.plan) if rules else None
         live = LiveRobot(
-            reserved.robot,
-            self._write,
-            place=place,
-            guard=guard,
-            room_map=room_map,
-            stop_button=self.stop_button,
+            reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
         )
         with self._writing:
             if self.state is State.APPROVED:
                 reserved.use()
-                self._live = live
-                self.stop_button.attach(reserved.robot)
+                self._live, self.stop_button.robot = live, reserved.robot
             self._step(State.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
         threading.Thread(target=self._execute, args=(live,), name=self.id, daemon=True).start()
         try:
@@ -244,7 +237,7 @@ class Mission:
             raise
         finally:
             if not self._is_over.wait(GRACE):
-                self._end(live, State.FAILED, UNCONFIRMED, is_lost=True)
+                self._end(live, State.FAILED, UNCONFIRMED, None, is_lost=True)
         if self._fault is not None:
             raise self._fault
         return self.state
@@ -252,37 +245,23 @@ class Mission:
     def _execute(self, live: LiveRobot) -> None:
         """Run the program, on a thread of its own: a robot may never return from a skill."""
         try:
-            outcome = self._outcome(live)
+            with closing(Worker()) as worker:
+                self.stop_button.on_press(worker.stop)
+                if self.stop_button.ended.is_set():
+                    raise StoppedError  # noqa: TRY301 - it ends like any other error
+                outcome = worker.run_live(self.summary.program, live)
         except BaseException as error:  # noqa: BLE001 - whatever it is, the robot must not go on
             try:
                 live.stop()
             finally:
-                self._end(live, State.FAILED, _reason(error), is_lost=isinstance(error, RobotLostError))
+                self._end(live, State.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError))
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
             reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"
-            self._end(live, State.DONE if done else State.FAILED, reason, outcome.line)
+            self._end(live, State.DONE if done else State.FAILED, reason, outcome.line, is_lost=False)
 
-    def _outcome(self, live: LiveRobot) -> Outcome:
-        worker = Worker()
-        try:
-            self.stop_button.on_press(worker.stop)
-            if self.stop_button.ended.is_set():
-                raise StoppedError
-            return worker.run_live(self.summary.program, live)
-        finally:
-            worker.close()
-
-    def _end(
-        self,
-        live: LiveRobot,
-        state: State,
-        reason: str = "",
-        line: int | None = None,
-        *,
-        is_lost: bool = False,
-    ) -> None:
+    def _end(self, live: LiveRobot, state: State, reason: str, line: object, *, is_lost: bool) -> None:
         """End, unless it has ended; a mission that ends after a stop is stopped, if the robot is not lost."""
         why = "" if is_lost else self.stop_button.why_unstopped()
         try:
@@ -291,11 +270,10 @@ class Mission:
                     return
                 self.trace = live.trace
                 self._log_stop()
-                if self.stop_button.by is not None and why:
+                if self.state is State.STOPPING and why:
                     state, reason = State.FAILED, why
-                elif self.stop_button.by is not None and not is_lost:
-                    state, reason = State.STOPPED, stop_text(self.stop_button.by)
-                    line = live.broken_line
+                elif self.state is State.STOPPING and not is_lost:
+                    state, reason, line = State.STOPPED, self.summary.reason, live.broken_rule.get("line")
                 self._step(state, "end", reason=reason, line=line)
         except Exception as error:  # noqa: BLE001 - raised by `run`
             self._fault = error

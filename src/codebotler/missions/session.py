@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from codebotler.checking.evasions import evasions
@@ -19,7 +20,7 @@ from codebotler.checking.rule_rooms import expect_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
-from codebotler.missions.authoring import Again, ModelAuthor, prompt_of
+from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
@@ -83,7 +84,11 @@ class MissionSession:
         )
         self._events: list[Line] = []
         self._mission: Mission | None = None
-        self._wish: str | Again | None = order.program if order.has_program else Again()
+        self._wish: Callable[[Mission], None] | None = (  # of a person, for the session's own thread
+            partial(self._take, program=order.program)
+            if order.has_program
+            else partial(self._ask, repair=False)
+        )
         self._stop_button.on_press(self._end_waiting)
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
         self.on_event: Callable[[Line], None] = lambda _: None  # what it raises stops the robot
@@ -117,7 +122,7 @@ class MissionSession:
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
-            self._wish = program
+            self._wish = partial(self._take, program=program)
             self._change(program=program, author="", disabled_rules=(), **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
@@ -137,7 +142,7 @@ class MissionSession:
                 raise MissionError(f'there is no rule "{name}" in force')
             mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             with self._lock:
-                self._wish = view.program
+                self._wish = partial(self._take, program=view.program)
                 self._change(disabled_rules=(*view.disabled_rules, name), **UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
@@ -150,7 +155,8 @@ class MissionSession:
         with self._editing, self._lock:
             if not self._view.may_be_asked_again:
                 raise MissionError("the model cannot be asked again now")
-            self._wish = Again(repair, max_tokens)
+            self._author.max_tokens = max_tokens or self._author.max_tokens
+            self._wish = partial(self._ask, repair=repair)
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="", disabled_rules=())
 
     def approve(self, seen: str, *, despite_problems: bool = False) -> None:
@@ -199,11 +205,10 @@ class MissionSession:
         except Exception as error:
             if not isinstance(error, EXPECTED):
                 LOG.exception("a mission failed unexpectedly")
-            if not (
-                self._is_stopped and isinstance(error, NotReadyError)
-            ):  # a stopped robot gives no answers
-                self.error = error
-                self._show(error=_sentence(error))
+            if isinstance(error, NotReadyError) and self._is_stopped:
+                return  # the robot gives no answers any more
+            self.error = error
+            self._show(error=_sentence(error))
         finally:
             self._show(is_over=True, busy="", is_written=False)
 
@@ -239,10 +244,8 @@ class MissionSession:
             with self._lock:
                 self._lock.wait_for(lambda: self._wish is not None or not mission.state.is_open)
                 wish, self._wish = self._wish, None
-            if isinstance(wish, str):
-                self._take(mission, wish)
-            elif wish is not None:
-                self._ask(mission, wish)
+            if wish is not None:
+                wish(mission)
 
     def _run_approved(
         self, mission: Mission, reserved: Reservation, place: str, room_map: RoomMap | None
@@ -261,15 +264,14 @@ class MissionSession:
     def _is_stopped(self) -> bool:
         return self._stop_button.by is not None
 
-    def _ask(self, mission: Mission, how: Again) -> None:
+    def _ask(self, mission: Mission, *, repair: bool) -> None:
         """Have the model write a program, and take it; without one, go on as before."""
         before = self._view
         writing = {"busy": f"asking {before.model}", "is_written": True}
         self._show(**UNCHECKED | writing, program="", reply="", error="")
         try:
-            model = self._author.model(how.max_tokens)
-            prompt = prompt_of(before, self._robot, repair=how.repair)
-            made = self._author.write(model, prompt, self._add_to_reply)
+            prompt = prompt_of(before, self._robot, repair=repair)
+            author, made = self._author.write(prompt, self._add_to_reply)
         except asyncio.CancelledError:
             self._restore(before)
             return
@@ -286,7 +288,7 @@ class MissionSession:
             mission.note(none.sentence)
             self._restore(replace(before, programless=none))
             return
-        self._show(is_written=False, author=model.name)
+        self._show(is_written=False, author=author)
         self._take(mission, made.program)
 
     def _restore(self, before: SessionView) -> None:

@@ -82,8 +82,8 @@ class AsciiJSONResponse(JSONResponse):
 def refused(_request: Request, error: Exception) -> AsciiJSONResponse:
     """Say what is wrong with a request, without sending it back."""
     assert isinstance(error, RequestValidationError), "registered for this error alone"
-    faults = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
-    return AsciiJSONResponse({"detail": faults}, HTTPStatus.UNPROCESSABLE_ENTITY)
+    told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
+    return AsciiJSONResponse({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(console: Console) -> APIRouter:
@@ -216,8 +216,8 @@ def _add_rest(api: APIRouter, console: Console) -> None:
     ) -> dict[str, Any]:
         """The robot, its skills and its mission."""
         if once_begun:
-            await console.view_begun()
-        view = await console.view_over() if once_over else console.view
+            await console.view_once(over=False)
+        view = await console.view_once(over=True) if once_over else console.view
         return {
             "robot": console.robot.name,
             "skills": [skill.signature for skill in console.robot.skills.values()],
@@ -307,7 +307,7 @@ def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
 
 @contextmanager
 def as_http_errors() -> Iterator[None]:
-    """Answer a refusal with status 409, and wrong input with 422."""
+    """Answer what a mission refuses with 409, and what is wrong with 422."""
     try:
         yield
     except MissionError as error:

@@ -87,14 +87,9 @@ class Console:
         session = self._session
         return SessionView() if session is None else session.view
 
-    async def view_over(self) -> SessionView:
-        """What all viewers see once the mission is over, or after some seconds."""
-        await self.notifier.until(lambda: self.view.is_over, QUIET)
-        return self.view
-
-    async def view_begun(self) -> SessionView:
-        """What all viewers see once a mission goes on, or after some seconds."""
-        await self.notifier.until(lambda: not self.view.is_over, QUIET)
+    async def view_once(self, *, over: bool) -> SessionView:
+        """What all viewers see once a mission is over, or goes on; at the latest after some seconds."""
+        await self.notifier.until(lambda: self.view.is_over == over, QUIET)
         return self.view
 
     def begin(self, order: Order) -> MissionSession:

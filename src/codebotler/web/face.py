@@ -59,9 +59,9 @@ def router(console: Console, face: Face) -> APIRouter:
         `question` has the number to answer.
         """
         if once_begun:
-            await console.view_begun()
+            await console.view_once(over=False)
         if once_over:
-            await console.view_over()
+            await console.view_once(over=True)
         return face_data(console, face)
 
     @here.post("/api/face/answer")
