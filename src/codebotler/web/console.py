@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
-from contextlib import ExitStack, aclosing, contextmanager, suppress
+from collections.abc import AsyncGenerator, Callable, Sequence
+from contextlib import ExitStack, aclosing, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -172,17 +172,6 @@ class Notifier:
         for wake in wakes:
             wake()
 
-    @contextmanager
-    def watched(self, wake: Callable[[], None]) -> Iterator[None]:
-        """Have a function called at each change, on the thread that makes it; it must return at once."""
-        with self._lock:
-            self._wakes.append(wake)
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._wakes.remove(wake)
-
     async def changes(self) -> AsyncGenerator[None]:
         """Yield now, and again after changes; those during one round of the loop count as one."""
         loop, changed = asyncio.get_running_loop(), asyncio.Event()
@@ -191,11 +180,16 @@ class Notifier:
             with suppress(RuntimeError):  # the loop has ended, and with it all who waited
                 loop.call_soon_threadsafe(changed.set)
 
-        with self.watched(wake):
+        with self._lock:
+            self._wakes.append(wake)
+        try:
             while True:
                 changed.clear()
                 yield
                 await changed.wait()
+        finally:
+            with self._lock:
+                self._wakes.remove(wake)
 
     async def until(self, holds: Callable[[], bool], seconds: float | None = None) -> bool:
         """Wait until something holds, at most so many seconds; whether it does."""
