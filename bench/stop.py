@@ -135,7 +135,7 @@ def stopped(
         drives: set as soon as the robot drives.
         told: told what happens.
     """
-    with Reservation(robot, home) as reserved, Mission(home, robot.name, told=told) as mission:
+    with Reservation(robot, home) as reserved, Mission(home, robot.name, on_event=told) as mission:
         mission.draft(PROGRAM)
         mission.check([])
         mission.approve()

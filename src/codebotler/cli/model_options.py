@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import Signature, signature
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -138,3 +138,8 @@ def with_options_of(called: Callable[..., object]) -> Callable[[Command], Comman
         return command
 
     return extended
+
+
+def options_for(called: Callable[..., object], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a command that are those of a function."""
+    return {name: given[name] for name in signature(called).parameters}

@@ -8,10 +8,11 @@ from typing import Annotated, Any
 import typer
 
 from codebotler.cli import options
-from codebotler.cli.model_options import model_settings, with_options_of
+from codebotler.cli.model_options import model_settings, options_for, with_options_of
 from codebotler.core.terminal import note, print_text
 
 
+@with_options_of(options.robot_settings)
 @with_options_of(model_settings)
 def run(
     program: Annotated[
@@ -20,11 +21,6 @@ def run(
             metavar="PROGRAM|INSTRUCTION", help="A program file, - for standard input, or an instruction."
         ),
     ],
-    robot: options.RobotOption = None,
-    world: Annotated[
-        Path | None,
-        typer.Option(help="The world file of a simulated robot; by default an office for --robot sim."),
-    ] = None,
     model: options.ModelOption = None,
     base_url: options.BaseUrlOption = None,
     yes: Annotated[bool, typer.Option("--yes", help="Run the program without asking.")] = False,
@@ -32,45 +28,24 @@ def run(
         bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
     ] = False,
     shows_all: options.AllOption = False,
-    speed: options.SpeedOption = 1.0,
-    connect: options.ConnectOption = None,
-    address: options.AddressOption = "",
-    ros_python: options.RosPythonOption = options.ROS_PYTHON,
-    rules: options.RulesOption = None,
-    skills: options.SkillsOption = None,
-    **sampling: Any,  # noqa: ANN401 - of several kinds
+    **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
     Ctrl-C stops the robot; the exit status is then 130.
     """
-    from codebotler.checking.rules import read_rules
     from codebotler.cli import run
-    from codebotler.cli.rules import rooms_of
     from codebotler.cli.run import Request
     from codebotler.core.files import home
-    from codebotler.core.skills.files import skills_from
     from codebotler.models.chosen import chosen_model
     from codebotler.models.open import open_model
-    from codebotler.robots.base import Options
     from codebotler.robots.open import open_robot
 
     chosen = chosen_model(model, base_url)
-    table = skills_from(*(skills or ()))
-    kind, connection = options.connected(connect, robot, table)
-    known = options.world_or_office(kind, world, table, connection)
-    house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
-    request = Request(program, chosen.name, yes, despite_problems, shows_all, house_rules)
-    asked = chosen.with_its_server(model_settings(**sampling))
-    options.note_office(kind, world)
-    settings = Options(
-        world=known,
-        speed=speed or None,
-        address=address,
-        ros_python=ros_python,
-        skills=table,
-        connection=connection,
-    )
+    kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
+    request = Request(program, chosen.name, yes, despite_problems, shows_all, rules)
+    asked = chosen.with_its_server(model_settings(**options_for(model_settings, shared)))
+    options.note_office(kind, shared["world"])
     body = open_robot(kind, settings)
     raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
 
@@ -157,6 +132,7 @@ def connect(
         note(f"{out} is written; read it, and add what its first lines say is missing")
 
 
+@with_options_of(options.robot_settings)
 @with_options_of(model_settings)
 def serve_page(
     host: options.HostOption = "127.0.0.1",
@@ -165,14 +141,8 @@ def serve_page(
     behind_proxy: options.BehindProxyOption = None,
     token: options.TokenOption = None,
     no_token: options.NoTokenOption = False,
-    robot: options.RobotOption = None,
-    world: options.MapOption = None,
     model: options.ModelsOption = None,
     base_url: options.BaseUrlOption = None,
-    speed: options.SpeedOption = 1.0,
-    connect: options.ConnectOption = None,
-    address: options.AddressOption = "",
-    ros_python: options.RosPythonOption = options.ROS_PYTHON,
     face: Annotated[
         bool, typer.Option("--face", help="Have the robot speak and ask on a page of its own, /face.")
     ] = False,
@@ -185,21 +155,15 @@ def serve_page(
         typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
-    rules: options.RulesOption = None,
-    skills: options.SkillsOption = None,
-    **sampling: Any,  # noqa: ANN401 - of several kinds
+    **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Serve the web page for operating a robot.
 
     Ctrl-C ends it, which also stops the robot.
     """
-    from codebotler.checking.rules import read_rules
-    from codebotler.cli.rules import rooms_of
     from codebotler.cli.run import tell_missing
     from codebotler.core.files import home
-    from codebotler.core.skills.files import skills_from
     from codebotler.models.chosen import chosen_model, opener
-    from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
     from codebotler.web.access import Access, PageAddress
@@ -208,20 +172,16 @@ def serve_page(
     from codebotler.web.proxy import proxies_in_front
     from codebotler.web.server import serve
 
-    table = skills_from(*(skills or ()))
-    kind, connection = options.connected(connect, robot, table)
-    known = options.world_or_office(kind, world, table, connection)
-    house_rules = () if rules is None else read_rules(rules, table, rooms_of(known))
+    kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
-    options.note_office(kind, world)
+    options.note_office(kind, shared["world"])
     models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
-    settings = Options(known, speed or None, address, ros_python, table, connection)
+    opened = opener(models, base_url, model_settings(**options_for(model_settings, shared)))
     shown = Face(face_timeout) if face else None
-    opened = opener(models, base_url, model_settings(**sampling))
     body = open_robot(kind, settings) if shown is None else open_with_face(kind, settings, shown)
     tell_missing(body)
-    console = Console(body, home(), opened, models=models, world=known, face=shown, rules=house_rules)
+    console = Console(body, home(), opened, models=models, world=settings.world, face=shown, rules=rules)
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 
 

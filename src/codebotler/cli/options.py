@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -14,7 +14,9 @@ from codebotler.core.terminal import note, print_text
 if TYPE_CHECKING:
     from codebotler.core.skills.table import SkillTable
     from codebotler.core.world import World
+    from codebotler.robots.base import Options
     from codebotler.robots.ros.connection import Connection
+    from codebotler.simulator.rule_guard import Rule
 
 
 def robot_names(incomplete: str) -> list[str]:
@@ -135,6 +137,39 @@ NoTokenOption = Annotated[
         help="Let anyone on this machine in without a token; not with --host or --behind-proxy.",
     ),
 ]
+
+
+class RobotSettings(NamedTuple):
+    """What the options of a command say about its robot."""
+
+    kind: str
+    options: Options
+    rules: tuple[Rule, ...]
+
+
+def robot_settings(
+    *,
+    robot: RobotOption = None,
+    world: MapOption = None,
+    speed: SpeedOption = 1.0,
+    connect: ConnectOption = None,
+    address: AddressOption = "",
+    ros_python: RosPythonOption = ROS_PYTHON,
+    rules: RulesOption = None,
+    skills: SkillsOption = None,
+) -> RobotSettings:
+    """Read the files that options name; UserError if one is wrong."""
+    from codebotler.checking.rules import read_rules
+    from codebotler.core.skills.files import skills_from
+    from codebotler.robots.base import Options
+
+    table = skills_from(*(skills or ()))
+    kind, connection = connected(connect, robot, table)
+    known = world_or_office(kind, world, table, connection)
+    rooms = [] if known is None else [room.name for room in known.rooms]
+    house_rules = () if rules is None else read_rules(rules, table, rooms)
+    opened = Options(known, speed or None, address, ros_python, table, connection)
+    return RobotSettings(kind, opened, house_rules)
 
 
 def connected(file: Path | None, robot: str | None, skills: SkillTable) -> tuple[str, Connection | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -19,7 +18,6 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.core.words import listed
 from codebotler.core.world import World
-from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.log import State
 from codebotler.missions.mission import GRACE, MissionError
 from codebotler.missions.session import MissionSession
@@ -36,8 +34,11 @@ SIGNALS = {
     signal.SIGTERM: "SIGTERM",
     signal.SIGHUP: "SIGHUP, since its terminal was closed",
 }
-OF_SIGNALS = 128  # what shells add to the number of a signal, for the status of a process that it ended
-BRIEFLY = 2.0  # seconds in which what has not moved yet is tidied up after Ctrl-C
+SIGNAL_EXIT_BASE = 128
+"""Shells add this to the number of the signal that ended a process."""
+
+CLEANUP_SECONDS = 2.0
+"""How long a mission may take to end after Ctrl-C while the robot has not moved yet."""
 
 
 @dataclass(frozen=True)
@@ -104,12 +105,13 @@ def run(
     try:
         view = _prepared(session)
         if view.programless is not None:
-            _give_up(session, view.programless)
-        elif _is_accepted(session, view, robot, request):
+            tell_programless(view.programless)
+            session.reject(view.programless.sentence)
+        elif _is_approved(session, view, robot, request):
             return _watched(session, view, robot, request)
     except BaseException as error:
         session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
-        session.join(BRIEFLY)
+        session.join(CLEANUP_SECONDS)
         raise
     session.join(GRACE)
     return 1
@@ -144,18 +146,6 @@ def _prepared(session: MissionSession) -> SessionView:
     return view
 
 
-def _give_up(session: MissionSession, none: ProgramlessReply) -> None:
-    """End a mission for which the model wrote no program."""
-    tell_programless(none)
-    session.reject(none.sentence)
-
-
-def _is_accepted(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
-    """Show the check, and have the program approved."""
-    _show_check(view, request)
-    return _is_approved(session, view, robot, request)
-
-
 def _show_check(view: SessionView, request: Request) -> None:
     assert view.check is not None, "the program is checked"
     if not request.is_program:
@@ -169,6 +159,8 @@ def _show_check(view: SessionView, request: Request) -> None:
 
 
 def _is_approved(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
+    """Show the check, and have a person approve the program."""
+    _show_check(view, request)
     if view.problems and not (request.despite_problems and view.can_run):
         session.reject(f"the check found {'a problem' if len(view.problems) == 1 else 'problems'}")
         anyway = "; --despite-problems runs it anyway" if view.can_run else ""
@@ -192,7 +184,7 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
         raise session.error
     print_rich(ending(view))
     if view.state is State.STOPPED and got:
-        return OF_SIGNALS + got[0]
+        return SIGNAL_EXIT_BASE + got[0]
     return 0 if view.state is State.DONE else 1
 
 
@@ -205,8 +197,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
     got: list[int] = []
 
     def obey(number: int, _frame: object) -> None:
-        by = SIGNALS[signal.Signals(number)]
-        threading.Thread(target=session.stop, args=(by,), daemon=True).start()
+        session.stop_soon(SIGNALS[signal.Signals(number)])
         got.append(number)
         if len(got) > 1:
             note(f"\nasked the robot to stop; it has {GRACE:g} s to confirm")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -16,14 +16,13 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
 from codebotler.core.world import Point
 from codebotler.missions.progress import AT
+from codebotler.missions.stop import StopButton
 from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names_of
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
-
-TELLING = 6.0  # seconds within which a robot has been told to stop
 
 
 class Note(Protocol):
@@ -41,7 +40,7 @@ class LiveRobot:
     """Answers what `Worker.run_live` asks of a robot, by a connected real or simulated one.
 
     The program's clock starts at `clock_starts`, by default the time of day here, since programs speak of the
-    time to people.
+    time to people. `button` is pressed where a rule is broken.
     """
 
     is_live = True
@@ -55,10 +54,12 @@ class LiveRobot:
         clock_starts: datetime | None = None,
         guard: RuleGuard | None = None,
         room_map: RoomMap | None = None,
+        button: StopButton | None = None,
     ) -> None:
         self.robot, self.skills, self._note = robot, robot.skills, note
         self._guard, self._room_map = guard, room_map
-        self.on_broken: Callable[[RuleViolationError], None] = lambda _: self.stop()
+        self._button = button or StopButton(robot)
+        self.broken_rule: dict[str, object] = {}  # the log entry of the rule that stopped the mission
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
         self.rules = Rules(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # of the program, which calls a skill there
@@ -69,7 +70,7 @@ class LiveRobot:
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
-        self._stopped, self._told = threading.Event(), threading.Event()
+        self._stopped = self._button.ended
         self._fault: OSError | RobotLostError | None = None
         self._is_watched = False
 
@@ -84,22 +85,8 @@ class LiveRobot:
         return tuple(self._events)
 
     def stop(self) -> None:
-        """Cancel what the robot does and start nothing more; from any thread, any number of times.
-
-        The robot is told first, so that nothing slow can delay it.
-        """
-        self._stopped.set()
-        try:
-            self.robot.cancel()
-        finally:
-            self.robot.clock.stop()
-            self._told.set()
-
-    def why_unstopped(self) -> str:
-        """Return why the robot could not be stopped after a request; empty if it was, as far as it knows."""
-        if self._stopped.is_set():
-            self._told.wait(TELLING)
-        return str(getattr(self.robot, "failed_stop", ""))  # which some robots have
+        """Cancel the robot's work and start nothing more; from any thread, any number of times."""
+        self._button.cancel_robot()
 
     def sleep_until(self, now: float) -> None:
         """Let time pass by the robot's clock, or raise StoppedError."""
@@ -212,23 +199,21 @@ class LiveRobot:
 
     def _end_by(self, broken: RuleViolationError) -> None:
         """Stop the mission, or log which call a rule has prevented where the program may go on."""
-        if broken.ends_run:
-            self.on_broken(broken)
-        else:
-            self.log_rule(broken)
-        self._check_end()
-
-    def log_rule(self, broken: RuleViolationError) -> None:
-        """Log which rule was broken, and in which line of the program."""
         at = {} if self.line is None else {"line": self.line}
-        self._note("rule", **at, **_told(broken))
+        entry = at | _rule_entry(broken)
+        if broken.ends_run:
+            self.broken_rule = entry  # the mission logs it, since this may not be the program's thread
+            self._button.press(f"rule {broken.rule.name}")
+        else:
+            self._note("rule", **entry)
+        self._check_end()
 
     def report_unkept(self) -> str:
         """Log the first rule that is not kept at the end, and return the sentence; empty if all are."""
         broken = None if self._guard is None else self._guard.at_end()
         if broken is None:
             return ""
-        self._note("rule", **_told(broken))
+        self._note("rule", **_rule_entry(broken))
         return str(broken)
 
     def _meant(self, request: str) -> list[str]:
@@ -328,7 +313,7 @@ def answered(skill: Skill, result: base.Result) -> base.Result:
     return result
 
 
-def _told(broken: RuleViolationError) -> dict[str, object]:
+def _rule_entry(broken: RuleViolationError) -> dict[str, object]:
     """The log entry of a rule that was broken, or would have been."""
     rule, event = broken.rule, broken.event
     what = {} if event is None else {"what": trace_data((event,))[0], "prevented": not broken.is_late}

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
@@ -14,16 +13,17 @@ from typing import Self, TypeAlias
 
 from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
-from codebotler.core.trace import Outcome, RunError, Status, Trace
+from codebotler.core.trace import RunError, Status, Trace
 from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event, log_of
 from codebotler.missions.map_event import map_data
 from codebotler.missions.pictures import Pictures
+from codebotler.missions.stop import StopButton
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import Rule, RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
@@ -47,7 +47,7 @@ class MissionError(Exception):
         return str(self)
 
 
-Told: TypeAlias = Callable[[Line], None]
+EventListener: TypeAlias = Callable[[Line], None]
 """Called with each event after it was written, one at a time, from any thread."""
 
 
@@ -58,33 +58,36 @@ class Mission:
         home: the folder of missions.
         robot: the kind of robot.
         instruction: in plain words; empty where the program did not come from one.
-        told: called with each event.
+        on_event: called with each event.
+        stop_button: stops the mission and its robot; a new one by default.
 
     Raises:
         OSError: the folder cannot be written.
     """
 
-    def __init__(self, home: Path, robot: str, instruction: str = "", told: Told = lambda _: None) -> None:
+    def __init__(
+        self,
+        home: Path,
+        robot: str,
+        instruction: str = "",
+        on_event: EventListener = lambda _: None,
+        stop_button: StopButton | None = None,
+    ) -> None:
         self.folder = _new_folder(home / "missions")
         self._log: Appender | None = log_of(self.folder)
         self._pictures = Pictures(self.folder)
-        self.told = told
+        self.on_event = on_event
+        self.stop_button = stop_button or StopButton()
         self._writing = threading.RLock()  # held while an event is written; a stop waits for it last
-        self._gate = threading.Lock()  # held for moments only
         self._has_program = False  # which may be empty
-        self._stopped_by: str | None = None
-        self._broken_at: int | None = None  # the line that asked for what a rule forbade
-        self._unlogged: RuleViolationError | None = (
-            None  # the rule was broken, and the log does not say so yet
-        )
-        self._asked, self._passed_on = 0.0, math.inf  # when a stop was first asked for; when the robot knew
         self._live: LiveRobot | None = None
-        self._worker: Worker | None = None
-        self._over, self._wake = threading.Event(), threading.Event()
+        self._logged_rule: dict[str, object] = {}
+        self._is_over = threading.Event()
         self._fault: Exception | None = None
         self.trace: Trace = ()
         self.summary = Summary(self.folder.name, State.DRAFTING, robot, time.time(), instruction)
         self._write("state", state=State.DRAFTING)
+        self.stop_button.on_press(self._log_stop)
 
     def __enter__(self) -> Self:
         return self
@@ -93,6 +96,7 @@ class Mission:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
+            self._log_stop()  # the thread that stops the robot may not have come to it
             if not self.has_ended:
                 self._leave(error)
         finally:
@@ -176,36 +180,18 @@ class Mission:
     def stop(self, by: str = "somebody") -> None:
         """Stop the robot and the program, from any thread; nothing else starts.
 
-        Returns when the robot was told; `run` returns when the robot has ended what it did.
+        Returns when the robot was stopped and that is logged; `run` returns when all has ended.
 
         Args:
-            by: who stops it, in words such as `Ctrl-C`.
+            by: the person or thing that stops it, in words such as `Ctrl-C`.
 
         Raises:
             MissionError: it has ended.
         """
-        had_ended, asked = self.has_ended, time.monotonic()
-        with self._gate:
-            if self._stopped_by is None:
-                self._stopped_by, self._asked = by, asked
-            live, worker = self._live, self._worker
-        self._wake.set()  # wakes `run` even if the robot cannot be told
-        try:
-            if live is not None:
-                live.stop()
-        finally:
-            self._passed_on = min(self._passed_on, time.monotonic())
-            if worker is not None:
-                worker.stop()
-        with self._writing:
-            if self.state is State.STOPPED and not had_ended:
-                return  # by this very stop, whose end was written first
-            if self.has_ended:
-                raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
-            if self.state is State.RUNNING:
-                self._be_stopping()
-            elif self.state is not State.STOPPING:
-                self._step(State.STOPPED, "be stopped", reason=f"{stop_text(by)} before it ran")
+        had_ended = self.has_ended
+        self.stop_button.press(by)
+        if had_ended or self.state not in {State.STOPPING, State.STOPPED}:
+            raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
 
     def run(
         self,
@@ -234,31 +220,24 @@ class Mission:
             OSError: an event could not be written or printed, so the robot was stopped.
         """
         guard = RuleGuard(rules, () if room_map is None else room_map.plan) if rules else None
-        live = LiveRobot(reserved.robot, self._write, place=place, guard=guard, room_map=room_map)
-
-        def on_broken(broken: RuleViolationError) -> None:
-            self._broken_at, self._unlogged = live.line, broken
-            try:
-                self.stop(f"rule {broken.rule.name}")
-            finally:
-                self._log_rule(live)
-
-        live.on_broken = on_broken
+        live = LiveRobot(
+            reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
+        )
         with self._writing:
             if self.state is State.APPROVED:
                 reserved.use()
-                self._live = live
+                self._live, self.stop_button.robot = live, reserved.robot
             self._step(State.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
         threading.Thread(target=self._execute, args=(live,), name=self.id, daemon=True).start()
         try:
-            self._wake.wait()
+            self.stop_button.ended.wait()
         except BaseException:
             with suppress(MissionError):
                 self.stop(SHUTTING_DOWN)
             raise
         finally:
-            if not self._over.wait(GRACE):
-                self._end(State.FAILED, UNCONFIRMED)
+            if not self._is_over.wait(GRACE):
+                self._end(live, State.FAILED, UNCONFIRMED, None, is_lost=True)
         if self._fault is not None:
             raise self._fault
         return self.state
@@ -266,66 +245,56 @@ class Mission:
     def _execute(self, live: LiveRobot) -> None:
         """Run the program, on a thread of its own: a robot may never return from a skill."""
         try:
-            outcome = self._outcome(live)
+            with closing(Worker()) as worker:
+                self.stop_button.on_press(worker.stop)
+                if self.stop_button.ended.is_set():
+                    raise StoppedError  # noqa: TRY301 - it ends like any other error
+                outcome = worker.run_live(self.summary.program, live)
         except BaseException as error:  # noqa: BLE001 - whatever it is, the robot must not go on
             try:
                 live.stop()
             finally:
-                self._end(State.FAILED, _reason(error), is_lost=isinstance(error, RobotLostError))
+                self._end(live, State.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError))
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
             reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"
-            self._end(State.DONE if done else State.FAILED, reason, line=outcome.line)
+            self._end(live, State.DONE if done else State.FAILED, reason, outcome.line, is_lost=False)
 
-    def _outcome(self, live: LiveRobot) -> Outcome:
-        worker = Worker()
-        try:
-            with self._gate:
-                self._worker = worker
-                is_stopped = self._stopped_by is not None
-            if is_stopped:
-                raise StoppedError
-            return worker.run_live(self.summary.program, live)
-        finally:
-            worker.close()
-
-    def _end(self, state: State, reason: str = "", line: int | None = None, *, is_lost: bool = False) -> None:
+    def _end(self, live: LiveRobot, state: State, reason: str, line: object, *, is_lost: bool) -> None:
         """End, unless it has ended; a mission that ends after a stop is stopped, if the robot is not lost."""
-        if self._live is not None and self._stopped_by is not None and not is_lost and reason != UNCONFIRMED:
-            unstopped = self._live.why_unstopped()
-            state, reason, is_lost = (State.FAILED, unstopped, True) if unstopped else (state, reason, False)
+        why = "" if is_lost else self.stop_button.why_unstopped()
         try:
             with self._writing:
                 if self.has_ended:
                     return
-                if self._live is not None:
-                    self.trace = self._live.trace
-                    self._log_rule(self._live)  # the thread that stops the robot may not have come to it
-                if self._stopped_by is not None and reason != UNCONFIRMED and not is_lost:
-                    state, reason, line = State.STOPPED, stop_text(self._stopped_by), self._broken_at
-                if self._stopped_by is not None and self.state is State.RUNNING:
-                    self._be_stopping()
+                self.trace = live.trace
+                self._log_stop()
+                if self.state is State.STOPPING and why:
+                    state, reason = State.FAILED, why
+                elif self.state is State.STOPPING and not is_lost:
+                    state, reason, line = State.STOPPED, self.summary.reason, live.broken_rule.get("line")
                 self._step(state, "end", reason=reason, line=line)
         except Exception as error:  # noqa: BLE001 - raised by `run`
             self._fault = error
         finally:
-            self._over.set()
-            self._wake.set()
+            self._is_over.set()
+            self.stop_button.ended.set()
 
-    def _be_stopping(self) -> None:
-        """Log who stopped it; the robot may have ended before the stop returned."""
-        passed_on = min(self._passed_on, time.monotonic())
-        by = self._stopped_by or ""
-        self._write("stop", by=by, seconds_to_cancel=round(passed_on - self._asked, 6))
-        self._step(State.STOPPING, "be stopped", reason=stop_text(by))
-
-    def _log_rule(self, live: LiveRobot) -> None:
-        """Log the broken rule once: after the stop, and before the mission's end closes the log."""
+    def _log_stop(self) -> None:
+        """Log who stopped it and which rule was broken, each once: after the stop, and before the end."""
         with self._writing:
-            broken, self._unlogged = self._unlogged, None
-            if broken is not None:
-                live.log_rule(broken)
+            by = self.stop_button.by
+            if by is not None and self.state is State.RUNNING:
+                seconds = round(self.stop_button.seconds, 6)
+                self._write("stop", by=by, seconds_to_cancel=seconds)
+                self._step(State.STOPPING, "be stopped", reason=stop_text(by))
+            elif by is not None and not (self.state.is_moving or self.has_ended):
+                self._step(State.STOPPED, "be stopped", reason=f"{stop_text(by)} before it ran")
+            rule = {} if self._live is None else self._live.broken_rule
+            if rule != self._logged_rule:
+                self._logged_rule = rule
+                self._write("rule", **rule)
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state.is_moving:
@@ -366,14 +335,14 @@ class Mission:
             line = add_event(self._log, event, clock, **data)
             if event == "state":
                 self.summary.write(self.folder)
-            self.told(line)
+            self.on_event(line)
 
 
 def _reason(error: BaseException) -> str:
     if isinstance(error, RobotLostError):
         return f"the robot was lost: {error.sentence}"
-    told = visible(str(error))
-    return told if isinstance(error, EngineError) else f"{type(error).__name__}: {told}"
+    sentence = visible(str(error))
+    return sentence if isinstance(error, EngineError) else f"{type(error).__name__}: {sentence}"
 
 
 def _new_folder(missions: Path) -> Path:

@@ -35,7 +35,7 @@ def preflight(
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
-    def told(skill: str, what: str) -> Result:
+    def ask_robot(skill: str, what: str) -> Result:
         if skill not in can:
             return None
         try:
@@ -48,8 +48,8 @@ def preflight(
         except CancelledError:
             raise NotReadyError(f"the robot did not report {what}, because it was stopped") from None
 
-    rooms = told("get_all_rooms", "which rooms it knows")
-    here = told("get_current_location", "where it is")
+    rooms = ask_robot("get_all_rooms", "which rooms it knows")
+    here = ask_robot("get_current_location", "where it is")
     place = here if isinstance(here, str) else ""
     if not isinstance(rooms, list) or not rooms:
         return None, place

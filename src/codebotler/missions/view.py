@@ -56,8 +56,8 @@ class SessionView:
     reason: str = ""  # why it came to that state
     line: int | None = None  # of the program, where it failed
     busy: str = ""  # what goes on before the robot moves, such as `checking`
-    trouble: str = ""  # why it could not go on, in a sentence
-    known: tuple[str, ...] | None = None  # by the model, where it does not know this instruction
+    error: str = ""  # why it could not go on, in a sentence
+    suggestions: tuple[str, ...] | None = None  # instructions that the model does know
     instruction: str = ""
     model: str = ""  # its name; empty where none may be asked
     program: str = ""
@@ -71,7 +71,7 @@ class SessionView:
     room_map: RoomMap | None = None  # of the robot, as far as it says
     remarks: tuple[str, ...] = ()  # likely mistakes about the robot, in sentences
     rules: tuple[Rule, ...] = ()  # house rules
-    off: tuple[str, ...] = ()  # names of those that a person has switched off for this program
+    disabled_rules: tuple[str, ...] = ()  # names of those that a person has switched off for this program
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True
 
@@ -84,7 +84,7 @@ class SessionView:
     @property
     def rules_in_force(self) -> tuple[Rule, ...]:
         """The rules that count in this mission."""
-        return tuple(rule for rule in self.rules if rule.name not in self.off)
+        return tuple(rule for rule in self.rules if rule.name not in self.disabled_rules)
 
     @property
     def can_run(self) -> bool:

@@ -71,24 +71,24 @@ class AskAgainForm(_Form):
     )
 
 
-class AnyText(JSONResponse):
-    """JSON in ASCII, which can hold the half characters of a program."""
+class AsciiJSONResponse(JSONResponse):
+    """JSON in ASCII, which can hold the lone surrogates of a program."""
 
     def render(self, content: object) -> bytes:
         """The response's body."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
-def refused(_request: Request, error: Exception) -> AnyText:
+def refused(_request: Request, error: Exception) -> AsciiJSONResponse:
     """Say what is wrong with a request, without sending it back."""
     assert isinstance(error, RequestValidationError), "registered for this error alone"
     told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
-    return AnyText({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
+    return AsciiJSONResponse({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(console: Console) -> APIRouter:
     """The addresses of the API."""
-    api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AnyText)
+    api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AsciiJSONResponse)
     _add_missions(api, console)
     _add_changes(api, console)
     _add_events(api, console)
@@ -100,17 +100,17 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
         """All missions, oldest first."""
-        with _refusing():
+        with as_http_errors():
             return [asdict(summary) for summary in missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
         """Begin a mission; writing and checking go on in the background. Refused while a mission runs."""
-        with _refusing():
+        with as_http_errors():
             session = console.begin(Order(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
         if not session.view.id:
-            raise HTTPException(409, session.view.trouble or "the mission was stopped before it started")
+            raise HTTPException(409, session.view.error or "the mission was stopped before it started")
         return view_data(session.view)
 
     @api.get("/missions/{mission}")
@@ -137,7 +137,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         ] = "wall",
     ) -> Response:
         """The events as MCAP, which Foxglove opens."""
-        with _refusing(), installed():
+        with as_http_errors(), installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
 
         summary, events = _past(console, mission)
@@ -152,14 +152,14 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Replace the program; it is checked in the background."""
         _at_hand(console, mission)
-        with _refusing():
+        with as_http_errors():
             return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
         """Have the model write another program, which is then checked."""
         session = _at_hand(console, mission)
-        with _refusing():
+        with as_http_errors():
             session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
         return view_data(session.view)
 
@@ -167,7 +167,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
         """Run the program that the person saw, and no other."""
         session = _at_hand(console, mission)
-        with _refusing():
+        with as_http_errors():
             session.approve(approval.program, despite_problems=approval.despite_problems)
         return view_data(session.view)
 
@@ -175,7 +175,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     async def stop_mission(mission: str) -> dict[str, Any]:
         """Stop the current mission; `state` says when it has stopped."""
         _at_hand(console, mission)
-        console.stop_soon(PAGE)
+        console.stop(PAGE)
         return view_data(console.view)
 
     @api.post("/stop", status_code=202)
@@ -183,7 +183,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         *, only_moving: Annotated[bool, Query(description="Stop only a robot that runs a program.")] = False
     ) -> dict[str, Any]:
         """Stop the current mission, or only one whose robot moves; says whether there is any."""
-        return {"stopping": console.stop_soon(PAGE, only_moving=only_moving)}
+        return {"stopping": console.stop(PAGE, only_moving=only_moving)}
 
 
 def _add_events(api: APIRouter, console: Console) -> None:
@@ -201,7 +201,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
         """Check a program by the house rules, in the rooms of the current mission if there is one."""
-        with _refusing():
+        with as_http_errors():
             return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])
@@ -216,8 +216,8 @@ def _add_rest(api: APIRouter, console: Console) -> None:
     ) -> dict[str, Any]:
         """The robot, its skills and its mission."""
         if once_begun:
-            await console.view_begun()
-        view = await console.view_over() if once_over else console.view
+            await console.view_once(over=False)
+        view = await console.view_once(over=True) if once_over else console.view
         return {
             "robot": console.robot.name,
             "skills": [skill.signature for skill in console.robot.skills.values()],
@@ -256,7 +256,7 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "state": view.state,
         "phase": view.phase,
         "busy": view.busy,
-        "trouble": view.trouble,
+        "trouble": view.error,
         "instruction": view.instruction,
         "model": view.model,
         "author": view.author,
@@ -267,7 +267,10 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "problems": list(view.problems),
         "unknown_rooms": list(view.unknown_rooms),
         "remarks": list(view.remarks),
-        "rules": [{"name": r.name, "says": r.says, "in_force": r.name not in view.off} for r in view.rules],
+        "rules": [
+            {"name": r.name, "says": r.says, "in_force": r.name not in view.disabled_rules}
+            for r in view.rules
+        ],
         "check": None if view.check is None else view.check.data(),
         "reason": view.reason,
         "line": view.line,
@@ -303,7 +306,8 @@ def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
 
 
 @contextmanager
-def _refusing() -> Iterator[None]:
+def as_http_errors() -> Iterator[None]:
+    """Answer what a mission refuses with 409, and what is wrong with 422."""
     try:
         yield
     except MissionError as error:

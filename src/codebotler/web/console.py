@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
-from contextlib import ExitStack, aclosing, contextmanager, suppress
+from collections.abc import AsyncGenerator, Callable, Sequence
+from contextlib import ExitStack, aclosing, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -71,8 +71,7 @@ class Console:
     def __exit__(self, *_: object) -> None:
         session = self._session
         if session is not None:
-            if not session.view.is_over:
-                session.stop(SHUTTING_DOWN)
+            session.stop(SHUTTING_DOWN)
             session.join(GRACE + 1)
         with self._checking:
             self._held.close()
@@ -88,14 +87,9 @@ class Console:
         session = self._session
         return SessionView() if session is None else session.view
 
-    async def view_over(self) -> SessionView:
-        """What all viewers see once the mission is over, or after some seconds."""
-        await self.notifier.until(lambda: self.view.is_over, QUIET)
-        return self.view
-
-    async def view_begun(self) -> SessionView:
-        """What all viewers see once a mission goes on, or after some seconds."""
-        await self.notifier.until(lambda: not self.view.is_over, QUIET)
+    async def view_once(self, *, over: bool) -> SessionView:
+        """What all viewers see once a mission is over, or goes on; at the latest after some seconds."""
+        await self.notifier.until(lambda: self.view.is_over == over, QUIET)
         return self.view
 
     def begin(self, order: Order) -> MissionSession:
@@ -123,8 +117,8 @@ class Console:
                 before=before,
                 world=self.world,
             )
-        if before is not None and not before.view.is_over:
-            threading.Thread(target=before.stop, args=("another instruction",), daemon=True).start()
+        if before is not None:
+            before.stop_soon("another instruction")
         session.start()
         self.notifier.change()
         return session
@@ -147,18 +141,12 @@ class Console:
         self.interrupted = ()
         self.notifier.change()
 
-    def stop(self, by: str) -> None:
-        """Stop the mission at hand, if there is one; returns when the robot has been told."""
-        session = self._session
-        if session is not None and not session.view.is_over:
-            session.stop(by)
-
-    def stop_soon(self, by: str, *, only_moving: bool = False) -> bool:
+    def stop(self, by: str, *, only_moving: bool = False) -> bool:
         """Stop the mission, or only a robot that runs, without waiting; whether there is anything to stop."""
-        view = self.view
-        if view.is_over or (only_moving and not view.is_running):
+        session, view = self._session, self.view
+        if session is None or view.is_over or (only_moving and not view.is_running):
             return False
-        threading.Thread(target=self.stop, args=(by,), daemon=True).start()
+        session.stop_soon(by)
         return True
 
     def check(self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()) -> Check:
@@ -184,17 +172,6 @@ class Notifier:
         for wake in wakes:
             wake()
 
-    @contextmanager
-    def watched(self, wake: Callable[[], None]) -> Iterator[None]:
-        """Have a function called at each change, on the thread that makes it; it must return at once."""
-        with self._lock:
-            self._wakes.append(wake)
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._wakes.remove(wake)
-
     async def changes(self) -> AsyncGenerator[None]:
         """Yield now, and again after changes; those during one round of the loop count as one."""
         loop, changed = asyncio.get_running_loop(), asyncio.Event()
@@ -203,11 +180,16 @@ class Notifier:
             with suppress(RuntimeError):  # the loop has ended, and with it all who waited
                 loop.call_soon_threadsafe(changed.set)
 
-        with self.watched(wake):
+        with self._lock:
+            self._wakes.append(wake)
+        try:
             while True:
                 changed.clear()
                 yield
                 await changed.wait()
+        finally:
+            with self._lock:
+                self._wakes.remove(wake)
 
     async def until(self, holds: Callable[[], bool], seconds: float | None = None) -> bool:
         """Wait until something holds, at most so many seconds; whether it does."""

@@ -59,9 +59,9 @@ def router(console: Console, face: Face) -> APIRouter:
         `question` has the number to answer.
         """
         if once_begun:
-            await console.view_begun()
+            await console.view_once(over=False)
         if once_over:
-            await console.view_over()
+            await console.view_once(over=True)
         return face_data(console, face)
 
     @here.post("/api/face/answer")
@@ -76,7 +76,7 @@ def router(console: Console, face: Face) -> APIRouter:
     @here.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a robot that runs, and nothing else; says whether there is one."""
-        return {"stopping": console.stop_soon(STOPS, only_moving=True)}
+        return {"stopping": console.stop(STOPS, only_moving=True)}
 
     @here.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:

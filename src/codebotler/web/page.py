@@ -52,4 +52,4 @@ def _next(view: SessionView) -> str:
         return "watch"
     if not view.is_over:
         return "decide"
-    return "ask" if view.state is None or view.trouble else "see"
+    return "ask" if view.state is None or view.error else "see"

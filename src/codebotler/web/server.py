@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
-import threading
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -66,7 +65,7 @@ def serve(
         _check_prefixes(pages, place)
         app: ASGIApp = pages
         if console and alone_for is not None:
-            app = Presence(app, alone_for, partial(console.stop_soon, LEAVING, only_moving=True))
+            app = Presence(app, alone_for, partial(console.stop, LEAVING, only_moving=True))
         guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
@@ -210,5 +209,5 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:
-            threading.Thread(target=self._console.stop, args=(SHUTTING_DOWN,), daemon=True).start()
+            self._console.stop(SHUTTING_DOWN)
         super().handle_exit(sig, frame)

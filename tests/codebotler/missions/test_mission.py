@@ -51,7 +51,7 @@ def home(tmp_path: Path) -> Path:
 
 def ready(home: Path, program: str = HELLO, told: Callable[[Line], None] = lambda _: None) -> Mission:
     """A mission that is approved."""
-    mission = Mission(home, "answering", told=told)
+    mission = Mission(home, "answering", on_event=told)
     mission.draft(program)
     mission.check([])
     mission.approve()
@@ -97,7 +97,7 @@ def test_each_event_is_on_the_disk_before_it_is_told(home: Path) -> None:
         told.append(1)
 
     with Reservation(Answering(), home) as reserved, ready(home) as mission:
-        mission.told = count
+        mission.on_event = count
         mission.run(reserved)
     assert len(told) == 8
 
@@ -244,7 +244,7 @@ def running(mission: Mission, reserved: Reservation, until: str) -> Iterator[Non
         if line["event"] == until:
             happened.set()
 
-    mission.told = told
+    mission.on_event = told
     thread.start()
     assert happened.wait(30)
     yield
@@ -294,7 +294,7 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
 
     robot = Telling()
     with Reservation(robot, home) as reserved, ready(home) as mission, ThreadPoolExecutor(2) as threads:
-        mission.told = told
+        mission.on_event = told
         running = threads.submit(mission.run, reserved)
         assert blocked.wait(30)
         stopping = threads.submit(mission.stop)
@@ -333,7 +333,7 @@ def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Pat
         ready(home) as mission,
         ThreadPoolExecutor(1) as threads,
     ):
-        mission.told = hear
+        mission.on_event = hear
         running = threads.submit(mission.run, reserved)
         assert asked.wait(30)
         mission.stop("the test")
@@ -387,7 +387,7 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
         assert (summary.state, summary.reason) == ("failed", UNCONFIRMED)
     before = events_of(mission.folder)
     told: list[Line] = []
-    mission.told = told.append
+    mission.on_event = told.append
     may_answer.set()
     threads = [thread for thread in threading.enumerate() if thread.name == mission.id]
     for thread in threads:
@@ -463,7 +463,7 @@ def test_stop_is_written_even_where_its_end_comes_first(home: Path) -> None:
         def cancel(self) -> None:
             super().cancel()
             if threading.current_thread() is threading.main_thread():
-                assert mission._over.wait(30)
+                assert mission._is_over.wait(30)
 
     with Reservation(Quick(WORLD), home) as reserved, ready(home, STUBBORN) as mission:
         with running(mission, reserved, "feedback"):
@@ -548,8 +548,8 @@ def test_interrupted_run_stops_the_robot(home: Path, monkeypatch: pytest.MonkeyP
 
     driving = threading.Event()
     with Reservation(robot, home) as reserved, ready(home, STUBBORN) as mission:
-        mission.told = lambda line: driving.set() if line["event"] == "feedback" else None
-        monkeypatch.setattr(mission, "_wake", Interrupted())
+        mission.on_event = lambda line: driving.set() if line["event"] == "feedback" else None
+        monkeypatch.setattr(mission.stop_button, "ended", Interrupted())
         with pytest.raises(KeyboardInterrupt):
             mission.run(reserved)
         assert mission.state is State.STOPPED
@@ -586,7 +586,7 @@ def test_what_watches_may_break_and_the_robot_stops(home: Path) -> None:
 
     robot = Answering()
     with Reservation(robot, home) as reserved, ready(home) as mission:
-        mission.told = told
+        mission.on_event = told
         mission.run(reserved)
     assert mission.state is State.FAILED
     assert robot.done == ["hello"]

@@ -94,7 +94,7 @@ def test_the_robot_is_stopped_before_anything_is_logged(tmp_path: Path) -> None:
             seen.append("cancel")
 
     robot = Noting()
-    mission = Mission(tmp_path, robot.name, told=lambda line: seen.append(line["event"]))
+    mission = Mission(tmp_path, robot.name, on_event=lambda line: seen.append(line["event"]))
     mission.draft(STUBBORN)
     mission.check([])
     mission.approve()

@@ -149,9 +149,9 @@ def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: P
         with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
             console.begin(Order("Go to the lobby, and tell me how many people are there."))
             view = until(console, lambda view: view.is_over)
-            known = view.known
+            known = view.suggestions
             assert known is not None
-            assert view.reason == view.trouble == "recorded:careful has no program for this instruction"
+            assert view.reason == view.error == "recorded:careful has no program for this instruction"
             assert len(known) == count
             assert set(known) <= set(known_instructions(RoomMap.of(world)))
 
@@ -382,8 +382,8 @@ def test_a_model_that_fails_when_asked_again_takes_nothing_away(tmp_path: Path) 
         console.edit(HELLO)
         before = until(console, lambda view: view.may_be_approved and view.program == HELLO)
         session.ask_again(repair=False)
-        view = until(console, lambda view: bool(view.trouble))
-        assert view.trouble == "the model is not there"
+        view = until(console, lambda view: bool(view.error))
+        assert view.error == "the model is not there"
         assert (view.program, view.check, view.state) == (HELLO, before.check, State.CHECKED)
         session.approve(view.digest)
         assert until(console, lambda view: view.is_over).state is State.DONE
@@ -450,7 +450,7 @@ def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> N
         assert until(console, lambda view: bool(view.id)).phase == "starting"
         console.stop("a test")
         session.join(5)
-        assert (console.view.is_over, console.view.state, console.view.trouble) == (True, State.STOPPED, "")
+        assert (console.view.is_over, console.view.state, console.view.error) == (True, State.STOPPED, "")
 
 
 def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
@@ -495,7 +495,7 @@ def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         session = console.begin(Order(program=HELLO))
         until(console, lambda view: view.busy == "checking" and bool(view.id))
         console.stop("a test")
-        assert (console.view.state, console.view.check) == (State.STOPPED, None)
+        assert until(console, lambda view: view.state is State.STOPPED).check is None
         go_on.set()
         session.join(10)
         assert (console.view.state, console.view.check, console.view.is_over) == (State.STOPPED, None, True)
@@ -514,7 +514,7 @@ def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author()) as console:
         console.begin(Order("say hello", "author"))
         view = until(console, lambda view: view.is_over)
-        assert (view.trouble, view.state) == ("the model is not there", State.FAILED)
+        assert (view.error, view.state) == ("the model is not there", State.FAILED)
 
 
 def test_the_same_program_keeps_its_author_when_it_is_run_again(tmp_path: Path) -> None:
@@ -546,7 +546,7 @@ def test_a_mission_whose_end_cannot_be_logged_has_ended_in_the_view(
         approved(console)
         view = until(console, lambda view: view.is_over)
         assert (view.state, view.phase) == (State.DONE, "done")
-        assert "No space left" in view.trouble
+        assert "No space left" in view.error
 
 
 def test_the_first_model_writes_where_none_is_named(tmp_path: Path) -> None:
@@ -571,7 +571,7 @@ def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> Non
         checked(one)
         other.begin(Order(program=HELLO))
         view = until(other, lambda view: view.is_over)
-        assert "robot simulated" in view.trouble
+        assert "robot simulated" in view.error
         assert view.id == ""
 
 

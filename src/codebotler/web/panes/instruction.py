@@ -94,8 +94,8 @@ class InstructionPane:
             self._asked = visible_lines(view.instruction)
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
-        self._trouble.say(view.trouble if view.known is None else self._unknown(view.known))
-        self._suggest(view.known or ())
+        self._trouble.say(view.error if view.suggestions is None else self._unknown(view.suggestions))
+        self._suggest(view.suggestions or ())
 
     def _ask(self) -> None:
         try:

@@ -27,7 +27,7 @@ class RulesPane:
 
     def show(self, view: SessionView) -> None:
         """Show which rules count in the mission at hand."""
-        drawn = (view.off, view.may_be_approved)
+        drawn = (view.disabled_rules, view.may_be_approved)
         if self._console.rules and drawn != self._drawn:
             self._drawn = drawn
             self._box.clear()
@@ -38,7 +38,7 @@ class RulesPane:
         PlainText("h3", "House rules")
         with ui.element("ul"):
             for rule in self._console.rules[:MOST_RULES]:
-                is_off = rule.name in view.off
+                is_off = rule.name in view.disabled_rules
                 with ui.element("li").classes("off" if is_off else ""):
                     PlainText("span", shortened(rule.says, MOST_TEXT))
                     if is_off:

@@ -1,0 +1,72 @@
+"""`ModelAuthor`: asks a language model for the programs of one mission."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+
+from codebotler.generation.generate import Generation, write_program
+from codebotler.missions.view import SessionView
+from codebotler.models.base import Heard, Model
+from codebotler.models.open import open_model
+from codebotler.prompts import Prompt, prompt_for
+from codebotler.robots.base import Robot
+
+
+class ModelAuthor:
+    """Has a model write programs, one at a time, until it is cancelled from any thread.
+
+    Args:
+        open_model: opens a model by its name.
+        name: of the model.
+    """
+
+    def __init__(self, open_model: Callable[[str], Model], name: str) -> None:
+        self._open_model, self._name = open_model, name
+        self._model: Model | None = None  # the last one
+        self.max_tokens: int | None = None  # the limit for a reply that a person has chosen
+        self._request: tuple[asyncio.AbstractEventLoop, asyncio.Task[Generation]] | None = None
+        self._is_cancelled = False
+
+    def write(self, prompt: Prompt, heard: Heard) -> tuple[str, Generation]:
+        """Ask for a program; return it with the model's name, or raise asyncio.CancelledError."""
+        if self.max_tokens is None or self._model is None:
+            self._model = self._open_model(self._name)
+        if self.max_tokens is not None:
+            settings = replace(self._model.settings, max_tokens=self.max_tokens)
+            self._model = open_model(self._model.name, settings)
+        return self._model.name, asyncio.run(self._write(self._model, prompt, heard))
+
+    def cancel(self) -> None:
+        """End the request that is under way, and let no other begin."""
+        self._is_cancelled, request = True, self._request
+        if request is not None:
+            with suppress(RuntimeError):  # the reply has arrived
+                request[0].call_soon_threadsafe(request[1].cancel)
+
+    async def _write(self, model: Model, prompt: Prompt, heard: Heard) -> Generation:
+        task = asyncio.create_task(write_program(model, prompt, heard=heard))
+        self._request = (asyncio.get_running_loop(), task)
+        try:
+            if self._is_cancelled:
+                task.cancel()
+            return await task
+        finally:
+            self._request = None
+
+
+def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
+    """The prompt for the instruction of a mission; as a repair, with what was wrong before."""
+    prompt = prompt_for(
+        view.instruction,
+        rooms=() if view.room_map is None else view.room_map.rooms,
+        rules=[rule.says for rule in view.rules_in_force],
+        skills=robot.skills.without(robot.missing),
+    )
+    if repair and view.problems:
+        return prompt.after(view.program, view.problems)
+    if repair and view.programless is not None:
+        return prompt.after_no_program(view.programless.sentence)
+    return prompt
