@@ -13,12 +13,6 @@ from codebotler.core.skills.values import Scalar
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import counted
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from codebotler.core.skills.table import SkillTable
-
 warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # odd regexes, which still work
 
 Point: TypeAlias = tuple[float, float]
@@ -86,13 +80,6 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
-
-    @classmethod
-    def read(cls, path: Path, skills: SkillTable | None = None) -> World:
-        """Read a world file; a UserError names the line of what is wrong, and how to mend it."""
-        from codebotler.core.world_file import read_world
-
-        return read_world(path, skills)
 
     def to_yaml(self) -> str:
         """This world as the text of a world file."""

@@ -18,6 +18,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.verbs import Verb, verb_of
 from codebotler.core.trace import Event, Outcome, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
+from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
 from codebotler.rtl.syntax import AROUND, LOOKS, QUESTIONS, TEXTS
@@ -294,7 +295,7 @@ def test_a_truth_that_cannot_be_is_refused_with_its_line(tmp_path: Path, truth: 
     path = tmp_path / "world.yaml"
     path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truth}\n")
     with pytest.raises(UserError) as caught:
-        World.read(path, skills_from(tmp_path / "lab.py"))
+        read_world(path, skills_from(tmp_path / "lab.py"))
     assert TRUTHS[truth] in str(caught.value)
     assert caught.value.line == 4
 
@@ -305,7 +306,7 @@ def test_truths_say_what_calls_come_to_however_they_are_quoted(tmp_path: Path) -
     truths = "read('a'): 7\n  read(\"b\"): Broken\n  gate a is shut: true\n"
     path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truths}")
     table = skills_from(tmp_path / "lab.py")
-    world = World.read(path, table)
+    world = read_world(path, table)
     robot = SimulatedRobot(world, skills=table)
     assert robot.perform("read", ["a"]) == 7
     with pytest.raises(RobotError, match="read: it is broken"):
@@ -313,7 +314,7 @@ def test_truths_say_what_calls_come_to_however_they_are_quoted(tmp_path: Path) -
     with pytest.raises(RobotError, match="open_gate: it is shut"):
         robot.perform("open_gate", ["a"])
     (tmp_path / "again.yaml").write_text(world.to_yaml())
-    assert World.read(tmp_path / "again.yaml", table) == world
+    assert read_world(tmp_path / "again.yaml", table) == world
 
 
 READS = (

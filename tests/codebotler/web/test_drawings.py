@@ -10,6 +10,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
+from codebotler.core.world_file import read_world
 from codebotler.missions.log import State, Summary
 from codebotler.missions.progress import MOST, MOST_STEPS, Find, Moment, Progress, line_of
 from codebotler.missions.view import SessionView
@@ -125,7 +126,7 @@ def test_where_the_robot_was_what_it_met_and_what_it_holds() -> None:
 
 
 def test_a_robot_that_was_stopped_on_its_way_is_where_its_dot_is() -> None:
-    world = World.read(OFFICE)
+    world = read_world(OFFICE)
 
     def shown(*lines: dict[str, Any]) -> MapState:
         rooms = RoomMap.of(world)
@@ -250,7 +251,7 @@ def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
 
 
 def test_what_was_found_in_a_large_room_is_clear_of_the_robot() -> None:
-    world = World.read(OFFICE)
+    world = read_world(OFFICE)
     at, room = (7.0, 3.0), "printer room 2"
     drawn = floorplan(world, MapState(at, room, trail=(at, at), finds={room: ["stapler"]}, held="paper"))
     (robot,) = re.findall(r'class="body"[^>]* cy="([\d.]+)"', drawn)

@@ -12,6 +12,7 @@ from types import FunctionType
 from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
+from codebotler.core.skills.own_modules import is_own_module
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, refuse
 from codebotler.core.skills.values import NOTHING, TEXT, ValueType, plain, value_type
 from codebotler.core.skills.verbs import Verb, verb_of
@@ -29,7 +30,6 @@ RTL_WORDS = frozenset(
 )
 """What formulas call other things by than events."""
 _DECLARED: dict[str, Skill] = {}
-_BY_MODULE: dict[str, list[Skill]] = {}
 PAPER = "codebotler.core.skills.paper"
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
@@ -42,16 +42,6 @@ def by_name(name: str) -> Skill | None:
 def all_names() -> list[str]:
     """The names of all skills declared in this process."""
     return list(_DECLARED)
-
-
-def declared_by(module: str) -> list[Skill]:
-    """The skills that a module has declared, in its order."""
-    return list(_BY_MODULE.get(module, ()))
-
-
-def forget(module: str) -> None:
-    """Forget what a module has declared that could not be run to its end."""
-    _BY_MODULE.pop(module, None)
 
 
 def by_event(kind: str) -> Skill | None:
@@ -179,7 +169,6 @@ class _Declaration:
             example=self.said["example"],
         )
         self.check_example(row)
-        _BY_MODULE.setdefault(self.does.__module__, []).append(row)
         known = _DECLARED.get(self.name)
         if known is None or getattr(known.does, "__module__", "") != PAPER:
             _DECLARED[self.name] = row
@@ -212,6 +201,9 @@ class _Declaration:
 
     def check_name(self) -> None:
         kind = self.said["event"] or self.name
+        is_second = isinstance(self.does.__globals__.get(self.name), Skill)
+        if is_second and is_own_module(self.does.__module__):
+            self.wrong(f"there is a skill {self.name} already; choose another name")
         if self.name in TAKEN:
             self.wrong(f"{self.name} is a name that Python, every program or every robot has; choose another")
         if kind in RTL_WORDS:

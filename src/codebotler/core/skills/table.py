@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from typing import Any, NoReturn, SupportsIndex
 
 from codebotler.core.errors import UserError
+from codebotler.core.skills.own_modules import find_in, place_of
 from codebotler.core.skills.values import TEXT, ValueType, possible, written_call
 from codebotler.core.skills.verbs import Verb
 
@@ -116,7 +116,7 @@ class Skill:
         name = getattr(self.does, "__module__", "")
         module = sys.modules.get(name)
         if module is not None and getattr(module, self.name, None) is self:
-            return _declared_in, (module.__file__ if name.startswith(OWN) else name, self.name)
+            return find_in, (place_of(name), self.name)
         return super().__reduce_ex__(protocol)
 
     def doing(self, does: Callable[..., Any]) -> Skill:
@@ -165,19 +165,6 @@ def _sample(parameter: Parameter) -> object:
     else:
         one = parameter.name if value.base == "str" else possible(replace(value, is_list=False))[0]
     return [one] if value.is_list else one
-
-
-OWN = "codebotler_skills_"
-"""How the names of modules begin that files of a user's own skills are."""
-
-
-def _declared_in(module: str, name: str) -> Skill:
-    if module.endswith(".py"):
-        from codebotler.core.skills.files import skill_in  # noqa: PLC0415 - which needs this module
-
-        return skill_in(module, name)
-    found: Skill = getattr(import_module(module), name)
-    return found
 
 
 @dataclass(frozen=True)
