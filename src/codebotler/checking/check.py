@@ -22,6 +22,7 @@ from codebotler.checking.sampled import (
 from codebotler.checking.static import read_program, read_rooms
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.labels import check_label
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
@@ -204,7 +205,7 @@ def _room_map(program: str, rooms: Sequence[str] | None, start: str | None, skil
 
 def _widened(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
     """The rooms, and those that the program drove to although its text does not name them."""
-    requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == "goto")
+    requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == GOTO)
     driven = (room_map.room(request) for request in requests)
     found = dict.fromkeys([*room_map.rooms, *(room for room in driven if room is not None)])
     rooms = [room for room in found if room != room_map.start][:MOST_ROOMS]

@@ -8,6 +8,7 @@ from itertools import chain, combinations
 
 from codebotler.checking.rule_rooms import may_mean
 from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.kinds import GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Names, Option, Trace
 from codebotler.core.world import World
@@ -125,7 +126,7 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
     """The rooms of a world, by name; of those named by a regex, also by words that formulas tell apart."""
     names = [room.name for room in world.rooms]
     spoken_of = [*chain.from_iterable(map(elements, formulas))]
-    told: list[Text] = [one.text for one in spoken_of if one.kind == "goto"]
+    told: list[Text] = [one.text for one in spoken_of if one.kind == GOTO]
     told += [Regex(one.place_regex.pattern) for one in spoken_of if one.place_regex is not None]
     for name in names:
         yield name
@@ -141,8 +142,8 @@ def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
     for element in elements(formula):
         if element.holding is not None:
             held = EventPattern(element.kind, Regex(".*"), holding=element.holding)
-            since = (Scope("AfterLast", EventPattern("place", Regex(".*"))),)
-            yield Or((Not(Last(held)), Exists(EventPattern("pick", element.holding), since)))
+            since = (Scope("AfterLast", EventPattern(PLACE, Regex(".*"))),)
+            yield Or((Not(Last(held)), Exists(EventPattern(PICK, element.holding), since)))
 
 
 # --- two rules

@@ -11,6 +11,7 @@ from typing import Protocol
 
 from codebotler.checking.room_names import HERE
 from codebotler.core.errors import RobotError
+from codebotler.core.skills import kinds
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
@@ -155,9 +156,9 @@ class LiveRobot:
 
     def _hold(self, event: Event) -> None:
         match event.kind:
-            case "pick":
+            case kinds.PICK:
                 self._held = event.text or "something"
-            case "place":
+            case kinds.PLACE:
                 self._held = ""
 
     # --- rules

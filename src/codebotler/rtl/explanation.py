@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from codebotler.core.phrases import verb
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Trace
 from codebotler.core.words import brief, listed, times
 from codebotler.rtl import formulas
@@ -19,7 +21,7 @@ from codebotler.rtl.semantics import (
     narrowed,
     scoped,
 )
-from codebotler.rtl.wording import deed, few, happening, is_any, is_plain, room, verb
+from codebotler.rtl.wording import deed, few, happening, is_any, is_plain, room
 
 
 @dataclass(frozen=True)
@@ -186,7 +188,7 @@ def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
     there = "during that stay" if first and len(arrivals) > 1 else "there"
     event, detail = _instead(element, trace, here)
     if not detail:
-        kinds = dict.fromkeys(trace[at].kind for at in here if trace[at].kind != "goto")
+        kinds = dict.fromkeys(trace[at].kind for at in here if trace[at].kind != GOTO)
         only = listed([verb(kind).alone for kind in kinds])
         detail = f": it only {only}" if only else ": it did nothing there"
     visits = arrivals[:1] if first else arrivals
@@ -283,7 +285,7 @@ def _instead(element: formulas.EventPattern, trace: Trace, here: Sequence[int]) 
     if not alike:
         return None, "" if trace else ": it did nothing at all"
     only = f": it only {verb(element.kind).past}"
-    if element.kind == "goto":
+    if element.kind == GOTO:
         rooms = dict.fromkeys(happening(trace[at], element) for at in alike)
         return None, f"{only} {listed(few([*rooms]))}"
     shown = [f"{happening(trace[at], element)} (step {at + 1})" for at in alike]

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import get_args
 
 from codebotler.core.program import parse_expression
-from codebotler.core.skills.declaration import INSIDE
+from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import TRUTH, ValueType, as_text

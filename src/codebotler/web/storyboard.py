@@ -10,16 +10,16 @@ from typing import Any
 from nicegui import ui
 
 from codebotler.checking.problems import Check, Sample
-from codebotler.checking.storyboard import cut, steps_of
-from codebotler.core.skills.declaration import verb_for
+from codebotler.checking.storyboard import cut, event_from_step, steps_of
+from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
+from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
+from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
-from codebotler.rtl.wording import done_with, is_spoken
 from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Lot, Whereabouts
 from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
-NO_ANSWER = "no answer"
 LEFT_OUT = "…"  # instead of a room, where steps are left out
 PLAIN = re.compile(r"[\w' -]+")
 """Names of rooms that need no quotes; others could be read as part of the sentence."""
@@ -109,7 +109,7 @@ def scenes_reached(strip: Strip, reached: Reached) -> int | None:
 
 
 def _has_seen(strip: Strip, looks: Sequence[tuple[str, bool]]) -> bool:
-    return _texts(strip, "check")[: len(looks)] == [look_text(*look) for look in looks]
+    return _texts(strip, CHECK)[: len(looks)] == [look_text(*look) for look in looks]
 
 
 def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
@@ -185,7 +185,7 @@ def scenes(
             found.append(Scene(LEFT_OUT, (Deed("more", f"{len(some):,} more steps"),)))
             continue
         for step in some:
-            if step["kind"] == "goto":
+            if step["kind"] == GOTO:
                 to = step["to"]
                 room = shortened(to or step["text"], MOST_TEXT)
                 found.append(Scene(room, is_found=to is not None, step=step["step"]))
@@ -196,26 +196,21 @@ def scenes(
 
 def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
     kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
-    verb = verb_for(kind)
-    if "answer" in step:
-        heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
-        return (Deed(kind, text, number), Deed("answer", heard))
-    if is_spoken(kind):
+    if not is_question(kind) and not is_spoken(kind):
+        return (Deed(kind, _phrase(event_from_step(step)), number),)
+    if "answer" not in step:
         return (Deed(kind, text, number),)
-    if kind == "check" and "found" in step:
-        return (Deed(kind, look_text(step["text"], step["found"]), number),)
-    if verb is None:
-        return (Deed(kind, f"{shortened(kind)} {text}", number),)
-    result = f": {verb.results[step['found']]}" if "found" in step else ""
-    given = [text, *(shortened(each, MOST_TEXT) for each in step.get("more", ()))]
-    return (Deed(kind, f"{done_with(kind, verb.third, given, '')}{result}", number),)
+    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
+    return (Deed(kind, text, number), Deed("answer", heard))
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
     """A look and its result in words."""
-    verb = verb_for("check")
-    assert verb is not None, "it is the paper's"
-    return f"{verb.third} {shortened(what, MOST_TEXT)}: {verb.results[is_found]}"
+    return _phrase(Event(CHECK, what, found=is_found))
+
+
+def _phrase(event: Event) -> str:
+    return phrase(event, "third", show=lambda text: shortened(text, MOST_TEXT), quote="")
 
 
 # --- what a world is like

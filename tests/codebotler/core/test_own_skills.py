@@ -11,8 +11,10 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills.declaration import INSIDE, RTL_WORDS, by_name
+from codebotler.core.phrases import phrase
+from codebotler.core.skills.declaration import RTL_WORDS, by_name
 from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.verbs import Verb, verb_of
@@ -22,7 +24,6 @@ from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
 from codebotler.rtl.syntax import AROUND, LOOKS, QUESTIONS, TEXTS
-from codebotler.rtl.wording import done_to
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
@@ -466,7 +467,7 @@ def test_the_words_of_a_verb_follow_its_event(tmp_path: Path) -> None:
     robot = SimulatedRobot(WORLD, skills=table)
     robot.perform("stow", ["pen", "drawer"])
     assert robot.trace == (Event("stow", "drawer", more=("pen",)),)
-    assert done_to(robot.trace[0], "put") == "put pen into drawer"
+    assert phrase(robot.trace[0], "past") == "put pen into drawer"
 
 
 def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:

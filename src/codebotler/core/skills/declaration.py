@@ -12,13 +12,13 @@ from types import FunctionType
 from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
+from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.own_modules import is_own_module
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, refuse
 from codebotler.core.skills.values import NOTHING, TEXT, ValueType, plain, value_type
 from codebotler.core.skills.verbs import Verb, verb_of
 
 TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"})
-INSIDE = "inside"
 BE = Verb("be inside", "is inside", "was inside", "being inside", "was in a room")
 POSE = Skill("(pose)", (Parameter("room"),), NOTHING, "", Recording(INSIDE, "room", names="room"), verb=BE)
 """Not a skill: house rules see this event when the robot's pose enters a room."""

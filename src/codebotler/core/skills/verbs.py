@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 PAST: Mapping[str, str] = {
     **dict.fromkeys(
@@ -74,7 +75,10 @@ STRESSED_AT_THE_END = frozenset(
         *("permit", "refer", "reset", "submit", "transfer", "unplug"),
     }
 )
-PLACE = re.compile(r"\{(\w+)\}")
+PARAMETER = re.compile(r"\{(\w+)\}")
+
+
+VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
 
 
 @dataclass(frozen=True)
@@ -107,10 +111,10 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
     head = head.lower()
     if not (head.isascii() and head.isalpha()):
         raise ValueError(f'the verb "{template}" must begin with a verb such as "open"')
-    for name in PLACE.findall(template):
+    for name in PARAMETER.findall(template):
         if name not in parameters:
             raise ValueError(f'the verb "{template}" names {{{name}}}, which is no parameter')
-    if set("{}") & set(PLACE.sub("", template)):
+    if set("{}") & set(PARAMETER.sub("", template)):
         raise ValueError(f'the verb "{template}" has a brace that is no parameter in braces')
     fixed, brace, _ = rest.partition("{")
     particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
@@ -122,7 +126,7 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
         base, third, before, ing = (f"{form} {particle}".strip() for form in forms)
         return Verb(base, third, before, ing, results=results)
     order = {name: str(number) for number, name in enumerate(parameters)}
-    return Verb(*forms, results=results, object=PLACE.sub(lambda found: f"{{{order[found[1]]}}}", rest))
+    return Verb(*forms, results=results, object=PARAMETER.sub(lambda found: f"{{{order[found[1]]}}}", rest))
 
 
 def _third(verb: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import Any, overload
 
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Option
 from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
@@ -48,7 +49,7 @@ def alphabet(
     held = _texts([element.holding for alike in kinds.values() for element in alike], nothing="")
     events: list[Event] = []
     for kind, alike in kinds.items():
-        moves_by = moves if kind == "goto" else None
+        moves_by = moves if kind == GOTO else None
         aspects = [
             [
                 Event(kind, text, options, more=more)
@@ -63,7 +64,7 @@ def alphabet(
             ],
             [
                 Event(kind, "", place=place)
-                for place in (places if kind != "goto" or any(e.place for e in alike) else [""])
+                for place in (places if kind != GOTO or any(e.place for e in alike) else [""])
             ],
             [
                 Event(kind, "", holding=holding, to=to)
