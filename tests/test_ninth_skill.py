@@ -63,7 +63,7 @@ def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> No
 def test_a_question_of_its_own_is_shown_with_its_options_and_its_answer() -> None:
     vote = Event("vote", "tea?", (Option("yes"), Option("no")), answer="no")
     (step,) = steps_of((vote,))
-    assert str(step_text(step)) == 'vote "tea?" [yes | no] → no'
+    assert str(step_text(step)) == 'did vote "tea?" [yes | no] → no'
     (unanswered,) = steps_of((Event("ask", "tea?", (Option("yes"),)),))
     assert str(step_text(unanswered)) == 'asked "tea?" [yes] → no answer'
 

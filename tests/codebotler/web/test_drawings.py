@@ -183,10 +183,10 @@ def test_a_stop_is_one_event_with_what_it_interrupted() -> None:
     ):
         assert [moment.text for moment in after(*events).moments] == [
             'drives to "supply room"',
-            "stopped from the page while driving to supply room",
+            'stopped from the page while going to "supply room"',
         ]
         words = [text for _, text in timeline(events)]
-        assert words == ['Drives to "supply room"', "Stopped from the page while driving to supply room"]
+        assert words == ['Drives to "supply room"', 'Stopped from the page while going to "supply room"']
     assert after(line("stop", by="Ctrl-C")).moments[-1].text == "stopped by Ctrl-C"
     asked = [call("ask", person="ann", question="Tea?", options=["no"]), line("stop", by="Ctrl-C")]
     assert after(*asked).moments[-1].text == 'stopped by Ctrl-C while asking "Tea?"'
