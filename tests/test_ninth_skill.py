@@ -13,7 +13,7 @@ from codebotler.core.program import Flaw, flaws
 from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, SkillTable
-from codebotler.core.skills.values import TEXT, TRUTH, ValueType
+from codebotler.core.skills.values import TEXT_TYPE, TRUTH_TYPE, ValueType
 from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
@@ -128,11 +128,11 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others() ->
     asks = Skill(
         "vote",
         (Parameter("about"), Parameter("options", ValueType(is_list=True), is_options=True)),
-        TEXT,
+        TEXT_TYPE,
         "Let all in the room vote.",
         Recording("vote", "about", "options"),
     )
-    smells = Skill("smells", (Parameter("what"),), TRUTH, "Smell.", Recording("smell", "what"))
+    smells = Skill("smells", (Parameter("what"),), TRUTH_TYPE, "Smell.", Recording("smell", "what"))
     table = SkillTable((*SKILLS.rows, asks, smells))
     trace = (
         Event("vote", "tea?"),

@@ -30,7 +30,7 @@ from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
 
-AT_ONCE = 16  # worlds that a worker is given
+WORLDS_AT_ONCE = 16  # worlds that a worker is given
 WIDENINGS = 3  # times that the rooms to which a program drives are added to those in its text
 
 
@@ -74,10 +74,10 @@ def check(
     if room_map is None and (rooms, start) != (None, None):
         room_map = room_map_for(program, rooms, start, skills=skills)
     with _opened(pool, workers) as opened:
-        if samples > AT_ONCE and not opened.is_here:
+        if samples > WORLDS_AT_ONCE and not opened.is_here:
             known = room_map or room_map_for(program, skills=skills)
             run = _PoolRunner(opened, program, settings)
-            return _checked(program, known, settings, run, AT_ONCE * opened.workers)
+            return _checked(program, known, settings, run, WORLDS_AT_ONCE * opened.workers)
         return opened.call(lambda: check_on(opened.here(), program, room_map, settings))
 
 
@@ -115,7 +115,7 @@ def checks_on(
     worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
 ) -> list[Check]:
     """Check several programs of one caller on one worker; their first runs may share a process."""
-    samplers = first_samplers(settings)[:AT_ONCE]
+    samplers = first_samplers(settings)[:WORLDS_AT_ONCE]
     first = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     known: list[dict[int, Outcome]] = [{} for _ in programs]
     for (number, run), outcome in worker.run_tame([runs.job for runs in first]).items():
@@ -178,7 +178,7 @@ class _WorkerRunner:
 
 
 def _checked(
-    program: str, room_map: RoomMap, settings: CheckSettings, run: SampleRunner, width: int = AT_ONCE
+    program: str, room_map: RoomMap, settings: CheckSettings, run: SampleRunner, width: int = WORLDS_AT_ONCE
 ) -> Check:
     read = cache(partial(read_program, program, room_map, settings.skills))
     ran = sampled_runs(partial(run, meanwhile=read), room_map, settings, width)

@@ -9,7 +9,7 @@ from textwrap import dedent
 
 from codebotler.checking.rule_rooms import room_patterns
 from codebotler.core.errors import UserError
-from codebotler.core.labels import PLAIN
+from codebotler.core.labels import PLAIN_LABEL
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
@@ -81,7 +81,7 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
     Raises:
         UserError: a rule names such a room with `^` or `$`, so that any further word of a request evades it.
     """
-    regexes = [room for room in rooms if not PLAIN.fullmatch(room)]
+    regexes = [room for room in rooms if not PLAIN_LABEL.fullmatch(room)]
 
     def leads_to(room: str, request: str) -> bool:
         return resolve_room(rooms, request) == room

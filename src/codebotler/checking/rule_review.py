@@ -30,8 +30,8 @@ DETECTED = (
     "it can be broken by what a look finds or a person answers, which can only be noticed: "
     "the mission stops right after that"
 )
-OTHER = "something else"  # an answer that rules do not name
-ANYTHING = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
+OTHER_ANSWER = "something else"  # an answer that rules do not name
+ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
         return False
     last = breaks[-1]
     if last.answer is not None:  # a question always has another option
-        last = replace(last, options=(*last.options, Option(last.answer), Option(OTHER)))
+        last = replace(last, options=(*last.options, Option(last.answer), Option(OTHER_ANSWER)))
     try:
         guard.judge(replace(last, found=None, answer=None))
     except RuleViolationError:
@@ -102,7 +102,7 @@ def _kept(rule: Rule, world: World | None) -> Trace | None:
     spoken_of = [*dict.fromkeys(elements(rule.formula))]
     less = [replace(one, place=None) for one in spoken_of] + [replace(one, holding=None) for one in spoken_of]
     kinds = [EventPattern(kind, Regex(".*")) for kind in dict.fromkeys(one.kind for one in spoken_of)]
-    happenings: list[Formula] = [*map(Exists, dict.fromkeys([*spoken_of, *less, *kinds])), ANYTHING]
+    happenings: list[Formula] = [*map(Exists, dict.fromkeys([*spoken_of, *less, *kinds])), ANY_EVENT]
     for happens in happenings:
         trace = _trace([happens], [rule], world)
         if trace is not None:
@@ -170,7 +170,7 @@ def _of_pair(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule
 
 
 def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
-    happens = [ANYTHING] if one.when == other.when == "always" else []
+    happens = [ANY_EVENT] if one.when == other.when == "always" else []
     alone = all(_trace(happens, [rule], world) is not None for rule in (one, other))
     return alone and _trace(happens, [one, other], world) is None
 
@@ -202,11 +202,13 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *PEOPLE - {""}]}
         row = by_event(element.kind)
         sort = row.recording.names if row is not None and row.recording is not None else ""
-        named.append((SORTS.get(sort, sort), element.text if sort in sorts else None, sorts.get(sort, [])))
+        named.append(
+            (SHOWN_SORTS.get(sort, sort), element.text if sort in sorts else None, sorts.get(sort, []))
+        )
         for what, text, known in named:
             may_lack = what == "room" and rule.any_room
             if isinstance(text, Regex) and not may_lack and not may_mean(text.pattern, known):
                 yield f'it names the {what} "{text.pattern}", which is not in this world'
 
 
-SORTS = {"object": "thing", "object or person": "thing or person"}
+SHOWN_SORTS = {"object": "thing", "object or person": "thing or person"}

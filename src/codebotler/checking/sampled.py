@@ -23,7 +23,7 @@ from codebotler.simulator.worker import NOTHING, Job, Meanwhile, Worker
 
 SAMPLES, MOST_SAMPLES = 5, 10_000
 EXPLORED = 2  # times as many worlds at most, to meet each fact in every way
-MORE = 20  # worlds in addition, where the program waits in vain in all that were drawn before
+MOST_FURTHER_WORLDS = 20  # worlds in addition, where the program waits in vain in all that were drawn before
 MOST_FACTS = 4
 
 
@@ -101,11 +101,11 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
     return outcome.status is Status.TIMEOUT
 
 
-Run: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
+RunInWorlds: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
 """Runs one program in several worlds, of which it may leave out those that are alike to the program."""
 
 
-def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
+def sampled_runs(run: RunInWorlds, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
     """The runs in so many worlds, and in more to meet each fact both ways, or where all search in vain.
 
     Worlds that are alike to the program need one run only; `run` is called with at most `width` worlds.
@@ -125,7 +125,7 @@ def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: in
 
     first = FactSampler(settings.seed, 0, settings.strict)
     add(first_samplers(settings))
-    for more in range(MORE):
+    for more in range(MOST_FURTHER_WORLDS):
         if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
             break
         # A program that waits in many places needs luck to end; a search, that not all is full of things.

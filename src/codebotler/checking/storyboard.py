@@ -15,8 +15,8 @@ from codebotler.core.skills.kinds import GOTO
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace, option_data, option_from
 
-MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
-MARK = "❱"
+MOST_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
+STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
@@ -60,7 +60,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
             for step in some:
                 indent = 0 if step["kind"] == GOTO else 4
                 number, is_needed = str(step["step"]), step["step"] in needed
-                mark = Text(f"{MARK} {number}", "bold red") if is_needed else Text(number, "dim")
+                mark = Text(f"{STEP_MARK} {number}", "bold red") if is_needed else Text(number, "dim")
                 table.add_row(mark, Padding(step_text(step), (0, 0, 0, indent)))
         else:
             table.add_row(Text(), Text(f"... {len(some):,} more{_repeating(steps, some)} ...", "dim"))
@@ -75,7 +75,7 @@ def cut(
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
         is_end = number <= FIRST_STEPS or number > len(steps) - LAST_STEPS
-        return len(steps) <= MOST_STEPS or is_end or number in needed
+        return len(steps) <= MOST_SHOWN_STEPS or is_end or number in needed
 
     return ((shown, list(some)) for shown, some in groupby(steps, key=is_shown))
 

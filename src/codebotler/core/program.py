@@ -25,11 +25,11 @@ from codebotler.core.skills.table import Parameter, Skill, SkillTable
 from codebotler.core.unicode import composed
 from codebotler.core.words import counted, listed
 
-TASK = "task_program"
-LONGEST = 20_000  # characters of a program that is parsed: at most a tenth of a second
-MOST_NAMES, LONGEST_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
-ALIKE = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
-GIVEN = ("time", "sys")  # modules that every program finds imported
+TASK_FUNCTION = "task_program"
+LONGEST_PROGRAM = 20_000  # characters of a program that is parsed: at most a tenth of a second
+MOST_NAMES, LONGEST_MISSPELT_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
+NAME_CUTOFF = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
+GIVEN_MODULES = ("time", "sys")  # modules that every program finds imported
 FILE = "<program>"
 
 warnings.filterwarnings("ignore", module=FILE)  # about odd escapes, such as "\d", in the programs of models
@@ -102,7 +102,7 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     If `compiled` is set, the compiler looks for further errors, such as a stray `return`. On text that others
     wrote, only a closed process may do that.
     """
-    if "\0" in source or len(source) > LONGEST:
+    if "\0" in source or len(source) > LONGEST_PROGRAM:
         return _unreadable(source)
     try:
         tree = parse(source)
@@ -122,8 +122,8 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
 
 
 def _unreadable(source: str) -> Flaw:
-    if len(source) > LONGEST:
-        return Flaw(None, "MemoryError", f"the program is longer than {LONGEST:,} characters")
+    if len(source) > LONGEST_PROGRAM:
+        return Flaw(None, "MemoryError", f"the program is longer than {LONGEST_PROGRAM:,} characters")
     line = source[: source.index("\0")].count("\n") + 1
     return Flaw(line, "SyntaxError", "the program contains a null character")
 
@@ -156,7 +156,7 @@ def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     return [
         node
         for node in tree.body
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == TASK
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == TASK_FUNCTION
     ]
 
 
@@ -206,7 +206,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
     # Names in annotations that are texts are never looked up when a program runs.
     spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
     with _PARSING:
-        found = names_in(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
+        found = names_in(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
     return [
         # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
         (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
@@ -260,21 +260,22 @@ def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tupl
 
 def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
     """Whether `task_program` is there and can be called without arguments."""
-    if TASK not in _bound_in_module(source):
-        yield Flaw(None, "NameError", f"the program defines no {TASK} at module level")
+    if TASK_FUNCTION not in _bound_in_module(source):
+        yield Flaw(None, "NameError", f"the program defines no {TASK_FUNCTION} at module level")
     found = entries(tree)
-    if not found or found[-1].decorator_list or TASK in names_bound(tree, besides=found):
+    if not found or found[-1].decorator_list or TASK_FUNCTION in names_bound(tree, besides=found):
         return
     entry = found[-1]
     if isinstance(entry, ast.AsyncFunctionDef):
-        yield Flaw(entry.lineno, "TypeError", f"{TASK} is a coroutine, which is never awaited")
+        yield Flaw(entry.lineno, "TypeError", f"{TASK_FUNCTION} is a coroutine, which is never awaited")
     given = entry.args
     positional = [*given.posonlyargs, *given.args]
     required = positional[: len(positional) - len(given.defaults)]
     required += [a for a, default in zip(given.kwonlyargs, given.kw_defaults, strict=True) if default is None]
     if required:
         names = listed([a.arg for a in required])
-        yield Flaw(entry.lineno, "TypeError", f"{TASK} takes {names}, but it is called without arguments")
+        message = f"{TASK_FUNCTION} takes {names}, but it is called without arguments"
+        yield Flaw(entry.lineno, "TypeError", message)
 
 
 def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
@@ -296,12 +297,12 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 
 def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
     """The names that may be meant by undefined ones, as far as that is quickly found."""
-    known = sorted({*names_bound(tree), *skills, *GIVEN, *dir(builtins)})
+    known = sorted({*names_bound(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
     if len(known) > MOST_NAMES:
         return found
-    for name in islice((one for one in undefined if len(one) <= LONGEST_NAME), MOST_HINTS):
-        alike = get_close_matches(name, (other for other in known if other != name), n=1, cutoff=ALIKE)
+    for name in islice((one for one in undefined if len(one) <= LONGEST_MISSPELT_NAME), MOST_HINTS):
+        alike = get_close_matches(name, (other for other in known if other != name), n=1, cutoff=NAME_CUTOFF)
         if alike:
             found[name] = alike[0]
     return found

@@ -161,19 +161,19 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
-SHORTEST = 1e-9  # part of a way, or metres; less is an error of rounding
+SHORTEST_PART = 1e-9  # part of a way, or metres; less is an error of rounding
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
     """The names of the rooms that hold each part of a straight way, from its start to its end."""
-    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST
+    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST_PART
     edges = {}  # of each room, where the way crosses them, by the share of the way that lies before
     for room in rooms:
         corners = [(complex(*corner) - here) / way for corner in room.footprint or ()]
         edges[room.name] = crossings(0.0, [(corner.real, corner.imag) for corner in corners])
     cuts = {0.0, 1.0, *(edge for each in edges.values() for edge in each if 0 < edge < 1)}
     for one, other in pairwise(sorted(cuts)):
-        if other - one > SHORTEST:
+        if other - one > SHORTEST_PART:
             middle = (one + other) / 2
             yield tuple(name for name, each in edges.items() if sum(edge > middle for edge in each) % 2)
 

@@ -112,8 +112,8 @@ def _deciding(
 def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     """The one test that `ask(t, ".*") or ask(".*", t)` comes to."""
     match formula:
-        case formulas.Or((one, other)) if isinstance(one, formulas.Presence) and isinstance(
-            other, formulas.Presence
+        case formulas.Or((one, other)) if isinstance(one, formulas.PresenceTest) and isinstance(
+            other, formulas.PresenceTest
         ):
             a, b = one.element, other.element
             if a.options is None or b.options is None or (a.text, a.options) != (b.options, b.text):
@@ -151,7 +151,7 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
     return _presence(test, trace) if is_true else _absence(test, trace)._replace(is_missing=True)
 
 
-def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
+def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     at = next(at for at in _positions(test, trace) if matches(test.element, trace, at))
     element = replace(test.element, place=None)
     done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
@@ -165,7 +165,7 @@ def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
     return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}", short=short)
 
 
-def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
+def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     element, where = test.element, _where(test.scopes, trace, is_true=False)
     here = [*_positions(test, trace)]
     if (missing := _missing_bound(test.scopes, trace)) is not None:
@@ -243,7 +243,7 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     return _Fact(found[number] if len(found) > number else None, text, ending, is_missing=is_missing)
 
 
-def _positions(test: formulas.Presence, trace: Trace) -> Iterable[int]:
+def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
     """The positions of the events that a test looks at."""
     span = scoped(test.scopes, trace)
     match test:

@@ -319,8 +319,8 @@ class Not:
         return f"not {_bracketed(self.part, And | Or)}"
 
 
-Presence: TypeAlias = Exists | Last | ActAtFirst | ActAtSome
-Test: TypeAlias = Presence | Count | AtLeast
+PresenceTest: TypeAlias = Exists | Last | ActAtFirst | ActAtSome
+Test: TypeAlias = PresenceTest | Count | AtLeast
 Formula: TypeAlias = Test | And | Or | Not
 
 

@@ -13,7 +13,7 @@ from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
 from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
-from codebotler.rtl.regex_words import ANYTHING, choices, one_of
+from codebotler.rtl.regex_words import MATCH_ALL_PATTERNS, choices, one_of
 from codebotler.rtl.text.claims import Claim, Number, Time
 
 _LOOKS: Mapping[bool, Mapping[VerbForm, str]] = {
@@ -221,7 +221,7 @@ def _qualities(text: Text) -> Iterator[str]:
 
 def is_any(text: Text | None) -> bool:
     """Whether a text is written to match every string, or there is none."""
-    return text is None or (isinstance(text, Regex) and text.pattern in ANYTHING)
+    return text is None or (isinstance(text, Regex) and text.pattern in MATCH_ALL_PATTERNS)
 
 
 def few(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:

@@ -13,7 +13,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.cli.run import checker
-from codebotler.core.skills.declaration import POSE
+from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event
@@ -50,7 +50,7 @@ AROUND = THROUGH.replace("1')\n", "1')\n    go_to('start_loc')\n    go_to('suppl
 
 
 def rule(formula: str, *, name: str = "house") -> Rule:
-    return Rule(name, "Do as the house wants.", parse(formula, skills=SKILLS.with_skill(POSE)))
+    return Rule(name, "Do as the house wants.", parse(formula, skills=SKILLS.with_skill(POSE_IN_ROOM)))
 
 
 NEVER = rule('not tr.Exists(inside("printer room 2"))', name="never")

@@ -19,7 +19,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.declaration import POSE
+from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.core.world_file import read_world
@@ -508,7 +508,7 @@ def test_rules_about_where_it_is_hold_along_its_own_way(
 ) -> None:
     world = read_world(OFFICE)
     robot = Pyrobosim(world, speed=None)
-    formula = parse(f'not tr.Exists(inside("{room}"))', skills=SKILLS.with_skill(POSE))
+    formula = parse(f'not tr.Exists(inside("{room}"))', skills=SKILLS.with_skill(POSE_IN_ROOM))
     mission = Mission(tmp_path, robot.name)
     mission.draft("def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n")
     mission.check([])

@@ -15,12 +15,16 @@ from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.own_modules import is_own_module
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, refuse
-from codebotler.core.skills.values import NOTHING, TEXT, ValueType, plain, value_type
+from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType, plain, value_type
 from codebotler.core.skills.verbs import Verb, verb_of
 
-TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"})
+RESERVED_NAMES = frozenset(
+    {"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"}
+)
 BE = Verb("be inside", "is inside", "was inside", "being inside", "was in a room")
-POSE = Skill("(pose)", (Parameter("room"),), NOTHING, "", Recording(INSIDE, "room", names="room"), verb=BE)
+POSE_IN_ROOM = Skill(
+    "(pose)", (Parameter("room"),), NO_VALUE, "", Recording(INSIDE, "room", names="room"), verb=BE
+)
 """Not a skill: house rules see this event when the robot's pose enters a room."""
 RTL_WORDS = frozenset(
     {
@@ -30,7 +34,7 @@ RTL_WORDS = frozenset(
 )
 """What formulas call other things by than events."""
 _DECLARED: dict[str, Skill] = {}
-PAPER = "codebotler.core.skills.paper"
+PAPER_MODULE = "codebotler.core.skills.paper"
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
 
@@ -46,7 +50,7 @@ def all_names() -> list[str]:
 
 def by_event(kind: str) -> Skill | None:
     """The skill declared in this process that leaves events of a kind, which is all that these say of it."""
-    other = POSE if kind == INSIDE else None
+    other = POSE_IN_ROOM if kind == INSIDE else None
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 
 
@@ -170,7 +174,7 @@ class _Declaration:
         )
         self.check_example(row)
         known = _DECLARED.get(self.name)
-        if known is None or getattr(known.does, "__module__", "") != PAPER:
+        if known is None or getattr(known.does, "__module__", "") != PAPER_MODULE:
             _DECLARED[self.name] = row
         return row
 
@@ -180,7 +184,7 @@ class _Declaration:
 
     def check_options(self) -> None:
         """Refuse options that are not what they must be."""
-        for name, (fits, wanted) in OPTIONS.items():
+        for name, (fits, wanted) in SKILL_OPTIONS.items():
             if not fits(self.said[name]):
                 self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
 
@@ -204,20 +208,20 @@ class _Declaration:
         is_second = isinstance(self.does.__globals__.get(self.name), Skill)
         if is_second and is_own_module(self.does.__module__):
             self.wrong(f"there is a skill {self.name} already; choose another name")
-        if self.name in TAKEN:
+        if self.name in RESERVED_NAMES:
             self.wrong(f"{self.name} is a name that Python, every program or every robot has; choose another")
         if kind in RTL_WORDS:
             self.wrong(f"{kind} means something else in formulas; choose another name")
 
     def parameters(self) -> tuple[Parameter, ...]:
         code = self.does.__code__
-        if code.co_flags & COROUTINE:
+        if code.co_flags & COROUTINE_FLAG:
             self.wrong(f"{self.name} is async, but the function of a skill is not; write def")
         first = self.annotation(code.co_varnames[0]) if code.co_argcount else None
         if (
             not code.co_argcount
             or code.co_kwonlyargcount
-            or code.co_flags & MORE_ARGUMENTS
+            or code.co_flags & MORE_ARGUMENTS_FLAGS
             or value_type(first or object) is not None
         ):
             self.wrong(
@@ -233,9 +237,9 @@ class _Declaration:
                     f"the parameter {name} of {self.name} has no type; write {name}: str, or another one"
                 )
         types = [self.type_of(name, f"the type of the parameter {name}") for name in names]
-        if NOTHING in types:
+        if NO_VALUE in types:
             self.wrong(f"a parameter of {self.name} cannot be None; use {USABLE}")
-        asks = self.returns() == TEXT  # a question lists its options, and returns one of them
+        asks = self.returns() == TEXT_TYPE  # a question lists its options, and returns one of them
         return tuple(
             Parameter(n, t, asks and n == "options" and t == ValueType(is_list=True))
             for n, t in zip(names, types, strict=True)
@@ -329,9 +333,9 @@ class _Declaration:
         return RosAction(kind, server, goal, result, package=package)
 
 
-SORTS = ("room", "object", "object or person", "thing", "")
-COROUTINE, MORE_ARGUMENTS = 0x80, 0x04 | 0x08  # among the flags of code
-OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+SORTS_OF_THINGS = ("room", "object", "object or person", "thing", "")
+COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # among the flags of code
+SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a text such as "open {door}"'),
     "past": (lambda it: isinstance(it, str), "a text"),
     "results": (
@@ -354,7 +358,7 @@ OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "a name, or None",
     ),
     "text": (lambda it: isinstance(it, str), "the name of a parameter"),
-    "names": (lambda it: it in SORTS, "one of " + ", ".join(f'"{one}"' for one in SORTS)),
+    "names": (lambda it: it in SORTS_OF_THINGS, "one of " + ", ".join(f'"{one}"' for one in SORTS_OF_THINGS)),
     "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
     "when_tried": (lambda it: isinstance(it, bool), "True or False"),
     "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number from 0 on"),

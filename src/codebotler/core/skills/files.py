@@ -10,7 +10,7 @@ from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.declaration import OPTIONS
+from codebotler.core.skills.declaration import SKILL_OPTIONS
 from codebotler.core.skills.own_modules import is_own_module, module_of, place_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
@@ -71,8 +71,8 @@ def _refused(path: Path, error: BaseException) -> UserError:
     is_ours = isinstance(error, UserError)
     sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
     if named := UNKNOWN_OPTION.match(str(error)):
-        alike = get_close_matches(named[1], OPTIONS, 1)
-        hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(OPTIONS)}"
+        alike = get_close_matches(named[1], SKILL_OPTIONS, 1)
+        hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(SKILL_OPTIONS)}"
         sentence = f"@skill has no option {named[1]}; {hint}"
     return UserError(sentence, file=path, line=lines[-1] if lines else None)
 

@@ -9,7 +9,7 @@ from typing import Any, NoReturn, SupportsIndex
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.own_modules import find_in, place_of
-from codebotler.core.skills.values import TEXT, ValueType, possible, written_call
+from codebotler.core.skills.values import TEXT_TYPE, ValueType, possible, written_call
 from codebotler.core.skills.verbs import Verb
 
 
@@ -18,7 +18,7 @@ class Parameter:
     """One argument of a skill."""
 
     name: str  # by which a program may pass it
-    type: ValueType = TEXT
+    type: ValueType = TEXT_TYPE
     is_options: bool = False  # whether it lists the options of a question, which may be of any type
 
     @property
@@ -55,7 +55,7 @@ class Recording:
         return self.names == "room"
 
 
-PACKAGE = "robot_actions_pkg"
+ROS_PACKAGE = "robot_actions_pkg"
 """Of the actions of the paper's skills."""
 
 
@@ -68,7 +68,7 @@ class RosAction:
     goal: tuple[str, ...] = ()  # its fields, in the order of the skill's parameters
     result: str | None = None  # the type of its only field, if it has one
     failure: str = ""  # the kind of its only error; if it is empty, the robot names the kind
-    package: str = PACKAGE
+    package: str = ROS_PACKAGE
 
     @property
     def definition(self) -> str:

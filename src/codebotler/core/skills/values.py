@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeAlias, get_args, get_origin
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
-LARGEST = 2**53  # of whole numbers, which JSON and robots carry exactly
+LARGEST_WHOLE_NUMBER = 2**53  # of whole numbers, which JSON and robots carry exactly
 BASES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
 
 
@@ -73,7 +73,7 @@ class ValueType:
             return False
         if isinstance(value, float) and not isfinite(value):
             return False
-        if given is int and abs(value) > LARGEST:  # type: ignore[arg-type]  # a whole number
+        if given is int and abs(value) > LARGEST_WHOLE_NUMBER:  # type: ignore[arg-type]  # a whole number
             return False
         return not self.choices or value in self.choices
 
@@ -92,7 +92,7 @@ PLURALS: Mapping[Base, str] = {
     "float": "numbers",
     "bool": "truth values",
 }
-TEXT, TRUTH, NOTHING = ValueType(), ValueType("bool"), ValueType(None)
+TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None)
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
@@ -105,7 +105,7 @@ def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
 def value_type(annotation: object) -> ValueType | None:
     """The type that an annotation means; None if it is none of those that skills can have."""
     if annotation is None or annotation is type(None):
-        return NOTHING
+        return NO_VALUE
     if isinstance(annotation, type) and annotation in BASES:
         return ValueType(BASES[annotation])
     if isinstance(annotation, type) and issubclass(annotation, Enum):
@@ -133,10 +133,10 @@ def possible(value: ValueType) -> tuple[Any, ...]:
         return [some[0]], [], [some[0], some[-1]]
     if value.base is None:
         return (None,)
-    return value.choices or SOME[value.base]
+    return value.choices or SAMPLE_VALUES[value.base]
 
 
-SOME: Mapping[Base, tuple[Scalar, ...]] = {
+SAMPLE_VALUES: Mapping[Base, tuple[Scalar, ...]] = {
     "bool": (True, False),
     "int": (1, 0, 2, 10),
     "float": (1.0, 0.0, 0.5, 100.0),

@@ -12,7 +12,7 @@ from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Fo
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.rtl.semantics import is_match
 
-ANYTHING = Regex("")
+ANY_TEXT = Regex("")
 
 
 def elements(formula: Formula) -> Iterator[EventPattern]:
@@ -83,9 +83,9 @@ def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
         EventPattern(
             kind, element.text, element.options, element.mention, more=element.more, offers=element.offers
         ),
-        EventPattern(kind, ANYTHING, answer=element.answer, found=element.found),
-        EventPattern(kind, ANYTHING, place=element.place),
-        EventPattern(kind, ANYTHING, holding=element.holding, to=element.to),
+        EventPattern(kind, ANY_TEXT, answer=element.answer, found=element.found),
+        EventPattern(kind, ANY_TEXT, place=element.place),
+        EventPattern(kind, ANY_TEXT, holding=element.holding, to=element.to),
     )
 
 
