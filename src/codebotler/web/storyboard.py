@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,14 +14,10 @@ from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event
-from codebotler.core.words import brief, listed
-from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Lot, Whereabouts
 from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
 LEFT_OUT = "…"  # instead of a room, where steps are left out
-PLAIN = re.compile(r"[\w' -]+")
-"""Names of rooms that need no quotes; others could be read as part of the sentence."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +165,7 @@ def _strip(sample: Sample, check: Check) -> Strip:
         ending = f"Fails: {shortened(error.message, MOST_TEXT)} ({shortened(error.kind)})"
     else:
         ending = "Done."
-    world = shortened(supposed(sample.facts), MOST_WORLD)
+    world = shortened(f"If {sample.world}", MOST_WORLD) if sample.facts else ""
     shown = scenes(steps_of(sample.outcome.trace, has_places=True), check.room_map.start)
     return Strip(world, shown, ending, error is None or sample.in_vain)
 
@@ -211,47 +206,3 @@ def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the tra
 
 def _phrase(event: Event) -> str:
     return phrase(event, "third", show=lambda text: shortened(text, MOST_TEXT), quote="")
-
-
-# --- what a world is like
-
-
-def supposed(facts: Sequence[Fact]) -> str:
-    """What is special about a world, such as `If the robot finds “mug” in kitchen, but not in hall`."""
-    clauses = list(dict.fromkeys(_clauses(facts)))
-    if not clauses:
-        return ""
-    first, rest = clauses[0], [f"it {clause}" for clause in clauses[1:]]
-    return f"If {listed([f'the robot {first}', *rest])}"
-
-
-def _clauses(known: Sequence[Fact]) -> Iterator[str]:
-    for one in known:
-        if isinstance(one, GivenAnswer):
-            yield f"hears {_quoted(one.answer)} when it asks {_quoted(one.question)} in {_room(one.room)}"
-        elif isinstance(one, Lot):
-            yield f"works where {one.sentence}"
-        else:
-            same = [other for other in known if isinstance(other, Whereabouts) and other.name == one.name]
-            yield _found(one.name, same)
-
-
-def _found(name: str, known: Sequence[Whereabouts]) -> str:
-    there, lacking = (_rooms(known, is_there=is_there) for is_there in (True, False))
-    is_person = name == SOMEBODY
-    if not there:
-        return f"finds nobody in {lacking}" if is_person else f"does not find {_quoted(name)} in {lacking}"
-    but = f", but {'nobody in' if is_person else 'not in'} {lacking}" if lacking else ""
-    return f"finds {'somebody' if is_person else _quoted(name)} in {there}{but}"
-
-
-def _rooms(known: Sequence[Whereabouts], *, is_there: bool) -> str:
-    return listed(list(dict.fromkeys(_room(one.room) for one in known if one.is_there is is_there)))
-
-
-def _room(name: str) -> str:
-    return brief(name) if PLAIN.fullmatch(name) else _quoted(name)
-
-
-def _quoted(text: str) -> str:
-    return f"“{brief(text)}”"
