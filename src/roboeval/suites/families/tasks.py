@@ -23,8 +23,8 @@ from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.formulas import And
 from codebotler.rtl.syntax import parse
-from roboeval.suites.load import Suite
 from roboeval.suites.schema import MOST_WORLDS, SuiteFile
+from roboeval.suites.suite import Suite
 from roboeval.suites.task import Requirement, Task
 from roboeval.suites.taskfile import read_task
 
