@@ -48,7 +48,7 @@ def check(
     room_map: RoomMap | None = None,
     house_rules: Sequence[Rule] = (),
 ) -> Check:
-    """Find what is wrong with a program, by its text and by runs in sampled worlds.
+    """Find the problems of a program, by its text and by runs in sampled worlds.
 
     Args:
         program: its source, which need not even parse.
@@ -57,12 +57,12 @@ def check(
             if that is a room, or else the first one.
         samples: how many worlds to sample, 1 to 10,000.
         seed: of the worlds: the same ones on every machine.
-        strict: whether to draw also what the program takes for granted.
-        skills: what the program may call.
-        workers: how many runs go on at the same time, in a pool that is started for this check alone.
-        pool: what runs the programs; without it and `workers`, the pool of this process, which stays.
+        strict: whether to randomize also facts that the program takes for granted.
+        skills: the skills that the program may call.
+        workers: how many runs go on at the same time, in a pool that only this check uses.
+        pool: runs the programs; without it and `workers`, the pool of this process is used and kept.
         room_map: the rooms and the start, in place of those two, where more is known of them.
-        house_rules: what a program must keep to in every world.
+        house_rules: the rules that a program must keep in every world.
 
     Raises:
         UserError: the name of a room is no regular expression, the robot starts in none of the rooms, or the

@@ -21,7 +21,7 @@ COMPARING = frozenset({"startswith", "endswith"})
 Literal: TypeAlias = tuple[int, int, str]
 """A text in a program: its line from 1, its column from 0, and the text."""
 
-A_ROOM: Literal = (0, 0, "")  # stands for the name of a room that a skill returns
+A_ROOM: Literal = (0, 0, "")  # the placeholder for the name of a room that a skill returns
 
 
 def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...]:

@@ -71,7 +71,7 @@ def _review(rule: Rule, world: World | None) -> Review:
 
 
 def _breaks(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
-    """Traces that break a rule: a shortest one, and such that end with a result of which it speaks."""
+    """Traces that break a rule: a shortest one, and those that end with a result which it names."""
     yield shortest
     for element in dict.fromkeys(elements(rule.formula)):
         if element.found is not None or element.answer is not None:
@@ -126,14 +126,14 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
     """The rooms of a world, by name; of those named by a regex, also by words that formulas tell apart."""
     names = [room.name for room in world.rooms]
     spoken_of = [*chain.from_iterable(map(elements, formulas))]
-    told: list[Text] = [one.text for one in spoken_of if one.kind == GOTO]
-    told += [Regex(one.place_regex.pattern) for one in spoken_of if one.place_regex is not None]
+    named_texts: list[Text] = [one.text for one in spoken_of if one.kind == GOTO]
+    named_texts += [Regex(one.place_regex.pattern) for one in spoken_of if one.place_regex is not None]
     for name in names:
         yield name
-        for word in distinct_strings((Regex(name), *dict.fromkeys(told))):
+        for word in distinct_strings((Regex(name), *dict.fromkeys(named_texts))):
             found = [one for one in names if finds(word, one, "label-in-request")]
             names_it = isinstance(names_of(name, word), Names) and found == [name]
-            if names_it and any(text.matches(word) != text.matches(name) for text in told):
+            if names_it and any(text.matches(word) != text.matches(name) for text in named_texts):
                 yield Names(word, name)
 
 

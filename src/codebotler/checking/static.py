@@ -1,4 +1,4 @@
-"""Static analysis: certain errors in code that is reached and not guarded, and skills that are misused.
+"""Static analysis: certain errors in code that runs unguarded, and misuse of skills.
 
 Programs are read in a closed process, which nothing in their text can hold up for long.
 """

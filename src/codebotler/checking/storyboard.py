@@ -48,7 +48,7 @@ def event_from_step(step: Mapping[str, Any]) -> Event:
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """The steps room by room; the needed ones, which explanations name, are marked and never left out."""
+    """Draw the steps room by room; those that explanations need are marked and always shown."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))

@@ -23,7 +23,7 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
         event: what the robot did or is doing.
         form: of the verb.
         show: cuts texts and makes them fit for where they are shown.
-        quote: what stands around texts.
+        quote: the mark around texts.
     """
     answer = None if event.answer is None else show(event.answer)
     if form == "ing" and answer is not None:
@@ -46,7 +46,7 @@ def verb_phrase(kind: str, form: VerbForm, given: Sequence[str], quote: str = '"
 
 
 def result_words(event: Event) -> str:
-    """The yes or no of an event in the words of its skill, such as `not found`; empty if it has neither."""
+    """The yes or no of an event in the words of its skill, such as `not found`; empty if it has none."""
     return "" if event.found is None else verb(event.kind).results[event.found]
 
 

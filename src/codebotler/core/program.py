@@ -1,8 +1,8 @@
-"""Programs as text: parsing, the skills they call, and what is certainly wrong with them.
+"""Programs as text: parsing, the skills they call, and certain errors.
 
 Parsing takes linear time, but for texts in which CPython 3.11 is quadratic, so it has a bound. Compiling,
-`symtable` and pyflakes have no bound of their own: what uses them is called in closed processes only, on text
-that others wrote (`codebotler.simulator.isolated_call`).
+`symtable` and pyflakes have no bound of their own: on text that others wrote, they run only in isolated
+processes (`codebotler.simulator.isolated_call`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ NAME_CUTOFF = 0.65  # the least likeness of a name that may have been meant, fro
 GIVEN_MODULES = ("time", "sys")  # modules that every program finds imported
 FILE = "<program>"
 
-warnings.filterwarnings("ignore", module=FILE)  # about odd escapes, such as "\d", in the programs of models
+warnings.filterwarnings("ignore", module=FILE)  # about invalid escapes such as "\d" in the programs of models
 
 # CPython before 3.13 counts the depth of all trees in the making together: where two threads parse at the
 # same time, one of them gets a SystemError. A forked process must not find the lock closed.
@@ -44,7 +44,7 @@ os.register_at_fork(
 
 @dataclass(frozen=True)
 class Flaw:
-    """Something that is certainly wrong with a program."""
+    """A certain error of a program."""
 
     line: int | None  # counted from 1; None where no line is to blame
     kind: str  # of the failure that it leads to, such as `NameError` or `AskEmptyOptions`
@@ -171,10 +171,10 @@ def _bound_in_module(source: str) -> set[str]:
     return {s.get_name() for s in symbols if s.is_assigned() or s.is_imported()}
 
 
-def names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
+def names_bound(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
     """The names that a program defines anywhere, in whatever scope; `*` after `from x import *`."""
     names: set[str] = set()
-    skipped = {id(node) for node in besides}
+    skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
         if id(node) in skipped:
             continue
@@ -235,7 +235,7 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
     return messages, Names
 
 
-# --- what is certainly wrong
+# --- certain errors
 
 
 def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
@@ -250,7 +250,7 @@ def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
 
 
 def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """What is certainly wrong with a program that compiles, by line."""
+    """The certain errors of a program that compiles, by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:
@@ -263,7 +263,7 @@ def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
     if TASK_FUNCTION not in _bound_in_module(source):
         yield Flaw(None, "NameError", f"the program defines no {TASK_FUNCTION} at module level")
     found = entries(tree)
-    if not found or found[-1].decorator_list or TASK_FUNCTION in names_bound(tree, besides=found):
+    if not found or found[-1].decorator_list or TASK_FUNCTION in names_bound(tree, ignoring=found):
         return
     entry = found[-1]
     if isinstance(entry, ast.AsyncFunctionDef):
@@ -309,7 +309,7 @@ def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> di
 
 
 def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
-    """The calls of skills that cannot succeed."""
+    """Calls of skills that cannot succeed."""
     rebound = names_bound(tree)
     if "*" in rebound:
         return
@@ -384,7 +384,7 @@ _LITERALS: dict[type[ast.expr], str] = {
 
 
 def _literal(node: ast.expr) -> str | None:
-    """What a literal is; None for what is none."""
+    """The kind of a literal, in words; None for other expressions."""
     if isinstance(node, ast.Constant):
         return "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"
     return _LITERALS.get(type(node))

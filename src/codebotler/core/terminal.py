@@ -149,7 +149,7 @@ def print_text(text: str) -> None:
 
 
 def note(sentence: str) -> None:
-    """Print to stderr, beside the results."""
+    """Print to stderr, so that results stay apart on stdout."""
     print(visible_lines(sentence), file=sys.stderr)
 
 

@@ -1,4 +1,4 @@
-"""Events, traces and outcomes: what a robot did, how a run ended, and both as plain data."""
+"""Events, traces and outcomes of runs, and their form as plain data."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def attempted(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """The event that a skill leaves if it is executed now; None for skills without one."""
+    """Return the event that a skill leaves if it runs now; None for skills without one."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))

@@ -13,7 +13,7 @@ from codebotler.core.skills.values import Scalar
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import counted
 
-warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # odd regexes, which still work
+warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # such regexes still work
 
 Point: TypeAlias = tuple[float, float]
 

@@ -27,7 +27,7 @@ FileModel = TypeVar("FileModel", bound=BaseModel)
 Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MAX_DEPTH = 50
 MAX_PLACES = 100_000
-MAX_NUMBER = 1_000  # characters of what is no text: PyYAML takes squares of that for numbers such as 1:59:59
+MAX_NUMBER = 1_000  # characters; PyYAML takes quadratic time for numbers such as 1:59:59
 LONGEST_VALUE = 80  # characters of a value that a message quotes
 TEXT_TAG = "tag:yaml.org,2002:str"
 SMALL_NUMBER = re.compile(r"\d{1,4}", re.ASCII)
@@ -57,7 +57,7 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - theirs
         is_long = isinstance(node, yaml.ScalarNode) and node.tag != TEXT_TAG and len(node.value) > MAX_NUMBER
-        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # no such date, for example
+        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # an impossible date, say
             if not is_long:
                 made = super().construct_object(node, deep)
                 return composed(made) if isinstance(made, str) else made  # a list is filled later
@@ -105,7 +105,7 @@ class YamlFile:
         return self._lines[path]
 
     def part(self, key: str, data: object) -> YamlFile:
-        """What stands under a key, as a file of its own that says the same lines.
+        """The value of a key as a file of its own, with the same line numbers.
 
         Args:
             key: of the whole.

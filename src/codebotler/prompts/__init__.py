@@ -1,4 +1,4 @@
-"""What a model is asked, from text files beside this one, and the program read from its reply."""
+"""The prompts of models, made from text files in this folder, and the programs in their replies."""
 
 from codebotler.prompts.rendering import (
     PictureMessage,

@@ -36,8 +36,8 @@ def deed(
     Args:
         element: what an event must match.
         form: of the verb.
-        negated: whether a negation stands before it.
-        when: what follows, with a space at its start; it stands before a clause such as `that nobody is in`.
+        negated: whether a negation comes before it.
+        when: what follows, with a space at its start; it comes before a clause such as `that nobody is in`.
         where: what follows after that, such as ` after going to the lobby (step 1)`.
     """
     thing = "anything" if negated else "something"

@@ -32,7 +32,7 @@ RTL_WORDS = frozenset(
         *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies", INSIDE),
     }
 )
-"""What formulas call other things by than events."""
+"""Words with another meaning in formulas, which no event may have as its name."""
 _DECLARED: dict[str, Skill] = {}
 PAPER_MODULE = "codebotler.core.skills.paper"
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
@@ -105,7 +105,7 @@ def skill(
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
     """Declare a skill by a function that does it to a simulated robot, its first parameter.
 
-    A function without code (`...`) leaves the event of the skill, and returns a value of its type by lot; in
+    A function without code (`...`) leaves the event of the skill, and returns a random value of its type; in
     some of the worlds that a check imagines, it fails with each of its errors.
 
     Args:
@@ -121,7 +121,7 @@ def skill(
         names: the sort of thing that the text names, such as `room`; empty for what is spoken.
         to: the parameter that says whom it is for.
         when_tried: whether an attempt that fails is an event, too.
-        seconds: how long the simulated robot takes by its clock, besides driving.
+        seconds: how long the simulated robot takes by its clock, without driving.
         is_idle: whether it leaves the robot and its world as they are, however often it is executed.
         adds_event: whether its event is added for it when it ends; otherwise the function does that.
 
@@ -139,14 +139,14 @@ def skill(
 
 
 class _Declaration:
-    """One function, and what is said of it."""
+    """One function, with the options of its declaration."""
 
     def __init__(self, does: Callable[..., Any], said: Mapping[str, Any]) -> None:
         self.does, self.said = does, said
         self.name = does.__name__
 
     def skill(self) -> Skill:
-        """The skill, which its events are known by from now on."""
+        """Make the skill, and register it by its name."""
         self.check_options()
         self.check_name()
         parameters, returns = self.parameters(), self.returns()
@@ -183,13 +183,13 @@ class _Declaration:
         refuse(self.does, sentence)
 
     def check_options(self) -> None:
-        """Refuse options that are not what they must be."""
+        """Refuse options of the wrong type."""
         for name, (fits, wanted) in SKILL_OPTIONS.items():
             if not fits(self.said[name]):
                 self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
 
     def check_example(self, row: Skill) -> None:
-        """Refuse an example that is no call of the skill."""
+        """Refuse an example that does not call the skill."""
         if not row.example:
             return
         import ast  # noqa: PLC0415 - children have no use for it
@@ -201,7 +201,7 @@ class _Declaration:
         match call:
             case ast.Call(ast.Name(name)) if name == self.name:
                 return
-        self.wrong(f"the example of {self.name} is no call of it: {row.call}")
+        self.wrong(f"the example of {self.name} does not call it: {row.call}")
 
     def check_name(self) -> None:
         kind = self.said["event"] or self.name
@@ -325,9 +325,9 @@ class _Declaration:
             self.wrong(
                 f'"{ros}" is no ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
             )
-        odd = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
-        if odd:
-            self.wrong(f"{odd[0]} of {self.name} would be no field of a ROS message; use small letters")
+        unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
+        if unusable:
+            self.wrong(f"{unusable[0]} of {self.name} cannot be a field of a ROS message; use small letters")
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)

@@ -34,7 +34,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Recording:
-    """What a skill leaves in the trace."""
+    """The event that a skill leaves in the trace."""
 
     kind: str  # of the event, and its name in RTL, such as `goto`
     text: str  # the parameter whose value is the event's text; empty if it has none
@@ -89,7 +89,7 @@ class Skill:
         recording: its event in the trace; None for skills without one.
         ros: the action on a robot.
         verb: for people; without one, they read the skill's name and its arguments.
-        seconds: how long the simulated robot takes by its clock, besides driving.
+        seconds: how long the simulated robot takes by its clock, without driving.
         is_idle: whether it leaves the robot and its world as they are, however often it is executed.
         does: what it does to a simulated robot, its first argument.
         adds_event: whether the robot adds its event; otherwise, what it does adds that by itself.
@@ -120,7 +120,7 @@ class Skill:
         return super().__reduce_ex__(protocol)
 
     def doing(self, does: Callable[..., Any]) -> Skill:
-        """The same skill, which does something else."""
+        """Return this skill with another function."""
         return replace(self, does=does, is_idle=False)
 
     @property
@@ -130,7 +130,7 @@ class Skill:
 
     @property
     def is_by_lot(self) -> bool:
-        """Whether its function has no code, so that lots decide what comes of it."""
+        """Whether its function has no code, so that its results are random."""
         return hasattr(self.does, "__wrapped__")
 
     @property
@@ -212,20 +212,20 @@ class SkillTable(Mapping[str, Skill]):
         return f"SkillTable({', '.join(self)})"
 
     def with_skill(self, skill: Skill) -> SkillTable:
-        """This table and one more row."""
+        """Return this table with one more row."""
         return SkillTable((*self.rows, skill))
 
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """This table and those rows of another one that it lacks."""
+        """Return this table with the rows of another one that it lacks."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def without(self, names: Iterable[str]) -> SkillTable:
-        """The rows of this table that have none of these names."""
+        """Return this table without the rows that have these names."""
         left_out = {*names}
         return SkillTable(tuple(row for row in self.rows if row.name not in left_out))
 
     def doing(self, **does: Callable[..., Any]) -> SkillTable:
-        """The same skills, of which some do something else."""
+        """Return these skills, some with another function."""
         return SkillTable(tuple(s.doing(does[s.name]) if s.name in does else s for s in self.rows))
 
     @property

@@ -1,4 +1,4 @@
-"""The types of what skills are given and return: what fits them, and how they are written."""
+"""The types of arguments and results of skills: which values fit, and how programs write them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ BASES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "boo
 
 @dataclass(frozen=True)
 class ValueType:
-    """What a skill takes or returns.
+    """The type of an argument or a result of a skill.
 
     Args:
         base: the type of a single value; None for nothing at all.
-        is_list: whether it is a list of such values.
+        is_list: whether it is a list of these values.
         choices: the only values that fit, if they are listed.
         enum: what the function of the skill gets for a choice, where it wants no plain value.
     """
@@ -96,7 +96,7 @@ TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
-    """What a function has returned, with the values of enumerations in their place."""
+    """A result without enumerations: each member is replaced by its value."""
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.value if isinstance(value, Enum) else value
@@ -127,7 +127,7 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def possible(value: ValueType) -> tuple[Any, ...]:
-    """Some values of a type, from which a result is drawn by lot."""
+    """Some values of a type, of which a random one is the result."""
     if value.is_list:
         some = possible(ValueType(value.base, choices=value.choices))
         return [some[0]], [], [some[0], some[-1]]

@@ -94,7 +94,7 @@ def _distinct_events(
 ) -> Iterable[Event]:
     """Of all events that can be made of some aspects, the first for each set of elements that it matches.
 
-    There can be hundreds of thousands, so that each is told by the elements that match its aspects, as bits.
+    There can be hundreds of thousands, so that bits for the elements that match its aspects identify each.
     """
     patterns = zip(*map(aspects_of, alike), strict=True)
     matched = [
@@ -144,10 +144,10 @@ def _texts(wanted: Sequence[Text | None]) -> list[str | None]: ...
 @overload
 def _texts(wanted: Sequence[Text | None], nothing: str) -> list[str]: ...
 def _texts(wanted: Sequence[Text | None], nothing: str | None = None) -> list[Any]:
-    """Texts that match in all combinations, and what stands for there being none."""
+    """Texts that match in all combinations, with a placeholder for a missing text."""
     texts = _distinct(wanted)
     strings = distinct_strings(texts, outer=True) if texts else ()
-    if nothing == "":  # which stands for there being none, so that an empty text needs another spelling
+    if nothing == "":  # the placeholder for a missing text, so that an empty text needs another spelling
         strings = tuple(string or "x" for string in strings if string or _is_as_empty("x", texts))
     return [*dict.fromkeys([nothing, *strings])]
 

@@ -71,7 +71,7 @@ class Automaton:
 
     @cached_property
     def distances(self) -> tuple[int | None, ...]:
-        """For each state, the fewest events to an accepting one; None if none can be reached."""
+        """For each state, the fewest events to an accepting one; None if there is no way to one."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
         distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
         while border:

@@ -105,10 +105,10 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
         for match in regex.finditer(text)
         if kind == 0 or not _PLACE.search(text, max(0, match.start() - NEAR_CLAIM), match.start())
     ]
-    reached = -1
+    last_end = -1
     for start, end, kind in sorted(named):
-        if -end > reached:
-            reached = -end
+        if -end > last_end:
+            last_end = -end
             yield start, -end, kind
 
 
