@@ -27,12 +27,9 @@ def test_a_phrase_names_texts_and_results_in_every_form(
 
 def test_a_question_has_its_options_where_the_verb_is_finite() -> None:
     unanswered = Event("ask", "Tea?", TEA.options)
-    assert [
-        form for form in ("base", "third", "past", "ing") if "[yes | 2 (no text)]" in phrase(TEA, form)
-    ] == [
-        "third",
-        "past",
-    ]
+    forms: list[VerbForm] = ["base", "third", "past", "ing"]
+    bracketed = [form for form in forms if "[yes | 2 (no text)]" in phrase(TEA, form)]
+    assert bracketed == ["third", "past"]
     assert phrase(unanswered, "past").endswith(NO_ANSWER)
     assert NO_ANSWER not in phrase(unanswered, "third")
 
