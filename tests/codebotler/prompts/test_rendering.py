@@ -208,7 +208,7 @@ def test_hash_is_that_of_all_but_the_instruction(monkeypatch: pytest.MonkeyPatch
     assert re.fullmatch("[0-9a-f]{64}", before)
     assert template_hash(SKILLS.with_skill(WAVE)) != before
     changes: dict[str, object] = {
-        "STOP": ("\n#",),
+        "STOP_TEXTS": ("\n#",),
         "OPENING": "def task_program() -> None:\n",
         "examples": lambda: examples()[1:],
         "_fenced": lambda program: program,
