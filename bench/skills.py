@@ -17,6 +17,7 @@ from codebotler.checking.check import check
 from codebotler.checking.rules import read_rules
 from codebotler.core.trace import Status
 from codebotler.core.world import World
+from codebotler.core.world_file import read_world
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
@@ -68,7 +69,7 @@ def main() -> None:
     with WorkerPool(1) as pool:
         for folder in sorted(path.parent for path in SETS.glob("*/suite.yaml")):
             suite = load_suite(folder)
-            world, rules = World.read(folder / "world.yaml"), read_rules(folder / "rules.yaml", suite.skills)
+            world, rules = read_world(folder / "world.yaml"), read_rules(folder / "rules.yaml", suite.skills)
             for mutant in changed(suite):
                 name = mutant.operator
                 all_of[name] += 1

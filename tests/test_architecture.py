@@ -2,6 +2,8 @@
 
 import re
 import runpy
+from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -35,3 +37,63 @@ def test_the_glossary_names_modules_that_are_there() -> None:
 def _is_module(name: str) -> bool:
     places = [ROOT / "src" / package / name.replace(".", "/") for package in ("", "codebotler", "roboeval")]
     return any(place.is_dir() or place.with_suffix(".py").is_file() for place in places)
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    graph = {name: _imported_by(name, text) for name, text in _modules().items()}
+    for circle in KNOWN_CIRCLES:
+        for name in circle:
+            graph[name] -= circle
+    tuple(TopologicalSorter(graph).static_order())  # CycleError names the modules of a circle
+
+
+def test_public_classes_and_constants_have_names_of_their_own() -> None:
+    owners: dict[str, set[str]] = {}
+    for module, text in _modules().items():
+        for name in _public_names(text):
+            owners.setdefault(name, set()).add(module)
+    shared = {name: modules for name, modules in owners.items() if len(modules) > 1}
+    assert {name: modules for name, modules in shared.items() if name not in KNOWN_CLASHES.split()} == {}
+
+
+KNOWN_CIRCLES = ({"codebotler.simulator.robot", "codebotler.simulator.rule_guard"},)
+
+KNOWN_CLASHES = """
+ABOUT ADDRESS AGAIN AHEAD ALL AT_LEAST AT_ONCE BAR BATCH BEAT BETWEEN BLOCKS BY_HAND CHANGED CHARACTERS
+CHUNK CLASSES CLEAR CLOSES CODE Check DECODER DOOR EMPTY ENOUGH ERROR EVENTS EVERY EXPECTED FAILED FEW
+FEWEST FIRST FLOOR FOLDER FORMATS Filter GONE HEAD HEADLINES HERE ID INSTALL KEY KINDS LARGEST LATER LATEST
+LEAVES LEVEL LINE LINES LOG LONG LONGEST LONGEST_NAME LONGEST_REMEMBERED MANY MEND METHODS MODULES MOST
+MOST_BYTES MOST_LINES MOST_NAME MOST_OPTIONS MOST_REASON MOST_REMEMBERED MOST_REPLY MOST_ROOMS MOST_SAID
+MOST_TASKS MOST_TEXT MOST_TITLE NAME NAMED NAMES NEAR NEEDED NEEDS NONE NOTHING NOT_RECORDED NOWHERE
+NO_PROGRAM NUMBER ON_WINDOWS OPERATORS OURS PAGE PAIR PAPER PATIENCE PATIENCE_S PAUSE PEOPLE PLACE PLACES
+PLAIN POLICY PORTS POSE Picture Progress QUIET Question RAISED RECURSION_LIMIT REFUSED REPORT RETRIES ROBOT
+ROOMS ROS_PYTHON ROUNDING SAY SCRIPT SETTLES SHOWN SIZES SKILLS SMALL SMALLEST_P STATIC STOPS STYLE STYLES
+SUITE Scope Search State Summary TAKEN TASK TELLING TOO_LARGE TOO_LONG TRIES Trial UNKNOWN UNREADABLE USES
+VARIABLE WIDE WORDS WORLDS
+"""
+
+
+@cache
+def _modules() -> dict[str, str]:
+    """The text of each module of both packages, by the module's name."""
+    root, found = ROOT / "src", {}
+    for path in sorted(root.rglob("*.py")):
+        name = ".".join(path.relative_to(root).with_suffix("").parts)
+        found[name.removesuffix(".__init__")] = path.read_text()
+    return found
+
+
+def _imported_by(module: str, text: str) -> set[str]:
+    """The modules of ours that a module imports anywhere, also for types only."""
+    modules, found = _modules().keys(), set[str]()
+    for package, names in re.findall(r"^\s*from ([\w.]+) import (\([^)]*\)|.*)", text, re.MULTILINE):
+        parts = {f"{package}.{name}" for name in re.findall(r"\w+", names)}
+        found |= parts if parts <= modules else {package, *parts}
+    return (found | {*re.findall(r"^\s*import ([\w.]+)", text, re.MULTILINE)}) & modules - {module}
+
+
+def _public_names(text: str) -> set[str]:
+    """The public classes and the constants that a module defines."""
+    classes = re.findall(r"^class ([A-Z]\w*)", text, re.MULTILINE)
+    assigned = re.findall(r"^([A-Z][A-Z0-9_]*(?:, [A-Z][A-Z0-9_]*)*)(?: =|: )", text, re.MULTILINE)
+    return {*classes, *(name for each in assigned for name in each.split(", "))} - {"TYPE_CHECKING"}

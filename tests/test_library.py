@@ -20,7 +20,7 @@ import codebotler
 import roboeval
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
-from codebotler.core.skills.values import NOTHING
+from codebotler.core.skills.values import NO_VALUE
 from roboeval import Suite, load_suite
 
 ROOT = Path(__file__).parent.parent
@@ -259,7 +259,7 @@ def test_a_single_text_is_no_list_of_rooms() -> None:
         ({"samples": 0}, "samples must be from 1 to .*, not 0$"),
         ({"samples": 10**9}, "samples must be .* 10,000, not 1,000,000,000$"),
         (
-            {"skills": SKILLS.with_skill(Skill("fly", (), NOTHING, "Fly."))},
+            {"skills": SKILLS.with_skill(Skill("fly", (), NO_VALUE, "Fly."))},
             '"fly" cannot be simulated: nothing says what it does',
         ),
     ],

@@ -13,7 +13,7 @@ from codebotler.core.program import Flaw, flaws
 from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, SkillTable
-from codebotler.core.skills.values import TEXT, TRUTH, ValueType
+from codebotler.core.skills.values import TEXT_TYPE, TRUTH_TYPE, ValueType
 from codebotler.core.skills.verbs import Verb
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
@@ -63,7 +63,7 @@ def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> No
 def test_a_question_of_its_own_is_shown_with_its_options_and_its_answer() -> None:
     vote = Event("vote", "tea?", (Option("yes"), Option("no")), answer="no")
     (step,) = steps_of((vote,))
-    assert str(step_text(step)) == 'vote "tea?" [yes | no] → no'
+    assert str(step_text(step)) == 'did vote "tea?" [yes | no] → no'
     (unanswered,) = steps_of((Event("ask", "tea?", (Option("yes"),)),))
     assert str(step_text(unanswered)) == 'asked "tea?" [yes] → no answer'
 
@@ -128,11 +128,11 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others() ->
     asks = Skill(
         "vote",
         (Parameter("about"), Parameter("options", ValueType(is_list=True), is_options=True)),
-        TEXT,
+        TEXT_TYPE,
         "Let all in the room vote.",
         Recording("vote", "about", "options"),
     )
-    smells = Skill("smells", (Parameter("what"),), TRUTH, "Smell.", Recording("smell", "what"))
+    smells = Skill("smells", (Parameter("what"),), TRUTH_TYPE, "Smell.", Recording("smell", "what"))
     table = SkillTable((*SKILLS.rows, asks, smells))
     trace = (
         Event("vote", "tea?"),

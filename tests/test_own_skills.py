@@ -17,7 +17,7 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.world import World
+from codebotler.core.world_file import read_world
 from codebotler.missions.store import missions
 from codebotler.simulator.sampled_robot import RoomMap
 from roboeval.cli.app import app as roboeval
@@ -64,7 +64,7 @@ class Own:
 
     def problems(self, program: str, *, with_rules: bool = False) -> list[str]:
         rules = read_rules(self.folder / "rules.yaml", self.skills) if with_rules else ()
-        rooms = RoomMap.of(World.read(self.folder / "world.yaml"))
+        rooms = RoomMap.of(read_world(self.folder / "world.yaml"))
         found = check(program, room_map=rooms, skills=self.skills, house_rules=rules)
         return [problem.kind for problem in found.problems]
 

@@ -28,6 +28,7 @@ WIDTH = 82  # letters in a line of `--help` here
 MODULES = {
     "codebotler": (
         *("codebotler", "codebotler.simulator", "codebotler.core.program", "codebotler.core.world"),
+        "codebotler.core.world_file",
         *("codebotler.core.skills.paper", "codebotler.core.skills.table"),
         *("codebotler.core.trace", "codebotler.rtl"),
         *("codebotler.rtl.reasoning", "codebotler.missions.mission"),
@@ -39,6 +40,7 @@ MODULES = {
     "roboeval": (
         "roboeval",
         "roboeval.suites.load",
+        "roboeval.suites.suite",
         "roboeval.evaluation.runs.completions",
         "roboeval.evaluation.runs.traces",
         "roboeval.analysis.metrics",

@@ -18,7 +18,7 @@ import pytest
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, RosAction, Skill
-from codebotler.core.skills.values import TRUTH, ValueType
+from codebotler.core.skills.values import TRUTH_TYPE, ValueType
 from codebotler.robots.base import ROS_PYTHON, CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros.robot import RosRobot, Waits
@@ -500,7 +500,7 @@ def test_ninth_skill_is_performed(graph: Graph) -> None:
     wave = Skill(
         "wave",
         (Parameter("person"), Parameter("ways", ValueType(is_list=True), is_options=True)),
-        TRUTH,
+        TRUTH_TYPE,
         "Wave at a person.",
         ros=RosAction("Wave", "/wave_server", ("string person", "string[] ways"), "bool"),
     )

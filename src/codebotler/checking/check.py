@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import cache, partial
 from typing import Protocol
 
 from codebotler.checking.problems import Check, Sample
-from codebotler.checking.room_names import MOST_ROOMS
+from codebotler.checking.rooms import room_map_for, widened
 from codebotler.checking.sampled import (
     SAMPLES,
     CheckSettings,
@@ -19,9 +19,8 @@ from codebotler.checking.sampled import (
     run_samples,
     sampled_runs,
 )
-from codebotler.checking.static import read_program, read_rooms
-from codebotler.core.errors import UserError, expect_list
-from codebotler.core.labels import check_label
+from codebotler.checking.static import read_program
+from codebotler.core.errors import expect_list
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
@@ -31,10 +30,8 @@ from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
 
-START = "start_loc"  # models know it by this name from the paper
-AT_ONCE = 16  # worlds that a worker is given
-GUESSES = 3  # times that the rooms to which a program drives are added to those in its text
-SOME_ROOMS = ("room 1", "room 2")  # for a program that drives to all rooms and names none
+WORLDS_AT_ONCE = 16  # worlds that a worker is given
+WIDENINGS = 3  # times that the rooms to which a program drives are added to those in its text
 
 
 def check(
@@ -51,7 +48,7 @@ def check(
     room_map: RoomMap | None = None,
     house_rules: Sequence[Rule] = (),
 ) -> Check:
-    """Find what is wrong with a program, by its text and by runs in sampled worlds.
+    """Find the problems of a program, by its text and by runs in sampled worlds.
 
     Args:
         program: its source, which need not even parse.
@@ -60,12 +57,12 @@ def check(
             if that is a room, or else the first one.
         samples: how many worlds to sample, 1 to 10,000.
         seed: of the worlds: the same ones on every machine.
-        strict: whether to draw also what the program takes for granted.
-        skills: what the program may call.
-        workers: how many runs go on at the same time, in a pool that is started for this check alone.
-        pool: what runs the programs; without it and `workers`, the pool of this process, which stays.
+        strict: whether to randomize also facts that the program takes for granted.
+        skills: the skills that the program may call.
+        workers: how many runs go on at the same time, in a pool that only this check uses.
+        pool: runs the programs; without it and `workers`, the pool of this process is used and kept.
         room_map: the rooms and the start, in place of those two, where more is known of them.
-        house_rules: what a program must keep to in every world.
+        house_rules: the rules that a program must keep in every world.
 
     Raises:
         UserError: the name of a room is no regular expression, the robot starts in none of the rooms, or the
@@ -75,21 +72,12 @@ def check(
     expect_list(rooms, "the rooms")
     settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules))
     if room_map is None and (rooms, start) != (None, None):
-        room_map = _room_map(program, rooms, start, skills)
+        room_map = room_map_for(program, rooms, start, skills=skills)
     with _opened(pool, workers) as opened:
-
-        def share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-            return run_samples(opened.here(), program, room_map, samplers, settings)
-
-        def run(room_map: RoomMap, samplers: Sequence[FactSampler], *, meanwhile: Meanwhile) -> list[Sample]:
-            shares = [samplers[start :: opened.workers] for start in range(opened.workers)]
-            futures = [opened.submit(share, room_map, each) for each in shares if each]
-            meanwhile()
-            return [sample for future in futures for sample in future.result()]
-
-        if samples > AT_ONCE and not opened.is_here:
-            known = room_map or _room_map(program, None, None, skills)
-            return _checked(program, known, settings, run, AT_ONCE * opened.workers)
+        if samples > WORLDS_AT_ONCE and not opened.is_here:
+            known = room_map or room_map_for(program, skills=skills)
+            run = _PoolRunner(opened, program, settings)
+            return _checked(program, known, settings, run, WORLDS_AT_ONCE * opened.workers)
         return opened.call(lambda: check_on(opened.here(), program, room_map, settings))
 
 
@@ -115,51 +103,90 @@ def check_on(
     room_map: RoomMap | None = None,
     settings: CheckSettings | None = None,
 ) -> Check:
-    """The same check on one worker, the calling thread's own, for checking many programs at the same time."""
+    """Check one program on one worker, which belongs to the calling thread, for checks at the same time."""
     how = settings or CheckSettings()
-
-    def run(rooms: RoomMap, samplers: Sequence[FactSampler], *, meanwhile: Meanwhile) -> list[Sample]:
-        return run_samples(worker, program, rooms, samplers, how, meanwhile=meanwhile)
-
     worker.begin_to_prepare(program, how.skills, how.rules)
+    run = partial(run_samples, worker, program, settings=how)
     with worker.one_child():
-        return _checked(program, room_map or _room_map(program, None, None, how.skills), how, run)
+        return _checked(program, room_map or room_map_for(program, skills=how.skills), how, run)
 
 
 def checks_on(
     worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
 ) -> list[Check]:
-    """The same checks of several programs of one caller, whose first runs may share a process."""
-    samplers = first_samplers(settings)[:AT_ONCE]
+    """Check several programs of one caller on one worker; their first runs may share a process."""
+    samplers = first_samplers(settings)[:WORLDS_AT_ONCE]
     first = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     known: list[dict[int, Outcome]] = [{} for _ in programs]
     for (number, run), outcome in worker.run_tame([runs.job for runs in first]).items():
         known[number][run] = outcome
-
-    def checked(number: int) -> Check:
-        program, room_map = programs[number]
-
-        def run(rooms: RoomMap, wanted: Sequence[FactSampler], *, meanwhile: Meanwhile) -> list[Sample]:
-            if rooms == room_map and wanted == samplers:
-                return first[number].samples(worker, known[number])
-            return run_samples(worker, program, rooms, wanted, settings, meanwhile=meanwhile)
-
+    found = []
+    for runs, outcomes in zip(first, known, strict=True):
         with worker.one_child():
-            return _checked(program, room_map, settings, run)
+            run_more = _WorkerRunner(worker, runs, outcomes)
+            found.append(_checked(runs.program, runs.room_map, settings, run_more))
+    return found
 
-    return list(map(checked, range(len(programs))))
+
+class SampleRunner(Protocol):
+    """Runs a program in several worlds."""
+
+    def __call__(
+        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
+    ) -> list[Sample]:
+        """Run it, and call `meanwhile` once nothing is left but to wait."""
+        ...
+
+
+@dataclass(frozen=True)
+class _PoolRunner:
+    """Runs a program on all workers of a pool."""
+
+    pool: WorkerPool
+    program: str
+    settings: CheckSettings
+
+    def __call__(
+        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
+    ) -> list[Sample]:
+        shares = [samplers[start :: self.pool.workers] for start in range(self.pool.workers)]
+        futures = [self.pool.submit(self._run_share, room_map, each) for each in shares if each]
+        meanwhile()
+        return [sample for future in futures for sample in future.result()]
+
+    def _run_share(self, room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+        return run_samples(self.pool.here(), self.program, room_map, samplers, self.settings)
+
+
+@dataclass(frozen=True)
+class _WorkerRunner:
+    """Runs a program on one worker, of which the outcomes of some first runs are known."""
+
+    worker: Worker
+    first: SampledRuns
+    outcomes: Mapping[int, Outcome]
+
+    def __call__(
+        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
+    ) -> list[Sample]:
+        first = self.first
+        if room_map == first.room_map and samplers == first.samplers:
+            return first.samples_on(self.worker, self.outcomes)
+        return run_samples(
+            self.worker, first.program, room_map, samplers, first.settings, meanwhile=meanwhile
+        )
 
 
 def _checked(
-    program: str, room_map: RoomMap, settings: CheckSettings, run: SampleRunner, width: int = AT_ONCE
+    program: str, room_map: RoomMap, settings: CheckSettings, run: SampleRunner, width: int = WORLDS_AT_ONCE
 ) -> Check:
     read = cache(partial(read_program, program, room_map, settings.skills))
     ran = sampled_runs(partial(run, meanwhile=read), room_map, settings, width)
     problems = list(read().problems)
     if not read().compiles:
         return Check(tuple(problems), (), room_map, settings.seed, settings.strict)
-    for _ in range(GUESSES if room_map.guessed else 0):
-        wider = _widened(room_map, ran)
+    for _ in range(WIDENINGS if room_map.guessed else 0):
+        wider = widened(room_map, ran)
         if wider == room_map:
             break
         room_map, ran = wider, sampled_runs(partial(run, meanwhile=read), wider, settings, width)
@@ -167,45 +194,3 @@ def _checked(
     problems += [problem for problem in failures(ran, room_map) if problem.line not in blamed]
     problems.sort(key=lambda problem: problem.line or 0)
     return Check(tuple(problems), tuple(ran), room_map, settings.seed, settings.strict)
-
-
-class SampleRunner(Protocol):
-    """What runs a program in several worlds."""
-
-    def __call__(
-        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
-    ) -> list[Sample]:
-        """Run it, and call `meanwhile` once that is only waited for."""
-        ...
-
-
-# --- rooms
-
-
-def _room_map(program: str, rooms: Sequence[str] | None, start: str | None, skills: SkillTable) -> RoomMap:
-    if rooms is not None:
-        for room in rooms:
-            try:
-                check_label(room)
-            except ValueError as error:
-                raise UserError(f'the room is "{room}", but {error}') from None
-        names = tuple(dict.fromkeys(rooms)) or (start or START,)
-        start = start or (START if START in names else names[0])
-        if start not in names:
-            raise UserError(f'the robot starts in "{start}", but the rooms are: {", ".join(names)}')
-        return RoomMap(names, start)
-    start = start or START
-    rooms_in_text, lists_all = read_rooms(program, skills)
-    named = [room for room in rooms_in_text if room != start]
-    if len(named) < len(SOME_ROOMS) and lists_all:
-        named += [room for room in SOME_ROOMS if room not in named]
-    return RoomMap((*named, start), start, guessed=True)
-
-
-def _widened(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
-    """The rooms, and those that the program drove to although its text does not name them."""
-    requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == "goto")
-    driven = (room_map.room(request) for request in requests)
-    found = dict.fromkeys([*room_map.rooms, *(room for room in driven if room is not None)])
-    rooms = [room for room in found if room != room_map.start][:MOST_ROOMS]
-    return replace(room_map, rooms=(*rooms, room_map.start))

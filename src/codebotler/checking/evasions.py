@@ -9,17 +9,18 @@ from textwrap import dedent
 
 from codebotler.checking.rule_rooms import room_patterns
 from codebotler.core.errors import UserError
-from codebotler.core.labels import PLAIN
+from codebotler.core.labels import PLAIN_LABEL
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.trace import Names
 from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.simulator.rule_guard import DRIVE, Rule
+from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.rules import resolve_room
 
-ACTS = {"drive": DRIVE, "take": "pick", "put": "place", "look": "check", "ask": "ask"}
+ACTS = {"drive": GOTO, "take": PICK, "put": PLACE, "look": CHECK, "ask": ASK}
 """The kind of event that each method of a simulated robot adds."""
 HARMLESS = {"room", "rooms", "state", "outcome", "truth", "fail"}
 
@@ -57,20 +58,20 @@ def _unseen_skills(rules: Sequence[Rule], skills: SkillTable) -> Iterator[str]:
 
 def acts_inside(row: Skill) -> set[str]:
     """The kinds of events that an own skill may add inside; all of them if its code does not tell."""
-    always = {DRIVE} if row.is_drive else set()
+    always = {GOTO} if row.is_drive else set()
     if row.is_by_lot or row.does is None:
         return always
     try:
         tree = ast.parse(dedent(inspect.getsource(row.does)))
     except (OSError, SyntaxError):
-        return {*ACTS.values(), "say"}
+        return {*ACTS.values(), SAY}
     robot = row.does.__code__.co_varnames[0]
     used = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
     acts = {node.attr for node in used if isinstance(node.value, ast.Name) and node.value.id == robot}
     named = sum(isinstance(node, ast.Name) and node.id == robot for node in ast.walk(tree))
     direct = sum(isinstance(node.value, ast.Name) and node.value.id == robot for node in used)
     if named > direct or acts - HARMLESS - {*ACTS}:  # it is given to another function, for example
-        return {*ACTS.values(), "say"}
+        return {*ACTS.values(), SAY}
     return always | {ACTS[act] for act in acts if act in ACTS}
 
 
@@ -80,7 +81,7 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
     Raises:
         UserError: a rule names such a room with `^` or `$`, so that any further word of a request evades it.
     """
-    regexes = [room for room in rooms if not PLAIN.fullmatch(room)]
+    regexes = [room for room in rooms if not PLAIN_LABEL.fullmatch(room)]
 
     def leads_to(room: str, request: str) -> bool:
         return resolve_room(rooms, request) == room

@@ -11,8 +11,8 @@ from codebotler.core.program import names_bound, nodes
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 
-LIST, HERE = "get_all_rooms", "get_current_location"
-MOST_ROOMS = 100
+ROOMS_SKILL, ROOM_SKILL = "get_all_rooms", "get_current_location"
+MOST_CHECKED_ROOMS = 100
 ROUNDS = 6  # in which names are passed on from variable to variable; longer chains are unusual
 SAME_VALUES = frozenset({"sorted", "list", "set", "tuple", "reversed", "iter", "filter", "frozenset"})
 OF_A_LIST = frozenset({"copy", "keys", "lower", "strip", "casefold", "title", "pop"})
@@ -21,13 +21,13 @@ COMPARING = frozenset({"startswith", "endswith"})
 Literal: TypeAlias = tuple[int, int, str]
 """A text in a program: its line from 1, its column from 0, and the text."""
 
-A_ROOM: Literal = (0, 0, "")  # stands for the name of a room that a skill returns
+A_ROOM: Literal = (0, 0, "")  # the placeholder for the name of a room that a skill returns
 
 
 def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...]:
     """The rooms that a program drives to, or compares rooms with, by their names in its text, in order."""
     try:
-        return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MOST_ROOMS]
+        return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MOST_CHECKED_ROOMS]
     except RecursionError:
         return ()
 
@@ -53,7 +53,7 @@ def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[in
 
 def lists_rooms(tree: ast.Module) -> bool:
     """Whether a program asks for the list of all rooms."""
-    return any(isinstance(node, ast.Name) and node.id == LIST for node in nodes(tree))
+    return any(isinstance(node, ast.Name) and node.id == ROOMS_SKILL for node in nodes(tree))
 
 
 def _texts(expression: ast.expr) -> Iterator[str]:
@@ -113,7 +113,7 @@ class _Variables:
                 return {(node.lineno, node.col_offset, value.strip())}
             case ast.Name(name):
                 return self.held[name]
-            case ast.Call(ast.Name(name)) if name in {LIST, HERE}:
+            case ast.Call(ast.Name(name)) if name in {ROOMS_SKILL, ROOM_SKILL}:
                 return {A_ROOM}
         return self._all(_parts(node))
 

@@ -8,6 +8,7 @@ from itertools import chain, combinations
 
 from codebotler.checking.rule_rooms import may_mean
 from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.kinds import GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Names, Option, Trace
 from codebotler.core.world import World
@@ -29,8 +30,8 @@ DETECTED = (
     "it can be broken by what a look finds or a person answers, which can only be noticed: "
     "the mission stops right after that"
 )
-OTHER = "something else"  # an answer that rules do not name
-ANYTHING = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
+OTHER_ANSWER = "something else"  # an answer that rules do not name
+ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def _review(rule: Rule, world: World | None) -> Review:
 
 
 def _breaks(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
-    """Traces that break a rule: a shortest one, and such that end with a result of which it speaks."""
+    """Traces that break a rule: a shortest one, and those that end with a result which it names."""
     yield shortest
     for element in dict.fromkeys(elements(rule.formula)):
         if element.found is not None or element.answer is not None:
@@ -89,7 +90,7 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
         return False
     last = breaks[-1]
     if last.answer is not None:  # a question always has another option
-        last = replace(last, options=(*last.options, Option(last.answer), Option(OTHER)))
+        last = replace(last, options=(*last.options, Option(last.answer), Option(OTHER_ANSWER)))
     try:
         guard.judge(replace(last, found=None, answer=None))
     except RuleViolationError:
@@ -101,7 +102,7 @@ def _kept(rule: Rule, world: World | None) -> Trace | None:
     spoken_of = [*dict.fromkeys(elements(rule.formula))]
     less = [replace(one, place=None) for one in spoken_of] + [replace(one, holding=None) for one in spoken_of]
     kinds = [EventPattern(kind, Regex(".*")) for kind in dict.fromkeys(one.kind for one in spoken_of)]
-    happenings: list[Formula] = [*map(Exists, dict.fromkeys([*spoken_of, *less, *kinds])), ANYTHING]
+    happenings: list[Formula] = [*map(Exists, dict.fromkeys([*spoken_of, *less, *kinds])), ANY_EVENT]
     for happens in happenings:
         trace = _trace([happens], [rule], world)
         if trace is not None:
@@ -125,14 +126,14 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
     """The rooms of a world, by name; of those named by a regex, also by words that formulas tell apart."""
     names = [room.name for room in world.rooms]
     spoken_of = [*chain.from_iterable(map(elements, formulas))]
-    told: list[Text] = [one.text for one in spoken_of if one.kind == "goto"]
-    told += [Regex(one.place_regex.pattern) for one in spoken_of if one.place_regex is not None]
+    named_texts: list[Text] = [one.text for one in spoken_of if one.kind == GOTO]
+    named_texts += [Regex(one.place_regex.pattern) for one in spoken_of if one.place_regex is not None]
     for name in names:
         yield name
-        for word in distinct_strings((Regex(name), *dict.fromkeys(told))):
+        for word in distinct_strings((Regex(name), *dict.fromkeys(named_texts))):
             found = [one for one in names if finds(word, one, "label-in-request")]
             names_it = isinstance(names_of(name, word), Names) and found == [name]
-            if names_it and any(text.matches(word) != text.matches(name) for text in told):
+            if names_it and any(text.matches(word) != text.matches(name) for text in named_texts):
                 yield Names(word, name)
 
 
@@ -141,8 +142,8 @@ def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
     for element in elements(formula):
         if element.holding is not None:
             held = EventPattern(element.kind, Regex(".*"), holding=element.holding)
-            since = (Scope("AfterLast", EventPattern("place", Regex(".*"))),)
-            yield Or((Not(Last(held)), Exists(EventPattern("pick", element.holding), since)))
+            since = (Scope("AfterLast", EventPattern(PLACE, Regex(".*"))),)
+            yield Or((Not(Last(held)), Exists(EventPattern(PICK, element.holding), since)))
 
 
 # --- two rules
@@ -169,7 +170,7 @@ def _of_pair(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule
 
 
 def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
-    happens = [ANYTHING] if one.when == other.when == "always" else []
+    happens = [ANY_EVENT] if one.when == other.when == "always" else []
     alone = all(_trace(happens, [rule], world) is not None for rule in (one, other))
     return alone and _trace(happens, [one, other], world) is None
 
@@ -201,11 +202,13 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *PEOPLE - {""}]}
         row = by_event(element.kind)
         sort = row.recording.names if row is not None and row.recording is not None else ""
-        named.append((SORTS.get(sort, sort), element.text if sort in sorts else None, sorts.get(sort, [])))
+        named.append(
+            (SHOWN_SORTS.get(sort, sort), element.text if sort in sorts else None, sorts.get(sort, []))
+        )
         for what, text, known in named:
             may_lack = what == "room" and rule.any_room
             if isinstance(text, Regex) and not may_lack and not may_mean(text.pattern, known):
                 yield f'it names the {what} "{text.pattern}", which is not in this world'
 
 
-SORTS = {"object": "thing", "object or person": "thing or person"}
+SHOWN_SORTS = {"object": "thing", "object or person": "thing or person"}

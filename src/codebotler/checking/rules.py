@@ -10,20 +10,20 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from codebotler.checking.rule_rooms import unknown_rooms_in
-from codebotler.core.skills.declaration import POSE
+from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import brief
-from codebotler.core.world_file import Name, Text
-from codebotler.core.yaml_files import Place, YamlFile
+from codebotler.core.world_file import Name, YamlText
+from codebotler.core.yaml_files import YamlFile, YamlPath
 from codebotler.rtl import And, EventPattern, Formula, RtlSyntaxError, holds, parse
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.rule_guard import Rule
 
-EACH = "{each}"  # in a formula, what the names of `for_each` replace
-MOST_QUOTED = 30  # characters of a formula, from where it is wrong
+EACH_TAG = "{each}"  # in a formula, what the names of `for_each` replace
+MOST_QUOTED_FORMULA = 30  # characters of a formula, from where it is wrong
 
 
 def _as_name(text: str) -> str:
@@ -36,20 +36,20 @@ def _on_one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-class RuleFile(BaseModel):
+class HouseRuleFile(BaseModel):
     """One rule in a file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(strict=True), AfterValidator(_as_name)]
-    says: Annotated[Text, Field(min_length=1), AfterValidator(_on_one_line)]
-    always: Text | None = None
-    finally_: Annotated[Text | None, Field(alias="finally")] = None
+    says: Annotated[YamlText, Field(min_length=1), AfterValidator(_on_one_line)]
+    always: YamlText | None = None
+    finally_: Annotated[YamlText | None, Field(alias="finally")] = None
     refuse: Annotated[bool, Field(strict=True)] = False
     any_: Annotated[bool, Field(alias="any", strict=True)] = False
     for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
 
-    def rule(self, file: YamlFile, at: Place, skills: SkillTable) -> Rule:
+    def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable) -> Rule:
         """The rule that it describes, or a UserError."""
         if self.always is None and self.finally_ is None:
             raise file.wrong(
@@ -72,22 +72,26 @@ class RuleFile(BaseModel):
             raise file.wrong(f"{sentence}; {mend}", *at, "always")
         return Rule(self.name, self.says, formula, "always", self.refuse, self.any_)
 
-    def _formula(self, text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula:
+    def _formula(self, text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
         """The formula, or that of each name joined by `and`."""
-        if self.for_each is not None and EACH not in text:
-            raise file.wrong(f'"for_each" needs {EACH} in the formula, where its names belong', *at)
-        if self.for_each is None and EACH in text:
-            raise file.wrong(f'{EACH} in a formula needs "for_each" with the names that belong there', *at)
-        parts = [_parsed(text.replace(EACH, name), file, at, skills) for name in self.for_each or [EACH]]
+        if self.for_each is not None and EACH_TAG not in text:
+            raise file.wrong(f'"for_each" needs {EACH_TAG} in the formula, where its names belong', *at)
+        if self.for_each is None and EACH_TAG in text:
+            raise file.wrong(
+                f'{EACH_TAG} in a formula needs "for_each" with the names that belong there', *at
+            )
+        parts = [
+            _parsed(text.replace(EACH_TAG, name), file, at, skills) for name in self.for_each or [EACH_TAG]
+        ]
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 
 
-class RulesFile(BaseModel):
+class HouseRulesFile(BaseModel):
     """A file of rules."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    rules: Annotated[list[RuleFile], Field(min_length=1)]
+    rules: Annotated[list[HouseRuleFile], Field(min_length=1)]
 
 
 def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = ()) -> tuple[Rule, ...]:
@@ -102,7 +106,7 @@ def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (
         UserError: something is wrong; it names the line, and how to mend it.
     """
     file = YamlFile.read(path)
-    forms = file.validate(RulesFile).rules
+    forms = file.validate(HouseRulesFile).rules
     names = [form.name for form in forms]
     for number, name in enumerate(names):
         if name in names[:number]:
@@ -114,11 +118,11 @@ def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (
     return rules
 
 
-def _parsed(text: str, file: YamlFile, at: Place, skills: SkillTable) -> Formula:
+def _parsed(text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
     try:
-        formula = parse(text, skills=skills.with_skill(POSE))
+        formula = parse(text, skills=skills.with_skill(POSE_IN_ROOM))
     except RtlSyntaxError as error:
-        there = brief(text[error.column - 1 :], MOST_QUOTED)
+        there = brief(text[error.column - 1 :], MOST_QUOTED_FORMULA)
         where = f"column {error.column} of it" + (f", at {there}" if there else "")
         raise file.wrong(f"this is not a formula: {where}: {error.problem}", *at) from None
     for element in elements(formula):

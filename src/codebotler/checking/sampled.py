@@ -23,7 +23,7 @@ from codebotler.simulator.worker import NOTHING, Job, Meanwhile, Worker
 
 SAMPLES, MOST_SAMPLES = 5, 10_000
 EXPLORED = 2  # times as many worlds at most, to meet each fact in every way
-MORE = 20  # worlds in addition, where the program waits in vain in all that were drawn before
+MOST_FURTHER_WORLDS = 20  # worlds in addition, where the program waits in vain in all that were drawn before
 MOST_FACTS = 4
 
 
@@ -49,31 +49,31 @@ class SampledRuns:
     def __init__(
         self, program: str, room_map: RoomMap, samplers: Sequence[FactSampler], settings: CheckSettings
     ) -> None:
-        self._program, self._room_map = program, room_map
-        self._samplers, self._settings = samplers, settings
+        self.program, self.room_map = program, room_map
+        self.samplers, self.settings = samplers, settings
         self._robots: dict[int, SampledRobot] = {}
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
-    def samples(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
+    def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
         """What the runs show, of which some are known by number; of worlds that are alike, one may be run."""
         ran: list[Sample] = []
-        for number, sampler in enumerate(self._samplers):
+        for number, sampler in enumerate(self.samplers):
             if number in known:
                 outcome = known[number]
             elif any(one.is_as_in(sampler) for one in ran):
                 continue
             else:
-                outcome = worker.run_alone(self._program, partial(self._new_robot, number))
+                outcome = worker.run_alone(self.program, partial(self._new_robot, number))
             robot = self._robots[number]
             facts, draws = tuple(robot.facts), tuple(robot.draws)
             ran.append(Sample(sampler.sample, outcome, facts, draws, _is_in_vain(outcome, robot)))
         return ran
 
     def _new_robot(self, number: int) -> SampledRobot:
-        how = self._settings
-        guard = RuleGuard(how.house_rules, self._room_map.plan) if how.house_rules else None
-        sampler = self._samplers[number]
-        robot = SampledRobot(self._room_map, sampler, how.rules, how.skills, guard=guard)
+        how = self.settings
+        guard = RuleGuard(how.house_rules, self.room_map.plan) if how.house_rules else None
+        sampler = self.samplers[number]
+        robot = SampledRobot(self.room_map, sampler, how.rules, how.skills, guard=guard)
         self._robots[number] = robot
         return robot
 
@@ -92,7 +92,7 @@ def run_samples(
         return []
     runs = SampledRuns(program, room_map, samplers, settings)
     known = worker.run_tame([runs.job], meanwhile)
-    return runs.samples(worker, {number: outcome for (_, number), outcome in known.items()})
+    return runs.samples_on(worker, {number: outcome for (_, number), outcome in known.items()})
 
 
 def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
@@ -101,11 +101,11 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
     return outcome.status is Status.TIMEOUT
 
 
-Run: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
+RunInWorlds: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
 """Runs one program in several worlds, of which it may leave out those that are alike to the program."""
 
 
-def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
+def sampled_runs(run: RunInWorlds, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
     """The runs in so many worlds, and in more to meet each fact both ways, or where all search in vain.
 
     Worlds that are alike to the program need one run only; `run` is called with at most `width` worlds.
@@ -125,7 +125,7 @@ def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: in
 
     first = FactSampler(settings.seed, 0, settings.strict)
     add(first_samplers(settings))
-    for more in range(MORE):
+    for more in range(MOST_FURTHER_WORLDS):
         if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
             break
         # A program that waits in many places needs luck to end; a search, that not all is full of things.

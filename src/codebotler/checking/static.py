@@ -1,4 +1,4 @@
-"""Static analysis: certain errors in code that is reached and not guarded, and skills that are misused.
+"""Static analysis: certain errors in code that runs unguarded, and misuse of skills.
 
 Programs are read in a closed process, which nothing in their text can hold up for long.
 """
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from codebotler.checking.problems import Problem, no_room
 from codebotler.checking.room_names import fixed_drives, lists_rooms, named_rooms
-from codebotler.core.program import TASK, Flaw, flaws_of, nodes, parsed, tree_of
+from codebotler.core.program import TASK_FUNCTION, Flaw, flaws_of, nodes, parsed, tree_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import ValueType
@@ -19,8 +19,8 @@ from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 from codebotler.simulator.sampled_robot import RoomMap
 
 EVERYTHING = frozenset({"Exception", "BaseException"})
-ENDS = (ast.Return, ast.Raise, ast.Continue, ast.Break)
-EXAMPLE = "def task_program():\n    if is_in_rom('mug'):\n        say('a mug')\n"
+ENDING_NODES = (ast.Return, ast.Raise, ast.Continue, ast.Break)
+EXAMPLE_PROGRAM = "def task_program():\n    if is_in_rom('mug'):\n        say('a mug')\n"
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def read_rooms(program: str, skills: SkillTable) -> tuple[tuple[str, ...], bool]
     return tuple(rooms), lists_all
 
 
-@isolated(EXAMPLE, RoomMap(("start_loc",), "start_loc"), SKILLS)
+@isolated(EXAMPLE_PROGRAM, RoomMap(("start_loc",), "start_loc"), SKILLS)
 def _findings(
     program: str, room_map: RoomMap, skills: SkillTable
 ) -> tuple[bool, list[tuple[str, str, int | None]]]:
@@ -62,7 +62,7 @@ def _findings(
     return True, [(problem.kind, problem.message, problem.line) for problem in found]
 
 
-@isolated(EXAMPLE, SKILLS)
+@isolated(EXAMPLE_PROGRAM, SKILLS)
 def _rooms(program: str, skills: SkillTable) -> tuple[list[str], bool]:
     """The rooms that a program names, and whether it asks for the list of all rooms."""
     tree = tree_of(program)
@@ -110,7 +110,7 @@ def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: S
 
 def _never(tree: ast.Module) -> Iterator[ast.stmt]:
     """The statements that never run: after a return, below what is never true, in functions never named."""
-    named = {node.id for node in nodes(tree) if isinstance(node, ast.Name)} | {TASK}
+    named = {node.id for node in nodes(tree) if isinstance(node, ast.Name)} | {TASK_FUNCTION}
     for node in nodes(tree):
         match node:
             case ast.FunctionDef(name, body=body, decorator_list=[]) if name not in named:
@@ -122,7 +122,7 @@ def _never(tree: ast.Module) -> Iterator[ast.stmt]:
         for block in ("body", "orelse", "finalbody"):
             statements = getattr(node, block, [])
             if isinstance(statements, list):
-                ends = (i for i, statement in enumerate(statements) if isinstance(statement, ENDS))
+                ends = (i for i, statement in enumerate(statements) if isinstance(statement, ENDING_NODES))
                 yield from statements[next(ends, len(statements)) + 1 :]
 
 

@@ -10,14 +10,13 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.core.skills.declaration import by_event, verb_for
+from codebotler.core.phrases import is_question, phrase
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.terminal import shortened, visible
-from codebotler.core.trace import Event, Trace
-from codebotler.rtl.wording import done_with
+from codebotler.core.trace import Event, Trace, option_data, option_from
 
-MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
-MOST_OPTIONS = 20
-MARK = "❱"
+MOST_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
+STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
@@ -29,37 +28,39 @@ def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]
     data: dict[str, Any] = {"step": number, "kind": event.kind, "text": event.text}
     if has_places:
         data["place"] = event.place
-        if event.kind == "goto":
+        if event.kind == GOTO:
             data["to"] = event.destination
     if event.found is not None:
         data["found"] = event.found
     if event.more:
         data["more"] = [*event.more]
-    if _asks(event.kind) or event.answer is not None:
-        data["options"] = [o.text if o.is_text else {"no text": o.text} for o in event.options]
+    if is_question(event.kind) or event.answer is not None:
+        data["options"] = [*map(option_data, event.options)]
         data["answer"] = event.answer
     return data
 
 
-def _asks(kind: str) -> bool:
-    row = by_event(kind)
-    return row is not None and row.recording is not None and row.recording.options is not None
+def event_from_step(step: Mapping[str, Any]) -> Event:
+    """The event of a step, without its place."""
+    options = tuple(map(option_from, step.get("options", ())))
+    more = tuple(step.get("more", ()))
+    return Event(step["kind"], step["text"], options, step.get("answer"), step.get("found"), more=more)
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """The steps room by room; the needed ones, which explanations name, are marked and never left out."""
+    """Draw the steps room by room; those that explanations need are marked and always shown."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
         return table
-    if steps[0]["kind"] != "goto" and "place" in steps[0]:
+    if steps[0]["kind"] != GOTO and "place" in steps[0]:
         table.add_row(Text(), Text(f"in {visible(steps[0]['place'])}", "bold"))
     for is_shown, some in cut(steps, needed):
         if is_shown:
             for step in some:
-                indent = 0 if step["kind"] == "goto" else 4
+                indent = 0 if step["kind"] == GOTO else 4
                 number, is_needed = str(step["step"]), step["step"] in needed
-                mark = Text(f"{MARK} {number}", "bold red") if is_needed else Text(number, "dim")
+                mark = Text(f"{STEP_MARK} {number}", "bold red") if is_needed else Text(number, "dim")
                 table.add_row(mark, Padding(step_text(step), (0, 0, 0, indent)))
         else:
             table.add_row(Text(), Text(f"... {len(some):,} more{_repeating(steps, some)} ...", "dim"))
@@ -74,7 +75,7 @@ def cut(
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
         is_end = number <= FIRST_STEPS or number > len(steps) - LAST_STEPS
-        return len(steps) <= MOST_STEPS or is_end or number in needed
+        return len(steps) <= MOST_SHOWN_STEPS or is_end or number in needed
 
     return ((shown, list(some)) for shown, some in groupby(steps, key=is_shown))
 
@@ -93,26 +94,13 @@ def _repeating(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str,
 
 def step_text(step: Mapping[str, Any]) -> Text:
     """A step of `steps_of` as one line."""
-    text = f'"{shortened(step["text"])}"'
-    if step["kind"] == "goto":
-        return _drive(step, text)
-    kind, result = step["kind"], step.get("found")
-    verb = verb_for(kind)
-    bare = f"{visible(kind)} {text}" if step["text"] else visible(kind)
-    told = (
-        bare
-        if verb is None
-        else done_with(kind, verb.past, [shortened(each) for each in (step["text"], *step.get("more", ()))])
-    )
-    if "answer" in step:
-        answer = "no answer" if step["answer"] is None else shortened(step["answer"])
-        told += f" {_options(step['options'])} → {answer}"
-    elif verb and result is not None:
-        told += f": {verb.results[result]}"
-    return Text(told)
+    if step["kind"] == GOTO:
+        return _drive(step)
+    return Text(phrase(event_from_step(step), "past", show=shortened))
 
 
-def _drive(step: Mapping[str, Any], request: str) -> Text:
+def _drive(step: Mapping[str, Any]) -> Text:
+    request = f'"{shortened(step["text"])}"'
     if "place" not in step:
         return Text(f"→ {request}", "bold")
     start = f"{visible(step['place'])} → "
@@ -121,12 +109,6 @@ def _drive(step: Mapping[str, Any], request: str) -> Text:
     drive = Text(start + visible(step["to"]), "bold")
     is_same = step["to"].lower() == step["text"].lower()
     return drive if is_same else drive.append(f"  (asked for {request})", "not bold")
-
-
-def _options(options: Sequence[str | Mapping[str, str]]) -> str:
-    shown = [shortened(o) if isinstance(o, str) else f"{shortened(o['no text'])} (no text)" for o in options]
-    left = len(shown) - MOST_OPTIONS
-    return f"[{' | '.join(shown[:MOST_OPTIONS] + [f'{left:,} more'] * (left > 0))}]"
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:

@@ -35,14 +35,14 @@ def generate(
     from codebotler.cli.generate import show, write
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.world import World
+    from codebotler.core.world_file import read_world
     from codebotler.models.chosen import chosen_model
     from codebotler.prompts import prompt_for
 
     chosen = chosen_model(model, base_url)
     settings = chosen.with_its_server(model_settings(**sampling))
     table = skills_from(*(skills or ()))
-    known = None if world is None else World.read(world, table)
+    known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
     prompt = prompt_for(
         instruction,
@@ -141,11 +141,11 @@ def rules(
     from codebotler.cli.rules import note_evasions, review_data, review_view
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, note, print_json, print_rich
-    from codebotler.core.world import World
+    from codebotler.core.world_file import read_world
 
     table = skills_from(*(skills or ()))
     house_rules = read_rules(file, table)
-    known = None if world is None else World.read(world, table)
+    known = None if world is None else read_world(world, table)
     note_evasions(house_rules, known, table)
     if not any(rule.inside for rule in house_rules):
         note("goto is about destinations: a robot may drive through other rooms, unless a rule uses inside")

@@ -13,7 +13,7 @@ from rich.text import Text
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.storyboard import steps_of, storyboard
 from codebotler.core.errors import UserError
-from codebotler.core.files import MAX_BYTES, read_text, text_of
+from codebotler.core.files import MOST_FILE_BYTES, read_text, text_of
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import RunError
 from codebotler.prompts.extract import program_in
@@ -34,7 +34,7 @@ def read_program(name: str) -> str:
         if not text.strip():
             raise UserError("it contains no program", file=name)
         return text
-    text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
+    text = text_of(sys.stdin.buffer.read(MOST_FILE_BYTES + 1), INPUT)
     if not text.strip():
         raise UserError("is empty; pipe a program or a model's reply into it", file=INPUT)
     return program_in(text)

@@ -15,7 +15,7 @@ from typer.main import get_command
 
 from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import (
-    FULL,
+    DISK_FULL,
     drop_output,
     flush_output,
     note,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
 USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
-ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
+ENVIRONMENT = (*DISK_FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
 
 _command = cache(get_command)
 

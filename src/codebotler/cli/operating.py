@@ -209,7 +209,7 @@ def virtual_robot(
     from contextlib import suppress
 
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.world import World
+    from codebotler.core.world_file import read_world
     from codebotler.robots.ros.virtual import VirtualRobot
 
     def show(line: str) -> None:
@@ -217,7 +217,7 @@ def virtual_robot(
             print_text(line)
 
     table = skills_from(*(skills or ()))
-    known = World.read(world, table)
+    known = read_world(world, table)
     robot = VirtualRobot(known, speed=speed, ros=ros, port=port, python=ros_python, show=show, skills=table)
     try:
         started = robot.start()

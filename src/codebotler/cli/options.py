@@ -188,14 +188,14 @@ def world_or_office(
     robot: str, file: Path | None, skills: SkillTable, connection: Connection | None = None
 ) -> World | None:
     """The world in the file that is named, or else a robot's places, or an office for the simulated robot."""
-    from codebotler.core.world import World
+    from codebotler.core.world_file import read_world
     from codebotler.robots.simulated import OFFICE
 
     if file is None and connection is not None:
         return None if connection.places is None else connection.places.world()
 
     file = OFFICE if file is None and robot == "sim" else file
-    return None if file is None else World.read(file, skills)
+    return None if file is None else read_world(file, skills)
 
 
 def note_office(robot: str, file: Path | None) -> None:

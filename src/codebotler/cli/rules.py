@@ -13,6 +13,7 @@ from codebotler.checking.evasions import evasions
 from codebotler.checking.rule_review import Review
 from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
+from codebotler.core.phrases import verb, verb_phrase
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
@@ -20,8 +21,6 @@ from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import listed
 from codebotler.core.world import World
-from codebotler.rtl.wording import done_with
-from codebotler.rtl.wording import verb as verb_of
 from codebotler.simulator.rule_guard import Rule
 
 MADE_UP = ("", "x")  # texts in examples that stand for any other
@@ -96,11 +95,11 @@ def step_sentence(event: Event, here: str = "") -> str:
         event: the step.
         here: the room that the steps before it tell; a drive from another one says so.
     """
-    verb, drives = verb_of(event.kind), is_drive(event)
+    drives = is_drive(event)
     made_up = "another room" if drives else "something"
-    quote = "" if verb.object else '"'
+    quote = "" if verb(event.kind).object else '"'
     given = [made_up if t in MADE_UP else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
-    told = [done_with(event.kind, verb.third, given, "")]
+    told = [verb_phrase(event.kind, "third", given, "")]
     offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
     more = len(event.options) - len(offered)
     offered += [f"{more} {'more' if offered else 'options'}"] if more > 1 else []

@@ -14,6 +14,7 @@ from rich.syntax import Syntax
 from rich.text import Text
 
 from codebotler.core.errors import RobotError, UserError
+from codebotler.core.phrases import phrase
 from codebotler.core.program import literal, parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
@@ -21,7 +22,6 @@ from codebotler.core.terminal import visible
 from codebotler.core.trace import Event, Option
 from codebotler.core.words import listed
 from codebotler.prompts.rendering import stub
-from codebotler.rtl.wording import done_to, verb
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.sampled_robot import Lot, RoomMap, SampledRobot
 
@@ -140,10 +140,7 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
             where = f", where {listed(trial.facts)}" if trial.facts else ""
             yield Text(visible(f"  {row.call} {trial.outcome}{where}"), "dim")
             if trial.event is not None and not trial.outcome.startswith("fails"):
-                words = done_to(trial.event, verb(trial.event.kind).past)
-                if trial.event.found is not None:
-                    words += f": {verb(trial.event.kind).results[trial.event.found]}"
-                yield Text(visible(f"    in words: {words}"), "dim")
+                yield Text(visible(f"    in words: {phrase(trial.event, 'past')}"), "dim")
 
 
 def data(skills: SkillTable) -> list[dict[str, Any]]:

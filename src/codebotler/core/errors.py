@@ -21,7 +21,7 @@ EXTRAS = {
 }
 """The extra of this distribution that brings each package."""
 
-LONGEST = 600  # characters of a sentence; of a longer one, the ends are shown
+LONGEST_SENTENCE = 600  # characters of a sentence; of a longer one, the ends are shown
 
 
 class UserError(ValueError):
@@ -34,7 +34,8 @@ class UserError(ValueError):
     """
 
     def __init__(self, sentence: str, *, file: Path | str | None = None, line: int | None = None) -> None:
-        self.sentence, self.file, self.line = both_ends(" ".join(sentence.splitlines()), LONGEST), file, line
+        self.sentence = both_ends(" ".join(sentence.splitlines()), LONGEST_SENTENCE)
+        self.file, self.line = file, line
         where = "" if file is None else f"{file}: " if line is None else f"{file}, line {line}: "
         super().__init__(where + self.sentence)
 

@@ -19,14 +19,14 @@ from codebotler.core.errors import UserError
 
 CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # of a file system that does not sync folders
 
-MAX_BYTES = 5_000_000
+MOST_FILE_BYTES = 5_000_000
 MAX_ROW = 5_000_000
 
 
 # --- whole texts
 
 
-def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
+def read_text(path: Path, *, limit: int = MOST_FILE_BYTES) -> str:
     """The content of a UTF-8 file of at most so many bytes, or a UserError."""
     return text_of(read_bytes(path, limit + 1), path, limit=limit)
 
@@ -40,7 +40,7 @@ def read_bytes(path: Path, most: int) -> bytes:
             raise UserError(f"cannot be read ({error.strerror})", file=path) from None
 
 
-def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
+def text_of(data: bytes, name: Path | str, *, limit: int = MOST_FILE_BYTES) -> str:
     """The text of a file's bytes, with the line ends of any system and without a byte order mark."""
     if len(data) > limit:
         raise UserError(f"is larger than {limit:,} bytes", file=name)

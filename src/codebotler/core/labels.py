@@ -16,17 +16,17 @@ from typing import Any
 
 from codebotler.core.regex_flags import scope_flags
 
-PLAIN = re.compile(
+PLAIN_LABEL = re.compile(
     r"[\w ',;:!%@&/-]*"
 )  # texts, most names among them, that are regexes which find themselves
-ENDLESS = 100  # times from which a repeat counts as one without limit
+ENDLESS_REPEATS = 100  # times from which a repeat counts as one without limit
 MOST_WAYS, MOST_BESIDE_ENDLESS = 1_000, 40  # to match one text, the second beside a repeat without limit
-ANYTHING = ".*"
+ANY_LABEL = ".*"
 SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
-REPEATS = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
-LOOKS = frozenset({"ASSERT", "ASSERT_NOT"})
-GROUPS = LOOKS | {"SUBPATTERN"}
-UNKNOWN = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
+REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
+LOOK_OPCODES = frozenset({"ASSERT", "ASSERT_NOT"})
+GROUPS = LOOK_OPCODES | {"SUBPATTERN"}
+UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
 
 
 class SlowRegexError(Exception):
@@ -39,7 +39,7 @@ def check_label(text: str) -> str:
     Raises:
         ValueError: it is one of these; the message says which.
     """
-    if PLAIN.fullmatch(text):
+    if PLAIN_LABEL.fullmatch(text):
         return text
     check_regex(text)
     try:
@@ -62,9 +62,9 @@ def check_regex(text: str) -> str:
 @lru_cache(maxsize=1024)
 def expect_quick(pattern: str) -> None:
     """Raise SlowRegexError if a regex breaks the rule above."""
-    if pattern != ANYTHING:
-        pattern = pattern.removeprefix(ANYTHING)
-        pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANYTHING)
+    if pattern != ANY_LABEL:
+        pattern = pattern.removeprefix(ANY_LABEL)
+        pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANY_LABEL)
     ways, endless = _cost(import_module("re._parser").parse(pattern))
     if endless > 1:
         raise SlowRegexError("two repeats have no limit; write a limit, as in .{0,50}")
@@ -76,8 +76,8 @@ def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - of private classes of
     """In how many ways a part of a regex may match one text, and how many repeats without limit it has."""
     costs = [(str(op), *_cost_of(str(op), value)) for op, value in tree]
     # Nothing goes back into what looks ahead or behind: its cost comes beside that of the rest.
-    looks = [(ways, endless) for op, ways, endless in costs if op in LOOKS]
-    rest = [(ways, endless) for op, ways, endless in costs if op not in LOOKS]
+    looks = [(ways, endless) for op, ways, endless in costs if op in LOOK_OPCODES]
+    rest = [(ways, endless) for op, ways, endless in costs if op not in LOOK_OPCODES]
     return (
         prod(ways for ways, _ in rest) + sum(ways for ways, _ in looks),
         max(sum(endless for _, endless in rest), *(endless for _, endless in looks), 0),
@@ -85,9 +85,9 @@ def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - of private classes of
 
 
 def _cost_of(op: str, value: Any) -> tuple[int, int]:  # noqa: ANN401 - the same
-    if op in UNKNOWN:
+    if op in UNSUPPORTED_OPCODES:
         raise SlowRegexError("it refers to one of its groups; write out what you mean")
-    if op in REPEATS:
+    if op in REPEAT_OPCODES:
         return _cost_of_repeat(*value)
     if op == "BRANCH":
         costs = [_cost(choice) for choice in value[1]]
@@ -103,4 +103,4 @@ def _cost_of_repeat(least: int, most: int, repeated: Any) -> tuple[int, int]:  #
         return 1 + ways, endless
     if [str(op) for op, _ in repeated][1:] or str(repeated[0][0]) not in SINGLE:
         raise SlowRegexError("a repeat holds more than one character; write out how often it may be there")
-    return (1, 1) if most > ENDLESS else (most - least + 1, 0)
+    return (1, 1) if most > ENDLESS_REPEATS else (most - least + 1, 0)

@@ -1,8 +1,8 @@
-"""Programs as text: parsing, the skills they call, and what is certainly wrong with them.
+"""Programs as text: parsing, the skills they call, and certain errors.
 
 Parsing takes linear time, but for texts in which CPython 3.11 is quadratic, so it has a bound. Compiling,
-`symtable` and pyflakes have no bound of their own: what uses them is called in closed processes only, on text
-that others wrote (`codebotler.simulator.isolated_call`).
+`symtable` and pyflakes have no bound of their own: on text that others wrote, they run only in isolated
+processes (`codebotler.simulator.isolated_call`).
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from codebotler.core.skills.table import Parameter, Skill, SkillTable
 from codebotler.core.unicode import composed
 from codebotler.core.words import counted, listed
 
-TASK = "task_program"
-LONGEST = 20_000  # characters of a program that is parsed: at most a tenth of a second
-MOST_NAMES, LONGEST_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
-ALIKE = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
-GIVEN = ("time", "sys")  # modules that every program finds imported
+TASK_FUNCTION = "task_program"
+LONGEST_PROGRAM = 20_000  # characters of a program that is parsed: at most a tenth of a second
+MOST_NAMES, LONGEST_MISSPELT_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
+NAME_CUTOFF = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
+GIVEN_MODULES = ("time", "sys")  # modules that every program finds imported
 FILE = "<program>"
 
-warnings.filterwarnings("ignore", module=FILE)  # about odd escapes, such as "\d", in the programs of models
+warnings.filterwarnings("ignore", module=FILE)  # about invalid escapes such as "\d" in the programs of models
 
 # CPython before 3.13 counts the depth of all trees in the making together: where two threads parse at the
 # same time, one of them gets a SystemError. A forked process must not find the lock closed.
@@ -44,7 +44,7 @@ os.register_at_fork(
 
 @dataclass(frozen=True)
 class Flaw:
-    """Something that is certainly wrong with a program."""
+    """A certain error of a program."""
 
     line: int | None  # counted from 1; None where no line is to blame
     kind: str  # of the failure that it leads to, such as `NameError` or `AskEmptyOptions`
@@ -102,7 +102,7 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     If `compiled` is set, the compiler looks for further errors, such as a stray `return`. On text that others
     wrote, only a closed process may do that.
     """
-    if "\0" in source or len(source) > LONGEST:
+    if "\0" in source or len(source) > LONGEST_PROGRAM:
         return _unreadable(source)
     try:
         tree = parse(source)
@@ -122,8 +122,8 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
 
 
 def _unreadable(source: str) -> Flaw:
-    if len(source) > LONGEST:
-        return Flaw(None, "MemoryError", f"the program is longer than {LONGEST:,} characters")
+    if len(source) > LONGEST_PROGRAM:
+        return Flaw(None, "MemoryError", f"the program is longer than {LONGEST_PROGRAM:,} characters")
     line = source[: source.index("\0")].count("\n") + 1
     return Flaw(line, "SyntaxError", "the program contains a null character")
 
@@ -156,7 +156,7 @@ def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     return [
         node
         for node in tree.body
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == TASK
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == TASK_FUNCTION
     ]
 
 
@@ -171,10 +171,10 @@ def _bound_in_module(source: str) -> set[str]:
     return {s.get_name() for s in symbols if s.is_assigned() or s.is_imported()}
 
 
-def names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
+def names_bound(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
     """The names that a program defines anywhere, in whatever scope; `*` after `from x import *`."""
     names: set[str] = set()
-    skipped = {id(node) for node in besides}
+    skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
         if id(node) in skipped:
             continue
@@ -206,7 +206,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
     # Names in annotations that are texts are never looked up when a program runs.
     spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
     with _PARSING:
-        found = names_in(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
+        found = names_in(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
     return [
         # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
         (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
@@ -235,7 +235,7 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
     return messages, Names
 
 
-# --- what is certainly wrong
+# --- certain errors
 
 
 def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
@@ -250,7 +250,7 @@ def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
 
 
 def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """What is certainly wrong with a program that compiles, by line."""
+    """The certain errors of a program that compiles, by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:
@@ -260,21 +260,22 @@ def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tupl
 
 def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
     """Whether `task_program` is there and can be called without arguments."""
-    if TASK not in _bound_in_module(source):
-        yield Flaw(None, "NameError", f"the program defines no {TASK} at module level")
+    if TASK_FUNCTION not in _bound_in_module(source):
+        yield Flaw(None, "NameError", f"the program defines no {TASK_FUNCTION} at module level")
     found = entries(tree)
-    if not found or found[-1].decorator_list or TASK in names_bound(tree, besides=found):
+    if not found or found[-1].decorator_list or TASK_FUNCTION in names_bound(tree, ignoring=found):
         return
     entry = found[-1]
     if isinstance(entry, ast.AsyncFunctionDef):
-        yield Flaw(entry.lineno, "TypeError", f"{TASK} is a coroutine, which is never awaited")
+        yield Flaw(entry.lineno, "TypeError", f"{TASK_FUNCTION} is a coroutine, which is never awaited")
     given = entry.args
     positional = [*given.posonlyargs, *given.args]
     required = positional[: len(positional) - len(given.defaults)]
     required += [a for a, default in zip(given.kwonlyargs, given.kw_defaults, strict=True) if default is None]
     if required:
         names = listed([a.arg for a in required])
-        yield Flaw(entry.lineno, "TypeError", f"{TASK} takes {names}, but it is called without arguments")
+        message = f"{TASK_FUNCTION} takes {names}, but it is called without arguments"
+        yield Flaw(entry.lineno, "TypeError", message)
 
 
 def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
@@ -296,19 +297,19 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 
 def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
     """The names that may be meant by undefined ones, as far as that is quickly found."""
-    known = sorted({*names_bound(tree), *skills, *GIVEN, *dir(builtins)})
+    known = sorted({*names_bound(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
     if len(known) > MOST_NAMES:
         return found
-    for name in islice((one for one in undefined if len(one) <= LONGEST_NAME), MOST_HINTS):
-        alike = get_close_matches(name, (other for other in known if other != name), n=1, cutoff=ALIKE)
+    for name in islice((one for one in undefined if len(one) <= LONGEST_MISSPELT_NAME), MOST_HINTS):
+        alike = get_close_matches(name, (other for other in known if other != name), n=1, cutoff=NAME_CUTOFF)
         if alike:
             found[name] = alike[0]
     return found
 
 
 def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
-    """The calls of skills that cannot succeed."""
+    """Calls of skills that cannot succeed."""
     rebound = names_bound(tree)
     if "*" in rebound:
         return
@@ -383,7 +384,7 @@ _LITERALS: dict[type[ast.expr], str] = {
 
 
 def _literal(node: ast.expr) -> str | None:
-    """What a literal is; None for what is none."""
+    """The kind of a literal, in words; None for other expressions."""
     if isinstance(node, ast.Constant):
         return "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"
     return _LITERALS.get(type(node))

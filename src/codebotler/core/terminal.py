@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.progress import Progress, ProgressColumn
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 WIDEST = 10_000
 QUIET_S = 2.0  # after which a command says what it is doing
 
@@ -149,7 +149,7 @@ def print_text(text: str) -> None:
 
 
 def note(sentence: str) -> None:
-    """Print to stderr, beside the results."""
+    """Print to stderr, so that results stay apart on stdout."""
     print(visible_lines(sentence), file=sys.stderr)
 
 
@@ -162,7 +162,7 @@ def says_yes(question: str) -> bool:
 def system_sentence(error: OSError) -> str:
     """An error of the system as a sentence with the file, and the mend for a full disk."""
     where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))
-    mend = "; free some disk space and try again" if error.errno in FULL else ""
+    mend = "; free some disk space and try again" if error.errno in DISK_FULL else ""
     return f"{where}: {error.strerror}{mend}"
 
 

@@ -1,4 +1,4 @@
-"""Events, traces and outcomes: what a robot did, how a run ended, and both as plain data."""
+"""Events, traces and outcomes of runs, and their form as plain data."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def attempted(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """The event that a skill leaves if it is executed now; None for skills without one."""
+    """Return the event that a skill leaves if it runs now; None for skills without one."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))
@@ -184,7 +184,7 @@ def outcome_data(outcome: Outcome, skills: SkillTable = SKILLS) -> dict[str, Any
 
 def _event_data(event: Event, asking: frozenset[str]) -> list[Any]:
     if event.kind in asking or event.options or event.answer is not None:
-        return [event.kind, event.text, [_option_data(option) for option in event.options], event.answer]
+        return [event.kind, event.text, [option_data(option) for option in event.options], event.answer]
     data: list[Any] = [event.kind, event.text]
     if event.more:
         data.append(list(event.more))
@@ -204,16 +204,18 @@ def _event_from(element: object) -> Event:
         case [str(kind), str(text), [*more], bool(found)] if all(isinstance(each, str) for each in more):
             return Event(kind, text, found=found, more=tuple(map(str, more)))
         case [str(kind), str(text), list(options), (str() | None) as answer]:
-            return Event(kind, text, tuple(map(_option_from, options)), answer=answer)
+            return Event(kind, text, tuple(map(option_from, options)), answer=answer)
     forms = "[kind, text], [kind, text, true or false] or [kind, question, options, answer or null]"
     raise UserError(f"{element!r} is not an event of a trace; write {forms}")
 
 
-def _option_data(option: Option) -> object:
+def option_data(option: Option) -> object:
+    """An option as data: its text, or a mapping for anything else than a text."""
     return option.text if option.is_text else {"no text": option.text}
 
 
-def _option_from(data: object) -> Option:
+def option_from(data: object) -> Option:
+    """The option that `option_data` gave as data; a UserError if it is none."""
     match data:
         case str(text):
             return Option(text)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import TypeVar
 from unicodedata import normalize
 
-Value = TypeVar("Value")
+Composed = TypeVar("Composed")
 
 
-def composed(value: Value) -> Value:
+def composed(value: Composed) -> Composed:
     """Compose a text, or the texts in a list or a tuple; other values stay."""
     if isinstance(value, str):
         return normalize("NFC", value)  # type: ignore[return-value]  # a text, too

@@ -13,13 +13,7 @@ from codebotler.core.skills.values import Scalar
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import counted
 
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from codebotler.core.skills.table import SkillTable
-
-warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # odd regexes, which still work
+warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # such regexes still work
 
 Point: TypeAlias = tuple[float, float]
 
@@ -86,13 +80,6 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
-
-    @classmethod
-    def read(cls, path: Path, skills: SkillTable | None = None) -> World:
-        """Read a world file; a UserError names the line of what is wrong, and how to mend it."""
-        from codebotler.core.world_file import read_world
-
-        return read_world(path, skills)
 
     def to_yaml(self) -> str:
         """This world as the text of a world file."""
@@ -174,19 +161,19 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
-SHORTEST = 1e-9  # part of a way, or metres; less is an error of rounding
+SHORTEST_PART = 1e-9  # part of a way, or metres; less is an error of rounding
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
     """The names of the rooms that hold each part of a straight way, from its start to its end."""
-    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST
+    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST_PART
     edges = {}  # of each room, where the way crosses them, by the share of the way that lies before
     for room in rooms:
         corners = [(complex(*corner) - here) / way for corner in room.footprint or ()]
         edges[room.name] = crossings(0.0, [(corner.real, corner.imag) for corner in corners])
     cuts = {0.0, 1.0, *(edge for each in edges.values() for edge in each if 0 < edge < 1)}
     for one, other in pairwise(sorted(cuts)):
-        if other - one > SHORTEST:
+        if other - one > SHORTEST_PART:
             middle = (one + other) / 2
             yield tuple(name for name, each in edges.items() if sum(edge > middle for edge in each) % 2)
 

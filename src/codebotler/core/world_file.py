@@ -32,7 +32,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar, plain, written_call
 from codebotler.core.words import listed
 from codebotler.core.world import Answer, Person, Room, World, is_within
-from codebotler.core.yaml_files import Place, YamlFile
+from codebotler.core.yaml_files import YamlFile, YamlPath
 
 
 def read_world(path: Path, skills: SkillTable | None = None) -> World:
@@ -46,13 +46,13 @@ def read_world(path: Path, skills: SkillTable | None = None) -> World:
     return file.validate(WorldFile).world(file, skills=skills)
 
 
-Text = Annotated[str, StringConstraints(strict=True)]
+YamlText = Annotated[str, StringConstraints(strict=True)]
 Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
 
 
-Pattern = Annotated[Text, AfterValidator(check_label)]
+Pattern = Annotated[YamlText, AfterValidator(check_label)]
 NamePattern = Annotated[Name, AfterValidator(check_label)]
-Value: TypeAlias = StrictBool | StrictInt | StrictFloat | StrictStr
+YamlValue: TypeAlias = StrictBool | StrictInt | StrictFloat | StrictStr
 Metres = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
 Corner: TypeAlias = tuple[Metres, Metres]
 
@@ -118,16 +118,16 @@ class RoomFile(_Form):
 class WorldFile(_Form):
     """A world in a file, alone or inside a task."""
 
-    about: Text = ""
+    about: YamlText = ""
     robot: Name
     rooms: Annotated[list[RoomFile], Field(min_length=1, max_length=5_000)]
-    objects: dict[Text, list[NamePattern]] = {}
-    people: dict[Text, list[PersonFile]] = {}
+    objects: dict[YamlText, list[NamePattern]] = {}
+    people: dict[YamlText, list[PersonFile]] = {}
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
-    truths: dict[Name, Value | list[Value]] = {}
+    truths: dict[Name, YamlValue | list[YamlValue]] = {}
 
     def _truths(
-        self, file: YamlFile, at: Place, skills: SkillTable | None
+        self, file: YamlFile, at: YamlPath, skills: SkillTable | None
     ) -> Iterator[tuple[str, Scalar | tuple[Scalar, ...]]]:
         for statement, value in self.truths.items():
             try:
@@ -136,7 +136,7 @@ class WorldFile(_Form):
                 raise file.wrong(str(error), *at, statement) from None
             yield asked, tuple(value) if isinstance(value, list) else value
 
-    def world(self, file: YamlFile, at: Place = (), skills: SkillTable | None = None) -> World:
+    def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
         """The world that it describes, or a UserError about a room, a regex or a truth."""
         names: dict[str, str] = {}  # without capitals, and as they are
         for index, room in enumerate(self.rooms):

@@ -19,19 +19,19 @@ from codebotler.core.errors import UserError, both_ends
 from codebotler.core.files import read_text
 from codebotler.core.unicode import composed
 
-Place: TypeAlias = tuple[str | int, ...]
+YamlPath: TypeAlias = tuple[str | int, ...]
 """A path of keys and positions in a file."""
 
-Model = TypeVar("Model", bound=BaseModel)
+FileModel = TypeVar("FileModel", bound=BaseModel)
 
 Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MAX_DEPTH = 50
 MAX_PLACES = 100_000
-MAX_NUMBER = 1_000  # characters of what is no text: PyYAML takes squares of that for numbers such as 1:59:59
+MAX_NUMBER = 1_000  # characters; PyYAML takes quadratic time for numbers such as 1:59:59
 LONGEST_VALUE = 80  # characters of a value that a message quotes
-TEXT = "tag:yaml.org,2002:str"
+TEXT_TAG = "tag:yaml.org,2002:str"
 SMALL_NUMBER = re.compile(r"\d{1,4}", re.ASCII)
-MENDS = {
+SYNTAX_MENDS = {
     "mapping values are not allowed in this context": 'put quotes around text that contains ": "',
     "found character that cannot start any token": "put quotes around text, and indent with spaces",
 }
@@ -56,8 +56,8 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
         super().ascend_resolver()
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - theirs
-        is_long = isinstance(node, yaml.ScalarNode) and node.tag != TEXT and len(node.value) > MAX_NUMBER
-        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # no such date, for example
+        is_long = isinstance(node, yaml.ScalarNode) and node.tag != TEXT_TAG and len(node.value) > MAX_NUMBER
+        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # an impossible date, say
             if not is_long:
                 made = super().construct_object(node, deep)
                 return composed(made) if isinstance(made, str) else made  # a list is filled later
@@ -79,7 +79,7 @@ class YamlFile:
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
         self._text = text
-        self._lines: dict[Place, int] = {}
+        self._lines: dict[YamlPath, int] = {}
         try:
             loader = _BoundedLoader(text)
             node = loader.get_single_node()
@@ -105,7 +105,7 @@ class YamlFile:
         return self._lines[path]
 
     def part(self, key: str, data: object) -> YamlFile:
-        """What stands under a key, as a file of its own that says the same lines.
+        """The value of a key as a file of its own, with the same line numbers.
 
         Args:
             key: of the whole.
@@ -120,7 +120,7 @@ class YamlFile:
         """The error for a place in this file."""
         return UserError(sentence, file=self.name, line=self.line(place))
 
-    def validate(self, model: type[Model], data: object = None, *, at: Place = ()) -> Model:
+    def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
         """The content, or the part of it at a place, as a model; a UserError about the first fault."""
         try:
             return model.model_validate(self.data if data is None and not at else data)
@@ -129,7 +129,7 @@ class YamlFile:
             place = (*at, *first["loc"])
             raise self.wrong(_sentence(first, self._name(place)) + hint, *place) from None
 
-    def _name(self, place: Place) -> str:
+    def _name(self, place: YamlPath) -> str:
         if not place:
             return "the file"
         if place[-1] == "[key]":
@@ -145,10 +145,10 @@ class YamlFile:
         else:
             line = min(mark.line + 1, len(self._text.splitlines()))  # it may be behind the end
         sentence = ", ".join(part for part in (context, problem) if part).replace(", but", " but")
-        mend = f"; {MENDS[problem]}" if problem in MENDS else ""
+        mend = f"; {SYNTAX_MENDS[problem]}" if problem in SYNTAX_MENDS else ""
         return UserError(f"not valid YAML: {sentence}{mend}", file=self.name, line=line)
 
-    def _remember(self, node: yaml.Node, place: Place) -> None:
+    def _remember(self, node: yaml.Node, place: YamlPath) -> None:
         self._lines[place] = node.start_mark.line + 1
         if len(place) > MAX_DEPTH or len(self._lines) > MAX_PLACES:
             raise _fault("this is nested too deeply, or its anchors repeat too much", node)
@@ -159,7 +159,7 @@ class YamlFile:
             for key, value in node.value:
                 if not isinstance(key, yaml.ScalarNode):
                     raise _fault("this key is not text; write one word or put quotes around it", key)
-                if key.tag != TEXT and not SMALL_NUMBER.fullmatch(key.value):  # hashes of others can collide
+                if key.tag != TEXT_TAG and not SMALL_NUMBER.fullmatch(key.value):  # hashes may collide
                     raise _fault(f"the key {_quoted(key.value)} is not a text; put quotes around it", key)
                 inner = (*place, composed(key.value))
                 if inner in self._lines:
@@ -170,7 +170,7 @@ class YamlFile:
 
 # --- what pydantic finds, in plain English
 
-EXPECTED = {
+EXPECTED_TYPES = {
     "string_type": "a text",
     "list_type": "a list",
     "tuple_type": "a list",
@@ -180,7 +180,7 @@ EXPECTED = {
     "int_type": "a whole number",
     "bool_type": "true or false",
 }
-FAULTS = {
+FAULT_WORDS = {
     "extra_forbidden": "the key {name} is unknown; remove it or correct its spelling",
     "invalid_key": "this key is not text; remove it or put quotes around it",
     "string_too_short": "{name} is empty; write a text",
@@ -217,10 +217,10 @@ def _sentence(error: ErrorDetails, name: str) -> str:
         if isinstance(last, str):
             return f'the key "{last}" is missing'
         return f"this entry has too few values; it needs at least {last + 1}"
-    if kind in EXPECTED:
-        return f"{name} {_instead_of(EXPECTED[kind], value)}"
-    if kind in FAULTS:
-        return FAULTS[kind].format(name=name, **error.get("ctx", {}))
+    if kind in EXPECTED_TYPES:
+        return f"{name} {_instead_of(EXPECTED_TYPES[kind], value)}"
+    if kind in FAULT_WORDS:
+        return FAULT_WORDS[kind].format(name=name, **error.get("ctx", {}))
     plain = error["msg"].removeprefix("Value error, ").replace("Input should be", "it should be")
     return f"{name} is {_quoted(value)}, but {plain[:1].lower()}{plain[1:]}"
 

@@ -9,8 +9,9 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Protocol
 
-from codebotler.checking.room_names import HERE
+from codebotler.checking.room_names import ROOM_SKILL
 from codebotler.core.errors import RobotError
+from codebotler.core.skills import kinds
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
@@ -142,9 +143,9 @@ class LiveRobot:
 
     def _hold(self, event: Event) -> None:
         match event.kind:
-            case "pick":
+            case kinds.PICK:
                 self._held = event.text or "something"
-            case "place":
+            case kinds.PLACE:
                 self._held = ""
 
     # --- rules
@@ -239,13 +240,14 @@ class LiveRobot:
 
     def _room_now(self) -> str | None:
         """The room in which the robot says it is, if that is one of those that it knows."""
-        if HERE not in self.skills or HERE in self.robot.missing or self._room_map is None:
+        if ROOM_SKILL not in self.skills or ROOM_SKILL in self.robot.missing or self._room_map is None:
             return None
         try:
-            told = str(answered(self.skills[HERE], self.robot.perform(HERE, ()))).strip().casefold()
+            there = answered(self.skills[ROOM_SKILL], self.robot.perform(ROOM_SKILL, ()))
         except (RobotError, CancelledError):
             return None
-        return next((room for room in self._room_map.rooms if room.strip().casefold() == told), None)
+        name = str(there).strip().casefold()
+        return next((room for room in self._room_map.rooms if room.strip().casefold() == name), None)
 
     def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, logged."""

@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import Any
 
 from codebotler.core.program import parsed
+from codebotler.core.skills import kinds
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.table import Recording
 from codebotler.core.terminal import shortened
@@ -132,17 +133,17 @@ class Progress:
         recording = _recording(self.skill)
         now = self
         match recording and recording.kind:
-            case "goto":
+            case kinds.GOTO:
                 visited = (*self.visited, self.subject)[:MOST_STEPS]
                 now = replace(self, visited=visited, is_between=False)
-            case "pick":
+            case kinds.PICK:
                 now = replace(self, held=self.subject)
-            case "place":
+            case kinds.PLACE:
                 now = replace(self, held="")
-            case "check":
+            case kinds.CHECK:
                 now = self._found(Find(self.room, self.subject)) if result is True else self
                 now = replace(now, looks=(*self.looks, (self.subject, result is True))[:MOST_STEPS])
-            case "ask":
+            case kinds.ASK:
                 now = self._found(Find(self.room, self.subject)) if self.subject else self
                 now = replace(now, answers=(*now.answers, str(result))[:MOST_STEPS])
         return now

@@ -5,18 +5,19 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 
+from codebotler.core.phrases import phrase
 from codebotler.core.program import nodes, tree_of
 from codebotler.core.skills.declaration import by_name
-from codebotler.core.skills.table import Recording
-from codebotler.core.skills.values import as_text, written_call
+from codebotler.core.skills.values import written_call
+from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.terminal import shortened, visible
-from codebotler.core.trace import trace_from
+from codebotler.core.trace import attempted, options_of, trace_from
 from codebotler.core.words import brief
 from codebotler.missions.log import Line, Summary
-from codebotler.rtl.wording import event_words
 
 PAGE = "the page"  # as whoever presses STOP there is logged
 FIRST_CALLS = 2  # of a program, in the title of its mission
+MOST_ACTIVITY = 100  # characters of each text
 
 
 def event_text(line: Line) -> str:
@@ -26,20 +27,23 @@ def event_text(line: Line) -> str:
 
 
 def activity(line: Line) -> str:
-    """What a robot is at during a skill or while the program sleeps, such as `driving to supply room`."""
+    """What a robot does during a skill or a pause of the program, such as `going to "supply room"`."""
     if line["event"] == "sleep":
         return f"waiting for {line['seconds']:g} s"
+    return skill_text(line, "ing", MOST_ACTIVITY) or f"executing {visible(line['skill'])}"
+
+
+def skill_text(line: Line, form: VerbForm, most: int = 500) -> str:
+    """The call of a skill in words; empty for a skill that has none in this process."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
-        return f"executing {visible(line['skill'])}"
-    if skill.recording is None:
-        return skill.verb.ing
-    if skill.recording.more or skill.verb.object or not skill.recording.text:
-        return skill.verb.with_object(skill.verb.ing, _given(skill.recording, line))
-    text = shortened(as_text(line["arguments"][skill.recording.text]), 100)
-    if skill.recording.is_drive:
-        return f"driving to {text}"
-    return f'{skill.verb.ing} "{text}"' if skill.recording.is_spoken else f"{skill.verb.ing} {text}"
+        return ""
+    given = zip(skill.parameters, line["arguments"].values(), strict=True)
+    arguments = [options_of(value) if parameter.is_options else value for parameter, value in given]
+    event = attempted(skill, arguments, place="", time=0.0)
+    if event is None:
+        return str(getattr(skill.verb, form))
+    return phrase(event, form, show=lambda text: shortened(text, most))
 
 
 def stop_text(by: str, doing: str = "") -> str:
@@ -75,24 +79,9 @@ def title(summary: Summary) -> str:
     return f"typed: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
 
 
-def _given(recording: Recording, line: Line) -> list[str]:
-    """What a skill was given, in the order in which its event has it."""
-    names = [name for name in (recording.text, *recording.more) if name]
-    return [shortened(as_text(line["arguments"][name]), 100) for name in names]
-
-
 def _skill(line: Line) -> str:
-    skill, arguments = by_name(line["skill"]), line["arguments"]
-    if skill is None or skill.verb is None:
-        return shortened(written_call(line["skill"], list(arguments.values())))
-    if skill.recording is None:
-        return skill.verb.third
-    if skill.recording.more or skill.verb.object or not skill.recording.text:
-        return skill.verb.with_object(skill.verb.third, _given(skill.recording, line))
-    text = as_text(arguments[skill.recording.text])
-    words = f'{skill.verb.third} "{shortened(text)}"'
-    options = arguments.get(skill.recording.options or "")
-    return f"{words} [{shortened(' | '.join(options))}]" if options else words
+    arguments = list(line["arguments"].values())
+    return skill_text(line, "third") or shortened(written_call(line["skill"], arguments))
 
 
 def _result(line: Line) -> str:
@@ -113,7 +102,7 @@ def _rule(line: Line) -> str:
     rule, says = f'the rule "{visible(str(line["rule"]))}"', shortened(str(line["says"]))
     if "what" not in line:
         return f"not kept: {rule}: {says}"
-    what = visible(event_words(trace_from([line["what"]])[0]))
+    what = visible(phrase(trace_from([line["what"]])[0], "ing"))
     return f"{rule} prevented {what}: {says}" if line.get("prevented") else f"{what} broke {rule}: {says}"
 
 

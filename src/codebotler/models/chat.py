@@ -38,7 +38,7 @@ from codebotler.models.server_errors import (
     timed_out,
     unreachable,
 )
-from codebotler.prompts import Message, PictureMessage, Prompt
+from codebotler.prompts import PictureMessage, Prompt, PromptMessage
 
 BASE_URL = "OPENAI_BASE_URL"
 OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and the like
@@ -183,7 +183,7 @@ def _marking_thoughts(heard: Heard) -> _Hear:
     return hear
 
 
-def messages_of(conversation: tuple[Message, ...]) -> list[messages.ModelMessage]:
+def messages_of(conversation: tuple[PromptMessage, ...]) -> list[messages.ModelMessage]:
     """A conversation in the types of pydantic-ai."""
     made: list[messages.ModelMessage] = []
     for message in conversation:
@@ -199,7 +199,7 @@ def messages_of(conversation: tuple[Message, ...]) -> list[messages.ModelMessage
     return made
 
 
-def _user_part(message: Message) -> messages.UserPromptPart:
+def _user_part(message: PromptMessage) -> messages.UserPromptPart:
     if not isinstance(message, PictureMessage):
         return messages.UserPromptPart(message.text)
     picture = messages.BinaryContent(message.jpeg, media_type="image/jpeg")

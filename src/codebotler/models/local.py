@@ -19,7 +19,7 @@ from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, 
 from codebotler.models.keys import guard_logs
 from codebotler.models.sampling import DEMANDED_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import error_text, failure
-from codebotler.prompts import Message, Prompt
+from codebotler.prompts import Prompt, PromptMessage
 from codebotler.prompts.rendering import task_end
 
 BLOCK = 10  # replies to a prompt that share a seed; runs usually have a multiple of ten for each prompt
@@ -169,9 +169,9 @@ class LocalModel:
             return self._templated(prompt.messages)
         except jinja2.TemplateError:  # some templates know no system message
             system, user, *others = prompt.messages
-            return self._templated([Message("user", f"{system.text}\n\n{user.text}"), *others])
+            return self._templated([PromptMessage("user", f"{system.text}\n\n{user.text}"), *others])
 
-    def _templated(self, messages: Sequence[Message]) -> str:
+    def _templated(self, messages: Sequence[PromptMessage]) -> str:
         turns = [{"role": message.role, "content": message.text} for message in messages]
         return str(self.tokenizer.apply_chat_template(turns, tokenize=False, add_generation_prompt=True))
 

@@ -14,7 +14,7 @@ from codebotler.models.rate_limit import RateLimited
 from codebotler.models.server_errors import error_text
 from codebotler.perception.base import PerceptionError, Sighting, checked_label
 from codebotler.perception.image import jpeg_of
-from codebotler.prompts import Message, PictureMessage, Prompt
+from codebotler.prompts import PictureMessage, Prompt, PromptMessage
 
 SYSTEM = """\
 You are the eyes of a robot. You get a picture from its camera and a JSON text that names an object or a
@@ -54,7 +54,7 @@ class ChatDetector:
     def look(self, image: Image, label: str) -> Sighting:
         """Show the picture to the model, and ask again where a reply cannot be used."""
         question = PictureMessage("user", json.dumps(checked_label(label)), jpeg_of(image))
-        messages: tuple[Message, ...] = (Message("system", SYSTEM), question)
+        messages: tuple[PromptMessage, ...] = (PromptMessage("system", SYSTEM), question)
         fault = said = ""
         for number in range(TRIES):
             prompt = Prompt(label, messages, text="", stop=(), opening="")
@@ -66,8 +66,8 @@ class ChatDetector:
                 return sighting_in(reply.text)
             except ValueError as error:
                 fault, said = str(error), reply.text.strip()[:LONGEST_REPLY]
-            answer = [Message("assistant", said)] if said else []
-            messages = (*messages[:2], *answer, Message("user", AGAIN.format(fault=fault)))
+            answer = [PromptMessage("assistant", said)] if said else []
+            messages = (*messages[:2], *answer, PromptMessage("user", AGAIN.format(fault=fault)))
         last = f"; it replied: {error_text(said)}" if said else ""
         raise PerceptionError(f"{self.name} gave no usable answer in {TRIES} tries: {fault}{last}")
 

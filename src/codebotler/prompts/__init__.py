@@ -1,5 +1,12 @@
-"""What a model is asked, from text files beside this one, and the program read from its reply."""
+"""The prompts of models, made from text files in this folder, and the programs in their replies."""
 
-from codebotler.prompts.rendering import Message, PictureMessage, Prompt, prompt_for, stated, template_hash
+from codebotler.prompts.rendering import (
+    PictureMessage,
+    Prompt,
+    PromptMessage,
+    prompt_for,
+    stated,
+    template_hash,
+)
 
-__all__ = ["Message", "PictureMessage", "Prompt", "prompt_for", "stated", "template_hash"]
+__all__ = ["PictureMessage", "Prompt", "PromptMessage", "prompt_for", "stated", "template_hash"]

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from codebotler.core.program import TASK, Program, bound_names, entries, undefined_names
+from codebotler.core.program import TASK_FUNCTION, Program, bound_names, entries, undefined_names
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.unicode import composed
 from codebotler.prompts.lines import goes_on, is_code, is_prose, tree_of, trimmed, without_residue
@@ -85,7 +85,7 @@ def program_in(text: str) -> str:
 @isolated("def task_program():\n    say('hello')\n")
 def defines_task(text: str) -> bool:
     """Whether a text compiles and binds `task_program` at module level."""
-    return TASK in bound_names(text)
+    return TASK_FUNCTION in bound_names(text)
 
 
 @isolated(
@@ -107,7 +107,11 @@ def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
     """Whether all of a reply is the program, whatever its texts look like."""
     tree = tree_of(lines)
     is_one = tree is not None and not (continues and len(entries(tree)) > 1)
-    return is_one and len(trimmed(lines)) == len(_stripped(lines)) and TASK in bound_names("\n".join(lines))
+    return (
+        is_one
+        and len(trimmed(lines)) == len(_stripped(lines))
+        and TASK_FUNCTION in bound_names("\n".join(lines))
+    )
 
 
 # --- from segments to blocks of code
@@ -138,7 +142,7 @@ def _is_idle(statement: ast.stmt) -> bool:
     )
 
 
-_ENTRY = re.compile(rf"(?:async\s+)?def\s+{TASK}\b|{TASK}\s*=(?!=)")
+_ENTRY = re.compile(rf"(?:async\s+)?def\s+{TASK_FUNCTION}\b|{TASK_FUNCTION}\s*=(?!=)")
 
 
 def _blocks(segment: Segment, *, continues: bool) -> Iterator[_Block]:
@@ -193,14 +197,14 @@ def _headless(lines: Sequence[str]) -> list[str] | None:
     if _indent(head):
         if start is not None and len(_indent(lines[start])) >= len(_indent(head)):
             return None
-        return [f"def {TASK}():", *lines]
+        return [f"def {TASK_FUNCTION}():", *lines]
     inner = code[1 : next((n for n, i in enumerate(code) if n and not _indent(lines[i])), None)]
     if not inner or start in (code[0], *inner) or tree_of(lines) is not None:
         return None
     margin = min((_indent(lines[i]) for i in inner), key=len)
     if head.rstrip()[-1] in ":([{,\\" and _indent(lines[inner[0]]) == margin:
         return None  # the indentation belongs to the first line's own block or bracket
-    return [f"def {TASK}():", *lines[: code[0]], margin + head, *lines[code[0] + 1 :]]
+    return [f"def {TASK_FUNCTION}():", *lines[: code[0]], margin + head, *lines[code[0] + 1 :]]
 
 
 def _versions(block: _Block, *, continues: bool) -> list[_Block]:

@@ -10,14 +10,14 @@ from functools import lru_cache
 
 from codebotler.core.program import Flaw, parsed
 
-MARK = r"(?:</?[A-Za-z][\w:.-]*>|<[|\uff5c][^<>\n]*[|\uff5c]>|\[/\w+\]|\[[A-Z_]{3,}\])"
-RESIDUE_LINE = re.compile(rf"(?:{MARK}\s*)*(?:[Pp]ython3?|py|[Aa]ssistant|model)?")
+MARKUP = r"(?:</?[A-Za-z][\w:.-]*>|<[|\uff5c][^<>\n]*[|\uff5c]>|\[/\w+\]|\[[A-Z_]{3,}\])"
+RESIDUE_LINE = re.compile(rf"(?:{MARKUP}\s*)*(?:[Pp]ython3?|py|[Aa]ssistant|model)?")
 RESIDUE = re.compile(
-    rf"^(?:{MARK}(?:assistant|python|final)?[ ]?)+|(?<=[^\s`])(?:\s*(?:{MARK}|`{{3,}})){{1,9}}\s*$"
+    rf"^(?:{MARKUP}(?:assistant|python|final)?[ ]?)+|(?<=[^\s`])(?:\s*(?:{MARKUP}|`{{3,}})){{1,9}}\s*$"
 )
 KEYWORDS = "|".join((*(word for word in keyword.kwlist if word.islower()), "match", "case", "print", "exec"))
 WORD = rf"(?!(?:{KEYWORDS})\b)[^\W\d_][\w'\u2019-]*"
-WORDS = re.compile(rf"\b{WORD}\s+{WORD}")  # side by side, as nowhere in code
+ADJACENT_WORDS = re.compile(rf"\b{WORD}\s+{WORD}")  # side by side, as nowhere in code
 STRING = re.compile(r"""("|').*?(?:\1|$)|\#.*""")
 STATEMENT = re.compile(
     r"""\s*(?:
@@ -27,7 +27,7 @@ STATEMENT = re.compile(
     )""",
     re.VERBOSE,
 )
-CALL = re.compile(r"\s*[^\W\d][\w.]*\(")
+CALL_START = re.compile(r"\s*[^\W\d][\w.]*\(")
 PROSE = re.compile(
     rf"""[ ]?(?:
       (?:[-*+>•\u2013]|\d+[.)])\s | \*\* | ` | [-=*_]{{3,}}\s*$ | </?[\w|] | [^\x00-\x7f]  # Markdown, tags
@@ -54,11 +54,11 @@ def goes_on(line: str) -> bool:
 
 def is_code(line: str) -> bool:
     """Whether a line begins like code, and is no sentence about a call."""
-    return bool(STATEMENT.match(line) or (CALL.match(line) and not _has_words(line)))
+    return bool(STATEMENT.match(line) or (CALL_START.match(line) and not _has_words(line)))
 
 
 def _has_words(line: str) -> bool:
-    return bool(WORDS.search(STRING.sub("''", line)))
+    return bool(ADJACENT_WORDS.search(STRING.sub("''", line)))
 
 
 def is_residue(line: str) -> bool:

@@ -14,20 +14,20 @@ from string import Template
 from typing import Literal
 
 from codebotler.core.errors import UserError, expect_list
-from codebotler.core.program import TASK, Flaw, called_skills, parsed, tree_of
+from codebotler.core.program import TASK_FUNCTION, Flaw, called_skills, parsed, tree_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.unicode import composed
 from codebotler.core.words import listed
 
-FOLDER = Path(__file__).parent
-OPENING = f"def {TASK}():\n"
+PROMPT_FOLDER = Path(__file__).parent
+OPENING = f"def {TASK_FUNCTION}():\n"
 MAX_LENGTH, MAX_TRIES = 100_000, 20  # of a reply, within which the end of its function is looked for
-STOP = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI's endpoint takes no more than four
+STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI's endpoint takes no more than four
 
 
 @dataclass(frozen=True)
-class Message:
+class PromptMessage:
     """One turn of a conversation with a chat model."""
 
     role: Literal["system", "user", "assistant"]
@@ -35,7 +35,7 @@ class Message:
 
 
 @dataclass(frozen=True)
-class PictureMessage(Message):
+class PictureMessage(PromptMessage):
     """A turn with a picture, as the bytes of a JPEG file."""
 
     jpeg: bytes
@@ -55,7 +55,7 @@ class Prompt:
     """A request for a program, in the form for chat models and in the form for base models."""
 
     instruction: str
-    messages: tuple[Message, ...] = field(repr=False)  # for chat models
+    messages: tuple[PromptMessage, ...] = field(repr=False)  # for chat models
     text: str = field(repr=False)  # for base models; ends with `opening`
     stop: tuple[str, ...]  # texts before which base models stop
     opening: str  # the beginning of the program that base models go on with
@@ -63,8 +63,8 @@ class Prompt:
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
         """The request to write a program again without its problems, each of which is a sentence."""
         listed = "\n".join(f"- {problem}" for problem in problems)
-        answer = Message("assistant", _fenced(program))
-        repair = Message("user", _filled("repair", problems=listed))
+        answer = PromptMessage("assistant", _fenced(program))
+        repair = PromptMessage("user", _filled("repair", problems=listed))
         text = _filled(
             "completion-repair", program=_comment(program), problems=_comment(listed), opening=self.opening
         )
@@ -86,12 +86,12 @@ class Prompt:
 
     def program_from(self, reply: str) -> str:
         """The program in a base model's continuation of `text`, without whatever follows it."""
-        if re.match(rf"\s*(```|(async )?def {TASK}\b)", reply):
+        if re.match(rf"\s*(```|(async )?def {TASK_FUNCTION}\b)", reply):
             return reply  # it began anew
         return self.opening + reply[: task_end(self.opening, reply, self.stop)]
 
 
-def task_end(opening: str, reply: str, stop: Sequence[str] = STOP) -> int:
+def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
     """The index at which the function that `opening` begins ends in a reply.
 
     It ends before a line without indentation, unless that line belongs to an open bracket or string.
@@ -136,11 +136,11 @@ def prompt_for(
     wish = "\n\n".join(filter(None, (instruction, about_rooms, about_rules)))
     stubs = [stub(skill) for skill in skills.values()]
     shown = [example for example in examples() if example.skills <= skills.keys()]
-    messages = [Message("system", _filled("system", skills="\n\n".join(stubs)))]
+    messages = [PromptMessage("system", _filled("system", skills="\n\n".join(stubs)))]
     for example in shown:
-        messages.append(Message("user", example.instruction))
-        messages.append(Message("assistant", _fenced(example.program)))
-    messages.append(Message("user", wish))
+        messages.append(PromptMessage("user", example.instruction))
+        messages.append(PromptMessage("assistant", _fenced(example.program)))
+    messages.append(PromptMessage("user", wish))
     text = _filled(
         "completion",
         skills="\n\n\n".join(stubs),
@@ -152,7 +152,7 @@ def prompt_for(
         rooms="".join(_comment(about) + "\n" for about in (about_rooms, about_rules) if about),
         opening=OPENING,
     )
-    return Prompt(instruction, tuple(messages), text + "\n", STOP, OPENING)
+    return Prompt(instruction, tuple(messages), text + "\n", STOP_TEXTS, OPENING)
 
 
 def stub(skill: Skill) -> str:
@@ -171,7 +171,7 @@ def stub(skill: Skill) -> str:
 @cache
 def examples() -> tuple[Example, ...]:
     """The examples in the order of their files."""
-    files = (path.read_text(encoding="utf-8") for path in sorted((FOLDER / "examples").glob("*.txt")))
+    files = (path.read_text(encoding="utf-8") for path in sorted((PROMPT_FOLDER / "examples").glob("*.txt")))
     parts = (text.partition("\n\n") for text in files)
     return tuple(
         Example(instruction, program, frozenset(called_skills(tree_of(program))))
@@ -190,7 +190,7 @@ def template_hash(skills: SkillTable = SKILLS) -> str:
 
 @cache
 def _template(name: str) -> Template:
-    return Template((FOLDER / f"{name}.txt").read_text(encoding="utf-8"))
+    return Template((PROMPT_FOLDER / f"{name}.txt").read_text(encoding="utf-8"))
 
 
 def _filled(name: str, **values: str) -> str:

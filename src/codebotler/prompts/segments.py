@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from itertools import chain, islice
 from typing import Literal, TypeAlias
 
-from codebotler.core.program import TASK
+from codebotler.core.program import TASK_FUNCTION
 from codebotler.prompts.lines import is_code, is_residue
 
-MARGIN = 3  # columns by which the last fence may be indented
+FENCE_MARGIN = 3  # columns by which the last fence may be indented
 MAX_ENDS = 5  # of a fence, which are tried until its code parses
 MAX_MARKERS = 9  # at the beginning of a line
 MARKER = re.compile(
@@ -20,13 +20,15 @@ MARKER = re.compile(
     | [<\[\u25c1] (?P<left>[|\uff5c])? (?P<slash>/)?
       (?P<name>[a-z][\w:.\u2581-]*) (?P<right>[|\uff5c])? [>\]\u25b7]"""
 )
-THOUGHT = re.compile(r"think|thought|reason|reflect|analy|scratch|monolog|deliberat|brainstorm|ponder|^cot$")
-FIRST, LAST = {"start", "begin", "prefix"}, {"end", "suffix"}
-LINE = re.compile(r"[^\n]*\n|[^\n]+")
-FENCE = re.compile(
+THOUGHT_TAG = re.compile(
+    r"think|thought|reason|reflect|analy|scratch|monolog|deliberat|brainstorm|ponder|^cot$"
+)
+START_WORDS, END_WORDS = {"start", "begin", "prefix"}, {"end", "suffix"}
+WHOLE_LINE = re.compile(r"[^\n]*\n|[^\n]+")
+FENCE_LINE = re.compile(
     r"(?P<indent>[ \t]*(?:(?:[-*+]|\d+[.)])[ \t]+)?)(?P<marks>`{3,}|~{3,})(?P<info>[^`\n]*)\n?$"
 )
-DEFINITION = re.compile(rf"^\s*(?:async\s+)?def\s+{TASK}\b", re.MULTILINE)
+DEFINITION = re.compile(rf"^\s*(?:async\s+)?def\s+{TASK_FUNCTION}\b", re.MULTILINE)
 NEXT_TURN = re.compile(
     r"(?im)<(?:\|(?:im_)?start|\|start_header_id|start_of_turn)\|?>user\b|<[|\uff5c]user[|\uff5c]>|\[INST\]"
     r"|^(?:user|human):"
@@ -91,9 +93,9 @@ def _segments(reply: str, parses: Parses) -> Iterator[Segment]:
 
 def _marked(reply: str, parses: Parses) -> Iterator[tuple[int, Segment, int]]:
     """Where each fence and each thought starts, what it is, and where it ends; only the first is certain."""
-    for line in LINE.finditer(reply):
+    for line in WHOLE_LINE.finditer(reply):
         start, end, text = line.start(), line.end(), line[0]
-        if (fence := FENCE.match(text)) and not _is_in_code(fence, reply[:start]):
+        if (fence := FENCE_LINE.match(text)) and not _is_in_code(fence, reply[:start]):
             code, length = _fenced(fence, reply[end:], parses)
             yield start, Segment("fence", reply[start : end + length], code), end + length
         for marker in _markers_at_ends(text):
@@ -109,7 +111,7 @@ def _is_in_code(fence: re.Match[str], before: str) -> bool:
     """Whether an indented fence is in code without fences, such as in a docstring, instead of in a list."""
     lines = reversed(before.split("\n"))
     head = next((line for line in lines if line and not line[0].isspace()), "")
-    return not fence["indent"].strip() and len(fence["indent"]) > MARGIN and is_code(head)
+    return not fence["indent"].strip() and len(fence["indent"]) > FENCE_MARGIN and is_code(head)
 
 
 def _fenced(fence: re.Match[str], rest: str, parses: Parses) -> tuple[Sequence[str], int]:
@@ -121,7 +123,9 @@ def _fenced(fence: re.Match[str], rest: str, parses: Parses) -> tuple[Sequence[s
     lines = rest.split("\n")
     indent = re.sub(r"\S", " ", fence["indent"])
     code = [line.removeprefix(indent) for line in lines]
-    closing = re.compile(rf"[ ]{{0,{max(MARGIN, len(indent))}}}{fence['marks']}{fence['marks'][0]}*\s*$")
+    closing = re.compile(
+        rf"[ ]{{0,{max(FENCE_MARGIN, len(indent))}}}{fence['marks']}{fence['marks'][0]}*\s*$"
+    )
     ends = (i for i, line in enumerate(lines) if line.rstrip().endswith(fence["marks"]))
     for end in chain(islice(ends, MAX_ENDS), [len(lines)]):
         last = [line.rstrip().rstrip(fence["marks"][0]) for line in code[end : end + 1]]
@@ -135,7 +139,7 @@ def _fenced(fence: re.Match[str], rest: str, parses: Parses) -> tuple[Sequence[s
 
 def _interrupts(line: str) -> bool:
     """Whether a line shows that a fence was not closed: it opens another one, or ends a thought."""
-    fence = FENCE.match(line)
+    fence = FENCE_LINE.match(line)
     is_end = any(
         marker.is_last and marker.is_thought and marker.is_at_edge(line) for marker in _markers(line)
     )
@@ -161,7 +165,7 @@ class _Marker:
 
     @property
     def is_thought(self) -> bool:
-        return bool(THOUGHT.search(self.name))
+        return bool(THOUGHT_TAG.search(self.name))
 
     def ends_with(self, other: _Marker) -> bool:
         """Whether the other is the last one of this pair."""
@@ -177,8 +181,8 @@ class _Marker:
 def _markers(text: str, start: int = 0) -> Iterator[_Marker]:
     for found in MARKER.finditer(text, start):
         words = re.split(r"[_\u2581]", (found["channel"] or found["name"]).lower())
-        is_last = bool(found["slash"] or (found["right"] and not found["left"]) or LAST & {*words})
-        name = "_".join(word for word in words if word not in {*FIRST, *LAST, "of"})
+        is_last = bool(found["slash"] or (found["right"] and not found["left"]) or END_WORDS & {*words})
+        name = "_".join(word for word in words if word not in {*START_WORDS, *END_WORDS, "of"})
         yield _Marker(name, is_last, bool(found["channel"] or found["left"]), *found.span())
 
 

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from codebotler.core.words import brief
 from codebotler.core.world import Point, Room, World, is_within
-from codebotler.core.world_file import Corner, Metres, Name, Value
+from codebotler.core.world_file import Corner, Metres, Name, YamlValue
 from codebotler.core.yaml_files import YamlFile
 
 EACH = "*"  # in a path: every entry
@@ -82,7 +82,7 @@ class PlacesMapping(_Form):
     file: Name
     frame: Name = "map"
     each: str = "places.*"
-    where: dict[str, Value] = {}
+    where: dict[str, YamlValue] = {}
     name: str = ""
     pose: str | list[str] = ""
     polygon: str = "polygon"

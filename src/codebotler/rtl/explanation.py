@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from codebotler.core.phrases import verb
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Trace
 from codebotler.core.words import brief, listed, times
 from codebotler.rtl import formulas
@@ -19,7 +21,7 @@ from codebotler.rtl.semantics import (
     narrowed,
     scoped,
 )
-from codebotler.rtl.wording import deed, few, happening, is_any, is_plain, room, verb
+from codebotler.rtl.wording import deed, few, happening, is_any, is_plain, room
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,8 @@ def _deciding(
 def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     """The one test that `ask(t, ".*") or ask(".*", t)` comes to."""
     match formula:
-        case formulas.Or((one, other)) if isinstance(one, formulas.Presence) and isinstance(
-            other, formulas.Presence
+        case formulas.Or((one, other)) if isinstance(one, formulas.PresenceTest) and isinstance(
+            other, formulas.PresenceTest
         ):
             a, b = one.element, other.element
             if a.options is None or b.options is None or (a.text, a.options) != (b.options, b.text):
@@ -149,7 +151,7 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
     return _presence(test, trace) if is_true else _absence(test, trace)._replace(is_missing=True)
 
 
-def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
+def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     at = next(at for at in _positions(test, trace) if matches(test.element, trace, at))
     element = replace(test.element, place=None)
     done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
@@ -163,7 +165,7 @@ def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
     return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}", short=short)
 
 
-def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
+def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     element, where = test.element, _where(test.scopes, trace, is_true=False)
     here = [*_positions(test, trace)]
     if (missing := _missing_bound(test.scopes, trace)) is not None:
@@ -186,7 +188,7 @@ def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
     there = "during that stay" if first and len(arrivals) > 1 else "there"
     event, detail = _instead(element, trace, here)
     if not detail:
-        kinds = dict.fromkeys(trace[at].kind for at in here if trace[at].kind != "goto")
+        kinds = dict.fromkeys(trace[at].kind for at in here if trace[at].kind != GOTO)
         only = listed([verb(kind).alone for kind in kinds])
         detail = f": it only {only}" if only else ": it did nothing there"
     visits = arrivals[:1] if first else arrivals
@@ -241,7 +243,7 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     return _Fact(found[number] if len(found) > number else None, text, ending, is_missing=is_missing)
 
 
-def _positions(test: formulas.Presence, trace: Trace) -> Iterable[int]:
+def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
     """The positions of the events that a test looks at."""
     span = scoped(test.scopes, trace)
     match test:
@@ -283,7 +285,7 @@ def _instead(element: formulas.EventPattern, trace: Trace, here: Sequence[int]) 
     if not alike:
         return None, "" if trace else ": it did nothing at all"
     only = f": it only {verb(element.kind).past}"
-    if element.kind == "goto":
+    if element.kind == GOTO:
         rooms = dict.fromkeys(happening(trace[at], element) for at in alike)
         return None, f"{only} {listed(few([*rooms]))}"
     shown = [f"{happening(trace[at], element)} (step {at + 1})" for at in alike]

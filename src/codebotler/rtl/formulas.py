@@ -8,6 +8,7 @@ from types import UnionType
 from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.trace import Names
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
@@ -144,14 +145,14 @@ class EventPattern:
     def __str__(self) -> str:
         if self.answer is not None:
             written = f"answered({self.answer})"
-        elif self.found is not None and self.kind == "check":
+        elif self.found is not None and self.kind == CHECK:
             written = f"{'found' if self.found else 'missed'}({self.text})"
         else:
             texts = [self.text, *self.more] if self.options is None else [self.text, self.options]
             if not self.has_text:
                 texts = []
             written = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
-        if self.found is not None and self.kind != "check":
+        if self.found is not None and self.kind != CHECK:
             written = f"returned({self.found}, {written})"
         if self.to is not None:
             written = f"to({self.to}, {written})"
@@ -231,12 +232,12 @@ class _ActAtPlace:
     @cached_property
     def arrival(self) -> EventPattern:
         """The move that begins a stay."""
-        return EventPattern("goto", Regex(self.place))
+        return EventPattern(GOTO, Regex(self.place))
 
     @cached_property
     def departure(self) -> EventPattern:
         """The move that ends a stay."""
-        return EventPattern("goto", Without(self.place))
+        return EventPattern(GOTO, Without(self.place))
 
     def __str__(self) -> str:
         return f"{_scoped(self.scopes)}.{type(self).__name__}({quote(self.place)}, {self.element})"
@@ -318,8 +319,8 @@ class Not:
         return f"not {_bracketed(self.part, And | Or)}"
 
 
-Presence: TypeAlias = Exists | Last | ActAtFirst | ActAtSome
-Test: TypeAlias = Presence | Count | AtLeast
+PresenceTest: TypeAlias = Exists | Last | ActAtFirst | ActAtSome
+Test: TypeAlias = PresenceTest | Count | AtLeast
 Formula: TypeAlias = Test | And | Or | Not
 
 

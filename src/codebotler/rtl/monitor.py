@@ -13,7 +13,7 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.automaton import Automaton, Letter, Undecided, machine_of
 from codebotler.rtl.semantics import is_match
 
-MOST_STEPS = 4_000  # that are remembered of a formula
+MOST_REMEMBERED_STEPS = 4_000  # that are remembered of a formula
 
 
 class Monitor:
@@ -110,7 +110,7 @@ class _Machine:
         """The state after a letter, and whether the formula holds there."""
         after = self._machine.step(state, self.letter(mask))
         found = after, self._machine.accepts(after)
-        if len(self.steps) < MOST_STEPS:
+        if len(self.steps) < MOST_REMEMBERED_STEPS:
             self.steps[state, mask] = found
         return found
 

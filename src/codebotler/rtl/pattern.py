@@ -11,17 +11,17 @@ from codebotler.core.regex_flags import scope_flags
 Tree = Any
 """A parsed regex or a part of one: pairs of an operation and its arguments, of private classes of `re`."""
 
-FLAGS = re.IGNORECASE | re.DOTALL
+PATTERN_FLAGS = re.IGNORECASE | re.DOTALL
 
 
 def compile_regex(pattern: str) -> re.Pattern[str]:
     """A regex as RTL reads it: case is ignored, and `.` matches line breaks as well."""
-    return re.compile(pattern, FLAGS)
+    return re.compile(pattern, PATTERN_FLAGS)
 
 
 def parse_tree(pattern: str) -> Tree:
     """The tree of a regex, as Python parses it."""
-    return import_module("re._parser").parse(pattern, FLAGS)
+    return import_module("re._parser").parse(pattern, PATTERN_FLAGS)
 
 
 def whole_word(pattern: str) -> re.Pattern[str]:

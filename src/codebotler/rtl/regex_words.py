@@ -9,7 +9,7 @@ from typing import Any
 from codebotler.core.words import brief, listed
 from codebotler.rtl.pattern import Tree, parse_tree
 
-ANYTHING = frozenset({"", ".*", ".+", "^.*$"})
+MATCH_ALL_PATTERNS = frozenset({"", ".*", ".+", "^.*$"})
 UNCLEAR = "(…)"
 _MOST = 40  # texts that one regex may find
 _FEWEST_IN_A_ROW = 3  # whole numbers that are named by the first and the last of them
@@ -48,7 +48,7 @@ def one_of(texts: tuple[str, ...], quote: str = '"') -> str:
 
 def first_choice(pattern: str) -> str:
     """The first plain text that a regex finds, for a reader; `(…)` if there is none for certain."""
-    first = "anything" if pattern in ANYTHING else (choices(pattern) or (UNCLEAR,))[0]
+    first = "anything" if pattern in MATCH_ALL_PATTERNS else (choices(pattern) or (UNCLEAR,))[0]
     return pattern if first == pattern.strip() or not pattern else first
 
 

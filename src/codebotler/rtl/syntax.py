@@ -11,30 +11,30 @@ from types import MappingProxyType
 from typing import get_args
 
 from codebotler.core.program import parse_expression
-from codebotler.core.skills.declaration import INSIDE
+from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.skills.values import TRUTH, ValueType, as_text
+from codebotler.core.skills.values import TRUTH_TYPE, ValueType, as_text
 from codebotler.core.unicode import composed
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
-SCOPES: dict[str, formulas.ScopeName] = {name: name for name in get_args(formulas.ScopeName)}
+SCOPE_NAMES: dict[str, formulas.ScopeName] = {name: name for name in get_args(formulas.ScopeName)}
 TESTS = ("Exists", "Last", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
-TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
+TEXT_WORDS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
 ANSWERED = "answered"
 QUESTIONS = ("mention", ANSWERED)
-LOOKS = {"found": True, "missed": False}
+LOOK_RESULTS = {"found": True, "missed": False}
 SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
-AROUND = ("at", "holding", "to", "options", "returned")  # what else an event must be like
+AROUND_WORDS = ("at", "holding", "to", "options", "returned")  # what else an event must be like
 
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
-DEEPEST = 50
+DEEPEST_FORMULA = 50
 """How deep a formula may be nested; few enough for Python's stack wherever it is evaluated."""
 
-MOST_OPTIONS = 100  # of a question, in a formula
+MOST_OFFERED = 100  # of a question, in a formula
 
 _LONGEST_SHOWN = 40
 
@@ -106,8 +106,8 @@ class _Parser:
         return self.constraint(tree, 0)
 
     def constraint(self, node: ast.expr, depth: int) -> formulas.Formula:
-        if depth > DEEPEST:
-            raise self.error(node, f"this is nested more than {DEEPEST} deep")
+        if depth > DEEPEST_FORMULA:
+            raise self.error(node, f"this is nested more than {DEEPEST_FORMULA} deep")
         match node:
             case ast.BoolOp(op, values):
                 parts = tuple(self.constraint(value, depth + 1) for value in values)
@@ -120,12 +120,12 @@ class _Parser:
 
     def test(self, node: ast.Call, function: ast.Attribute) -> formulas.Test:
         name = function.attr
-        if name in SCOPES:
+        if name in SCOPE_NAMES:
             raise self.error(
                 function, f"{name} is a scope and must be followed by a test such as .Exists(...)"
             )
         if name not in TESTS:
-            raise self.unknown(function, "test", name, [*TESTS, *SCOPES])
+            raise self.unknown(function, "test", name, [*TESTS, *SCOPE_NAMES])
         scopes = self.scopes(function.value)
         if name in {"Exists", "Last"}:
             (element,) = self.arguments(node, function, name, 1)
@@ -150,10 +150,10 @@ class _Parser:
                 case ast.Call(ast.Attribute(inner, name) as function):
                     if name in TESTS:
                         raise self.error(function, f"{name} is a test, so nothing can follow it")
-                    if name not in SCOPES:
-                        raise self.unknown(function, "scope", name, SCOPES)
+                    if name not in SCOPE_NAMES:
+                        raise self.unknown(function, "scope", name, SCOPE_NAMES)
                     (element,) = self.arguments(node, function, name, 1)
-                    scopes.append(formulas.Scope(SCOPES[name], self.element(element)))
+                    scopes.append(formulas.Scope(SCOPE_NAMES[name], self.element(element)))
                     node = inner
                 case _:
                     raise self.expected("tr or a scope such as tr.AfterFirst(...)", node)
@@ -165,7 +165,7 @@ class _Parser:
 
     def bare_element(self, node: ast.expr) -> formulas.EventPattern:
         match node:
-            case ast.Call(ast.Name(name)) if name in AROUND:
+            case ast.Call(ast.Name(name)) if name in AROUND_WORDS:
                 return self.around(name, node)
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
@@ -177,11 +177,13 @@ class _Parser:
                 if kind == "mention":
                     return formulas.EventPattern(self.question, self.matched(text), mention=True)
                 return formulas.EventPattern(self.question, formulas.Regex(".*"), answer=self.matched(text))
-            case ast.Call(ast.Name(kind)) if kind in LOOKS and self.look is not None:
+            case ast.Call(ast.Name(kind)) if kind in LOOK_RESULTS and self.look is not None:
                 (text,) = self.arguments(node, node, kind, 1)
-                return formulas.EventPattern(self.look, self.matched(text), found=LOOKS[kind])
+                return formulas.EventPattern(self.look, self.matched(text), found=LOOK_RESULTS[kind])
             case ast.Call(ast.Name(kind)):
-                raise self.unknown(node, "element", kind, [*self.recordings, *QUESTIONS, *LOOKS, *AROUND])
+                raise self.unknown(
+                    node, "element", kind, [*self.recordings, *QUESTIONS, *LOOK_RESULTS, *AROUND_WORDS]
+                )
         raise self.expected('an element such as goto("lobby")', node)
 
     def plain_element(self, kind: str, node: ast.Call) -> formulas.EventPattern:
@@ -250,7 +252,7 @@ class _Parser:
             case "returned":
                 if not (isinstance(what, ast.Constant) and isinstance(what.value, bool)):
                     raise self.expected("True or False", what)
-                if not self.skill_of[element.kind].returns == TRUTH:
+                if not self.skill_of[element.kind].returns == TRUTH_TYPE:
                     raise self.error(
                         inner, f"returned is about skills that return True or False; {element.kind} does not"
                     )
@@ -260,16 +262,16 @@ class _Parser:
         if name == "to":
             return replace(element, to=self.matched(what))
         least, most = self.number(what), self.number(given[-1])
-        if not 0 <= least <= most <= MOST_OPTIONS:
-            raise self.error(node, f"options takes numbers from 0 to {MOST_OPTIONS}, the smaller one first")
+        if not 0 <= least <= most <= MOST_OFFERED:
+            raise self.error(node, f"options takes numbers from 0 to {MOST_OFFERED}, the smaller one first")
         return replace(element, offers=(least, most if len(given) > 1 else None))
 
     def matched(self, node: ast.expr) -> formulas.Text:
         match node:
             case ast.Constant(str()):
                 return formulas.Regex(self.regex(node))
-            case ast.Call(ast.Name(name)) if name not in TEXTS:
-                raise self.unknown(node, "text helper", name, TEXTS)
+            case ast.Call(ast.Name(name)) if name not in TEXT_WORDS:
+                raise self.unknown(node, "text helper", name, TEXT_WORDS)
             case ast.Call(ast.Name("words")):
                 arguments = self.arguments(node, node, "words")
                 if not arguments:

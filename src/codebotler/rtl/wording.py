@@ -5,39 +5,39 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Literal, TypeAlias
 
 from codebotler.core import words
-from codebotler.core.skills.declaration import INSIDE, by_event, verb_for
-from codebotler.core.skills.verbs import Verb
+from codebotler.core.phrases import is_spoken, result_words, takes_nothing, verb
+from codebotler.core.skills.kinds import CHECK, GOTO, INSIDE
+from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
 from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
-from codebotler.rtl.regex_words import ANYTHING, choices, one_of
+from codebotler.rtl.regex_words import MATCH_ALL_PATTERNS, choices, one_of
 from codebotler.rtl.text.claims import Claim, Number, Time
 
-Form: TypeAlias = Literal["base", "past", "ing"]
-
-_LOOKS: Mapping[bool, Mapping[Form, str]] = {
+_LOOKS: Mapping[bool, Mapping[VerbForm, str]] = {
     True: {"base": "find", "past": "found", "ing": "finding"},
     False: {"base": "look in vain for", "past": "looked in vain for", "ing": "looking in vain for"},
 }
-_MENTIONS: Mapping[Form, str] = {"base": "mention", "past": "mentioned", "ing": "mentioning"}
-_OFFERS: Mapping[Form, str] = {"base": "offer", "past": "offered", "ing": "offering"}
-_ANSWERS: Mapping[Form, str] = {"base": "get", "past": "got", "ing": "getting"}
+_MENTIONS: Mapping[VerbForm, str] = {"base": "mention", "past": "mentioned", "ing": "mentioning"}
+_OFFERS: Mapping[VerbForm, str] = {"base": "offer", "past": "offered", "ing": "offering"}
+_ANSWERS: Mapping[VerbForm, str] = {"base": "get", "past": "got", "ing": "getting"}
 _CLAUSES = ("that ", "to ", "whether ", "what ", "in one ")
 _MOST_LISTED = 5
 _UNCLEAR = "that fits the requirement"  # in the place of a regex that has no certain words
 
 
-def deed(element: EventPattern, form: Form, *, negated: bool = False, when: str = "", where: str = "") -> str:
+def deed(
+    element: EventPattern, form: VerbForm, *, negated: bool = False, when: str = "", where: str = ""
+) -> str:
     """What an element asks for, such as `said something with "hello"`; `anything` after a negation.
 
     Args:
         element: what an event must match.
         form: of the verb.
-        negated: whether a negation stands before it.
-        when: what follows, with a space at its start; it stands before a clause such as `that nobody is in`.
+        negated: whether a negation comes before it.
+        when: what follows, with a space at its start; it comes before a clause such as `that nobody is in`.
         where: what follows after that, such as ` after going to the lobby (step 1)`.
     """
     thing = "anything" if negated else "something"
@@ -49,7 +49,7 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False, when: str 
         return f"{getattr(verb(element.kind), form)}{when}{where and f',{where},'} {means}"
     if means is not None and negated:
         means = re.sub("^something", "anything", means)
-    if element.found is not None and element.kind == "check":
+    if element.found is not None and element.kind == CHECK:
         done = f"{_LOOKS[element.found][form]} {means or _wanted(element, thing)}"
     elif element.answer is not None:
         answer = (
@@ -63,9 +63,9 @@ def deed(element: EventPattern, form: Form, *, negated: bool = False, when: str 
     elif element.options is not None and is_any(element.text) and not is_open and element.offers is None:
         return f"{_OFFERS[form]} an option {described(element.options)}{when}{where}"
     elif verb(element.kind).object:
-        told = verb(element.kind)
+        doing = verb(element.kind)
         wanted = [_part(text, thing) for text in (element.text, *element.more)]
-        done = told.with_object(getattr(told, form), [*wanted, *[thing] * told.object.count("{")], "")
+        done = doing.with_object(getattr(doing, form), [*wanted, *[thing] * doing.object.count("{")], "")
     else:
         done = f"{getattr(verb(element.kind), form)} {_wanted(element, thing)}"
     return f"{done.rstrip()}{_further(element, means)}{when}{where}"
@@ -82,7 +82,7 @@ def _further(element: EventPattern, means: str | None) -> str:
         more += f" with {number} option{'s' * (number != '1')}"
     if element.more and not verb(element.kind).object:
         more += f", {listed([*filter(None, map(described, element.more))])}".rstrip(", ")
-    if element.found is not None and element.kind != "check":
+    if element.found is not None and element.kind != CHECK:
         more += f' with the result "{verb(element.kind).results[element.found]}"'
     if element.to is not None:
         more += f" of somebody {described(element.to)}".rstrip()
@@ -118,7 +118,7 @@ def _part(text: Text, thing: str) -> str:
 def _wanted(element: EventPattern, thing: str) -> str:
     if not element.has_text:
         return ""
-    if element.kind in {"goto", INSIDE}:
+    if element.kind in {GOTO, INSIDE}:
         return room(element.text, "any" if thing == "anything" else "a")
     named = "" if is_spoken(element.kind) else _named(element.text)
     return named or _like(element.text, thing)
@@ -142,22 +142,22 @@ def _words_of(pattern: str) -> str:
 
 def happening(event: Event, element: EventPattern) -> str:
     """The object of what the robot did, and whatever else an element compares."""
-    told = verb(event.kind)
-    if told.object:
-        thing = told.with_object("", [brief(text) for text in (event.text, *event.more)], "").strip()
+    doing = verb(event.kind)
+    if doing.object:
+        thing = doing.with_object("", [brief(text) for text in (event.text, *event.more)], "").strip()
     elif takes_nothing(event.kind):
         thing = ""
     else:
-        thing = room_name(event.text) if event.kind in {"goto", INSIDE} else quoted(event.text)
+        thing = room_name(event.text) if event.kind in {GOTO, INSIDE} else quoted(event.text)
     thing += _offered(event, element)
     if element.answer is not None:
         thing += (
             " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
         )
-    if event.more and not told.object:
+    if event.more and not doing.object:
         thing += f", {', '.join(map(quoted, event.more))}"
-    if element.found is not None and event.kind != "check":
-        thing += "" if event.found is None else f" ({verb(event.kind).results[event.found]})"
+    if element.found is not None and event.kind != CHECK:
+        thing += f" ({result})" if (result := result_words(event)) else ""
     elif element.found is not None:
         thing += " in vain" if event.found is False else " and found it"
     if element.to is not None:
@@ -172,45 +172,6 @@ def _offered(event: Event, element: EventPattern) -> str:
     if event.options and (element.mention or not is_any(element.options)):
         return f" with the options {listed(few([quoted(option.text) for option in event.options]))}"
     return "" if element.offers is None else f" with {words.counted(len(event.options), 'option')}"
-
-
-def event_words(event: Event) -> str:
-    """What a robot does, such as `driving to "kitchen"`, and what has come of it if that is known."""
-    text = event.text
-    if event.answer is not None:
-        return f"the answer {quoted(event.answer)} to {quoted(text)}"
-    doing = verb(event.kind)
-    return done_to(event, doing.ing, text) + (
-        "" if event.found is None else f" ({doing.results[event.found]})"
-    )
-
-
-def done_to(event: Event, form: str, text: str | None = None) -> str:
-    """A form of an event's verb, and to what it is done."""
-    return done_with(event.kind, form, [brief(event.text if text is None else text), *map(brief, event.more)])
-
-
-def done_with(kind: str, form: str, given: Sequence[str], quote: str = '"') -> str:
-    """A form of the verb of a kind of event, and what its skill was given."""
-    return verb(kind).with_object(form, [] if takes_nothing(kind) else given, quote)
-
-
-def takes_nothing(kind: str) -> bool:
-    """Whether events of a kind have no text, since their skill has no arguments."""
-    row = by_event(kind)
-    return row is not None and row.recording is not None and not row.recording.text
-
-
-def verb(kind: str) -> Verb:
-    """The verb for a kind of event, also for one of a further skill."""
-    other = Verb(f"do {kind}", f"does {kind}", f"did {kind}", f"doing {kind}", f"did {kind}")
-    return verb_for(kind) or other
-
-
-def is_spoken(kind: str) -> bool:
-    """Whether the text of an event is said aloud."""
-    row = by_event(kind)
-    return row is not None and row.recording is not None and row.recording.is_spoken
 
 
 def room(text: Text, article: str = "a") -> str:
@@ -260,7 +221,7 @@ def _qualities(text: Text) -> Iterator[str]:
 
 def is_any(text: Text | None) -> bool:
     """Whether a text is written to match every string, or there is none."""
-    return text is None or (isinstance(text, Regex) and text.pattern in ANYTHING)
+    return text is None or (isinstance(text, Regex) and text.pattern in MATCH_ALL_PATTERNS)
 
 
 def few(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.calling import called
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import Scalar, as_text, plain, possible, written_call
@@ -162,9 +163,9 @@ class SimulatedRobot:
         """Drive to the first room whose name is found in the request."""
         room = self.room_for(location)
         if self.rules.events == "as-requested":
-            self.record("goto", location, destination=room)
+            self.record(GOTO, location, destination=room)
         elif room is not None:
-            self.record("goto", room, destination=room)
+            self.record(GOTO, room, destination=room)
         if room is None:
             raise no_room(location)
         self.room = room
@@ -178,7 +179,7 @@ class SimulatedRobot:
         rules, here = self.rules, self.people[self.room]
         seen = any(thing.is_meant_by(entity, rules.matching) for thing in self.things[self.room])
         seen = seen or any(one.is_here and is_called(one.person, entity, rules) for one in here)
-        self.record("check", entity, found=seen)
+        self.record(CHECK, entity, found=seen)
         if not any(one.is_here for one in here) and (
             coming := next((o for o in here if not o.is_gone), None)
         ):
@@ -188,7 +189,7 @@ class SimulatedRobot:
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
         """Ask the first person here who is meant, and return the position of the option they choose."""
         person, options = as_text(person), options_of(options)
-        self.record("ask", question, options, to=person)
+        self.record(ASK, question, options, to=person)
         if not options:
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
         here = (one for one in self.people[self.room] if one.is_here)
@@ -215,7 +216,7 @@ class SimulatedRobot:
         thing = next((thing for thing in here if thing.is_meant_by(obj, self.rules.matching)), None)
         if thing is None:
             raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
-        self.record("pick", obj if self.rules.events == "as-requested" else thing.label)
+        self.record(PICK, obj if self.rules.events == "as-requested" else thing.label)
         here.remove(thing)
         self.held, self.taken = obj, thing
 
@@ -229,7 +230,7 @@ class SimulatedRobot:
         if self.held is None or (self.held != obj and not is_meant):
             holds = "nothing" if self.held is None else f'"{self.held}"'
             raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
-        self.record("place", taken.label if taken else obj)
+        self.record(PLACE, taken.label if taken else obj)
         self.things[self.room].append(taken or Thing(obj, is_pattern=False))
         self.held = self.taken = None
 

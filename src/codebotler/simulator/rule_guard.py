@@ -10,17 +10,17 @@ from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import VIOLATION, RobotError
-from codebotler.core.skills.declaration import INSIDE
+from codebotler.core.phrases import phrase
+from codebotler.core.skills.kinds import GOTO, INSIDE, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Names, attempted
 from codebotler.core.world import Point, Room, rooms_along
 from codebotler.rtl import EventPattern, Formula, Inconclusive, Monitor
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.rtl.wording import event_words
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot, Thing
 
-DRIVE, MOVES = "goto", {"pick", "place"}  # kinds of events
+MOVES = {PICK, PLACE}  # kinds of events
 Verdict: TypeAlias = Literal["forbids", "cannot judge", "is broken by"]
 Watched: TypeAlias = "tuple[Rule, Monitor, frozenset[str]]"  # the last: see `_depends_on`
 
@@ -61,7 +61,7 @@ class RuleViolationError(RobotError):
     """
 
     def __init__(self, rule: Rule, event: Event | None, verdict: Verdict = "forbids") -> None:
-        what = "is not kept at the end" if event is None else f"{verdict} {event_words(event)}"
+        what = "is not kept at the end" if event is None else f"{verdict} {phrase(event, 'ing')}"
         why = ", which offers an option that is no text" if verdict == "cannot judge" else ""
         super().__init__(VIOLATION, f'the rule "{rule.name}" {what}{why}: {rule.says.rstrip(".")}')
         self.rule, self.event, self.verdict = rule, event, verdict
@@ -148,7 +148,7 @@ class RuleGuard:
             *earlier, now = self._named(robot, row, events, thing, attempt, failed=True)
             for each in earlier:
                 self.happened(each)
-            self.judge(*_attempts(robot, now, (), is_drive=now.kind == DRIVE))
+            self.judge(*_attempts(robot, now, (), is_drive=now.kind == GOTO))
         except RuleViolationError as broken:
             self._prevented.append(broken)
             raise
@@ -175,7 +175,7 @@ class RuleGuard:
             holding = (
                 attempt.holding if attempt is not None and attempt.holding == event.holding else event.holding
             )
-            is_drive = event.kind == DRIVE or (event is own and row.is_drive)
+            is_drive = event.kind == GOTO or (event is own and row.is_drive)
             if is_drive and not (failed and (event is own or number == len(events))):
                 later = (each.place for each in events[number:] if event is not own and each is not own)
                 left, self._here = self._here, names_of(next(later, robot.room), asked)
@@ -312,9 +312,9 @@ def names_of(name: str, request: str) -> str:
 
 def _moved(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
     """By which name the thing is recorded that would be picked up or put down."""
-    if kind == "place" and robot.taken is not None:
+    if kind == PLACE and robot.taken is not None:
         return (robot.taken.label,)
-    here = robot.things[robot.room] if kind == "pick" else ()
+    here = robot.things[robot.room] if kind == PICK else ()
     return [thing.label for thing in here if thing.is_meant_by(request, robot.rules.matching)][:1]
 
 

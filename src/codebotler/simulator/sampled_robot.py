@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
@@ -279,7 +280,7 @@ class SampledRobot(SimulatedRobot):
     def drive(self, location: str) -> None:
         """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
         room = self.room_for(location)
-        self.record("goto", location, destination=room)
+        self.record(GOTO, location, destination=room)
         if room is None:
             raise no_room(location)
         self.room = room
@@ -303,7 +304,7 @@ class SampledRobot(SimulatedRobot):
                 self.things[self.room].append(Thing(name, is_pattern=False))
         search = self.searches[name]
         (search.found if found else search.vain).add(self.room)
-        self.record("check", entity, found=found)
+        self.record(CHECK, entity, found=found)
         return found
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
@@ -314,7 +315,7 @@ class SampledRobot(SimulatedRobot):
             lost = self.search(who).is_lost or self.search(SOMEBODY).is_lost
             with self.excused(when=bool(options) and lost):
                 return super().ask(person, question, options)
-        self.record("ask", question, options, to=person)
+        self.record(ASK, question, options, to=person)
         asked = (self.room, who, question.strip())
         texts = [option.text for option in options]
         if self.answers.get(asked) not in texts:

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from nicegui import ui
 
 from codebotler.checking.problems import Check, Sample
-from codebotler.checking.storyboard import cut, steps_of
-from codebotler.core.skills.declaration import verb_for
+from codebotler.checking.storyboard import cut, event_from_step, steps_of
+from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
+from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
-from codebotler.core.words import brief, listed
-from codebotler.rtl.wording import done_with, is_spoken
-from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Lot, Whereabouts
+from codebotler.core.trace import Event
 from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
-NO_ANSWER = "no answer"
 LEFT_OUT = "…"  # instead of a room, where steps are left out
-PLAIN = re.compile(r"[\w' -]+")
-"""Names of rooms that need no quotes; others could be read as part of the sentence."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +104,7 @@ def scenes_reached(strip: Strip, reached: Reached) -> int | None:
 
 
 def _has_seen(strip: Strip, looks: Sequence[tuple[str, bool]]) -> bool:
-    return _texts(strip, "check")[: len(looks)] == [look_text(*look) for look in looks]
+    return _texts(strip, CHECK)[: len(looks)] == [look_text(*look) for look in looks]
 
 
 def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
@@ -170,7 +165,7 @@ def _strip(sample: Sample, check: Check) -> Strip:
         ending = f"Fails: {shortened(error.message, MOST_TEXT)} ({shortened(error.kind)})"
     else:
         ending = "Done."
-    world = shortened(supposed(sample.facts), MOST_WORLD)
+    world = shortened(f"If {sample.world}", MOST_WORLD) if sample.facts else ""
     shown = scenes(steps_of(sample.outcome.trace, has_places=True), check.room_map.start)
     return Strip(world, shown, ending, error is None or sample.in_vain)
 
@@ -185,7 +180,7 @@ def scenes(
             found.append(Scene(LEFT_OUT, (Deed("more", f"{len(some):,} more steps"),)))
             continue
         for step in some:
-            if step["kind"] == "goto":
+            if step["kind"] == GOTO:
                 to = step["to"]
                 room = shortened(to or step["text"], MOST_TEXT)
                 found.append(Scene(room, is_found=to is not None, step=step["step"]))
@@ -196,67 +191,18 @@ def scenes(
 
 def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
     kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
-    verb = verb_for(kind)
-    if "answer" in step:
-        heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
-        return (Deed(kind, text, number), Deed("answer", heard))
-    if is_spoken(kind):
+    if not is_question(kind) and not is_spoken(kind):
+        return (Deed(kind, _phrase(event_from_step(step)), number),)
+    if "answer" not in step:
         return (Deed(kind, text, number),)
-    if kind == "check" and "found" in step:
-        return (Deed(kind, look_text(step["text"], step["found"]), number),)
-    if verb is None:
-        return (Deed(kind, f"{shortened(kind)} {text}", number),)
-    result = f": {verb.results[step['found']]}" if "found" in step else ""
-    given = [text, *(shortened(each, MOST_TEXT) for each in step.get("more", ()))]
-    return (Deed(kind, f"{done_with(kind, verb.third, given, '')}{result}", number),)
+    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
+    return (Deed(kind, text, number), Deed("answer", heard))
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
     """A look and its result in words."""
-    verb = verb_for("check")
-    assert verb is not None, "it is the paper's"
-    return f"{verb.third} {shortened(what, MOST_TEXT)}: {verb.results[is_found]}"
+    return _phrase(Event(CHECK, what, found=is_found))
 
 
-# --- what a world is like
-
-
-def supposed(facts: Sequence[Fact]) -> str:
-    """What is special about a world, such as `If the robot finds “mug” in kitchen, but not in hall`."""
-    clauses = list(dict.fromkeys(_clauses(facts)))
-    if not clauses:
-        return ""
-    first, rest = clauses[0], [f"it {clause}" for clause in clauses[1:]]
-    return f"If {listed([f'the robot {first}', *rest])}"
-
-
-def _clauses(known: Sequence[Fact]) -> Iterator[str]:
-    for one in known:
-        if isinstance(one, GivenAnswer):
-            yield f"hears {_quoted(one.answer)} when it asks {_quoted(one.question)} in {_room(one.room)}"
-        elif isinstance(one, Lot):
-            yield f"works where {one.sentence}"
-        else:
-            same = [other for other in known if isinstance(other, Whereabouts) and other.name == one.name]
-            yield _found(one.name, same)
-
-
-def _found(name: str, known: Sequence[Whereabouts]) -> str:
-    there, lacking = (_rooms(known, is_there=is_there) for is_there in (True, False))
-    is_person = name == SOMEBODY
-    if not there:
-        return f"finds nobody in {lacking}" if is_person else f"does not find {_quoted(name)} in {lacking}"
-    but = f", but {'nobody in' if is_person else 'not in'} {lacking}" if lacking else ""
-    return f"finds {'somebody' if is_person else _quoted(name)} in {there}{but}"
-
-
-def _rooms(known: Sequence[Whereabouts], *, is_there: bool) -> str:
-    return listed(list(dict.fromkeys(_room(one.room) for one in known if one.is_there is is_there)))
-
-
-def _room(name: str) -> str:
-    return brief(name) if PLAIN.fullmatch(name) else _quoted(name)
-
-
-def _quoted(text: str) -> str:
-    return f"“{brief(text)}”"
+def _phrase(event: Event) -> str:
+    return phrase(event, "third", show=lambda text: shortened(text, MOST_TEXT), quote="")

@@ -11,7 +11,7 @@ from functools import cache
 from itertools import count
 from typing import Any, TypeAlias
 
-from codebotler.core.program import TASK, names_bound, parsed
+from codebotler.core.program import TASK_FUNCTION, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
 from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import Key, name_of
@@ -166,7 +166,7 @@ def shape(program: str) -> Lines:
         return _lines(program)
     try:
         nodes = list(ast.walk(tree))
-        bound = names_bound(tree) - {TASK}
+        bound = names_bound(tree) - {TASK_FUNCTION}
         numbers = {name: f"name{number}" for number, name in enumerate(_chosen(nodes, bound), 1)}
         for node in nodes:
             _rename(node, numbers)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,30 +10,11 @@ from codebotler.core.terminal import print_rich
 from roboeval.cli.output import watched
 
 if TYPE_CHECKING:
-    from roboeval.analysis.summary import Summary
+    from roboeval.cli.views.rounds import Round
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.completions import Completion, Key
     from roboeval.evaluation.runs.folder import Run
-
-
-@dataclass(frozen=True)
-class Round:
-    """How a round of a run did.
-
-    Args:
-        number: from 0, for the first programs.
-        summary: the verdicts on all programs after it.
-        requests: how many programs were requested in it.
-        accepted: how many programs the check accepts after it.
-        tokens: the tokens of its requests, as far as the model counts them.
-    """
-
-    number: int
-    summary: Summary
-    requests: int
-    accepted: int
-    tokens: int
 
 
 def further_rounds(
@@ -104,6 +84,7 @@ def _round(
 ) -> Round:
     from roboeval.analysis.summary import summary
     from roboeval.analysis.tally import Tally
+    from roboeval.cli.views.rounds import Round
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.requests import add_usage, no_usage
     from roboeval.evaluation.rounds import round_of

@@ -11,6 +11,7 @@ from typing import Any
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import VIOLATION
 from codebotler.core.program import parsed
+from codebotler.core.skills.kinds import ASK, SAY
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import counted
@@ -99,7 +100,7 @@ class Patience:
 
 
 def _weight(event: Event) -> int:
-    each = SPOKEN if event.kind in {"say", "ask"} else OTHER
+    each = SPOKEN if event.kind in {SAY, ASK} else OTHER
     return EVENT + each * (len(event.text) + sum(len(option.text) for option in event.options))
 
 

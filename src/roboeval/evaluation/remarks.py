@@ -6,11 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from codebotler.core.phrases import phrase
 from codebotler.core.trace import Event, Status, Trace
 from codebotler.core.words import counted, listed
 from codebotler.core.world import Answer, Person, World
 from codebotler.rtl.regex_words import choices, one_of
-from codebotler.rtl.wording import done_to, few, quoted, room_name, verb
+from codebotler.rtl.wording import few, quoted, room_name
 from codebotler.simulator.rules import Rules, choose, finds
 
 FEWEST_TIMES = 3  # that steps must be repeated to be a cycle
@@ -44,7 +45,7 @@ class Cycle:
     def sentence(self) -> str:
         """The repeated steps, the first of them, and how often they were repeated."""
         those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
-        deeds = ", ".join(few([*map(_deed, self.steps)]))
+        deeds = ", ".join(few([*(phrase(step, "base") for step in self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
 
     @property
@@ -66,13 +67,6 @@ def cycle_at_end(trace: Trace) -> Cycle | None:
         if covered >= FEWEST_TIMES * length and covered > most:
             most, found = covered, Cycle(start + 1, trace[start : start + length], covered // length)
     return found
-
-
-def _deed(event: Event) -> str:
-    deed = done_to(event, verb(event.kind).base)
-    if event.found is not None:
-        return f"{deed} ({verb(event.kind).results[event.found]})"
-    return deed if event.answer is None else f"{deed} (answer {quoted(event.answer)})"
 
 
 # --- answers in a fixed order

@@ -161,7 +161,7 @@ def _families(suite: Suite) -> dict[str, Any]:
     """From which families the tasks were made, and what a later version must make of them."""
     if suite.families is None:
         return {}
-    return {"families": {**asdict(suite.families), "version": suite.version, "digest": suite.digest}}
+    return {"families": {**suite.families, "version": suite.version, "digest": suite.digest}}
 
 
 def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.words import listed
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Formula, Regex, Text
@@ -153,7 +154,7 @@ class JudgedWorld:
                 if not can_match(text, outer=text is element.options):
                     message = f'no text was found that matches {text}, for which "{requirement.check}" looks'
                     yield self.finding("dead-regex", subject, message, line)
-                elif element.kind == "goto" and not self._leads_somewhere(text):
+                elif element.kind == GOTO and not self._leads_somewhere(text):
                     there = f'in "{requirement.check}" and gets anywhere in {self.name}'
                     message = f"no visit was found that matches {text} {there}"
                     yield self.finding("dead-regex", subject, message, line)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from codebotler.core.labels import check_regex
-from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, Text, WorldFile
+from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
 from codebotler.simulator.rules import WORDS_FOR_PEOPLE, Limits, Rules
 
 MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
@@ -56,7 +56,7 @@ class CheckFile(_Form):
 
     category: Category
     commonsense: bool = False
-    rtl: Text
+    rtl: YamlText
     means: Annotated[dict[str, Name], BeforeValidator(_of_what_is_said)] = {}
 
 
@@ -69,8 +69,8 @@ class Fact(_Form):
         commonsense: whether the model must know it without being told.
     """
 
-    fact: Text
-    words: Annotated[tuple[Annotated[Text, AfterValidator(check_regex)], ...], Field(min_length=1)]
+    fact: YamlText
+    words: Annotated[tuple[Annotated[YamlText, AfterValidator(check_regex)], ...], Field(min_length=1)]
     commonsense: bool = False
 
 
@@ -82,7 +82,7 @@ class RequirementFile(_Form):
         prompts: by the number of each prompt that asks for it, counted from 0, the words that do.
     """
 
-    check: Text
+    check: YamlText
     prompts: Annotated[dict[Annotated[int, Field(ge=0, lt=10_000)], Name], Field(min_length=1)] | None = None
 
     @model_validator(mode="before")
@@ -97,8 +97,8 @@ Require = Annotated[list[RequirementFile], Field(min_length=1)]
 class Accepted(_Form):
     """A finding of the linter that is there on purpose, and why."""
 
-    finding: Text
-    because: Text
+    finding: YamlText
+    because: YamlText
 
 
 class ScenarioFile(WorldFile):
@@ -110,7 +110,7 @@ class ScenarioFile(WorldFile):
     ablation_people: dict[str, list[PersonFile]] | None = None
 
 
-Levels = Annotated[list[Text], Field(min_length=1)] | Text
+Levels = Annotated[list[YamlText], Field(min_length=1)] | YamlText
 NOWHERE = "nowhere"
 Answers = AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]
 Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
@@ -148,7 +148,7 @@ class DrawnWorldsFile(_Form):
     rooms: Annotated[list[NamePattern], Field(min_length=1)]
     people: dict[NamePattern, DrawnPersonFile] = {}
     things: dict[NamePattern, DrawnThingFile] = {}
-    may_wait_forever: Text | Annotated[bool, Field(strict=True)] = False
+    may_wait_forever: YamlText | Annotated[bool, Field(strict=True)] = False
     corners: list[CornerFile] = []
 
 
@@ -226,7 +226,7 @@ class SuiteFile(_Form):
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
     version: Annotated[int, Field(strict=True, ge=0)]
-    about: Text = ""
+    about: YamlText = ""
     instructions: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")] | None = None
     worlds: Annotated[int, Field(strict=True, ge=1, le=MOST_WORLDS)] = 30
     seed: Annotated[int, Field(strict=True, ge=0)] = 1

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from codebotler.core.world_file import Name, Text
+from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.recorded import NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task
@@ -21,7 +21,7 @@ class EquivalentMutantFile(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     operator: Name
-    diff: Text  # as `roboeval mutate` prints it
+    diff: YamlText  # as `roboeval mutate` prints it
     because: Name
 
 

@@ -14,7 +14,7 @@ from codebotler.core.regex_flags import scope_flags
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import listed
-from codebotler.core.yaml_files import Place, YamlFile
+from codebotler.core.yaml_files import YamlFile, YamlPath
 from codebotler.rtl import RtlSyntaxError, parse
 from codebotler.rtl.regex_words import first_choice
 from codebotler.rtl.syntax import ANSWERED
@@ -224,7 +224,7 @@ class _Reader:
     # --- requirements
 
     def _requirements(
-        self, forms: Sequence[RequirementFile], start: str, at: Place
+        self, forms: Sequence[RequirementFile], start: str, at: YamlPath
     ) -> tuple[Requirement, ...]:
         return tuple(
             self._requirement(form.check, form.prompts, start, (*at, index))
@@ -232,7 +232,7 @@ class _Reader:
         )
 
     def _requirement(
-        self, text: str, prompts: Mapping[int, str] | None, start: str, at: Place
+        self, text: str, prompts: Mapping[int, str] | None, start: str, at: YamlPath
     ) -> Requirement:
         bare = text.strip().removeprefix("not ")
         name, arguments = self._call(text, bare, at)
@@ -256,7 +256,7 @@ class _Reader:
         words = self._words(prompts or {}, (*at, "prompts"))
         return Requirement(text, name, formula, check.category, self.file.line(at), words)
 
-    def _words(self, prompts: Mapping[int, str], at: Place) -> tuple[tuple[int, str], ...]:
+    def _words(self, prompts: Mapping[int, str], at: YamlPath) -> tuple[tuple[int, str], ...]:
         """The words of prompts on which a requirement rests, which must stand in them."""
         known = self.form.prompts
         for number, words in prompts.items():
@@ -269,7 +269,7 @@ class _Reader:
                 raise self.file.wrong(sentence, *at, number)
         return tuple(prompts.items())
 
-    def _call(self, text: str, bare: str, at: Place) -> tuple[str, list[str]]:
+    def _call(self, text: str, bare: str, at: YamlPath) -> tuple[str, list[str]]:
         try:
             node = parse_expression(bare)
         except (SyntaxError, ValueError, RecursionError, MemoryError):

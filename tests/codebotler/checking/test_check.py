@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.checking.check import check, check_on, checks_on
 from codebotler.checking.problems import Check
-from codebotler.checking.sampled import MORE, CheckSettings
+from codebotler.checking.sampled import MOST_FURTHER_WORLDS, CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
 from codebotler.simulator.fact_sampler import FactSampler
@@ -223,7 +223,7 @@ def test_waiting_in_many_places_ends_in_some_world(checks: Checks) -> None:
 
 def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None:
     found = checks("while is_in_room('mug') or True:", "    time.sleep(1)")
-    assert len(found.samples) == 5 + MORE
+    assert len(found.samples) == 5 + MOST_FURTHER_WORLDS
     (problem,) = found.problems
     assert (problem.kind, problem.line) == ("TimeoutError", 2)
     assert "25 imagined worlds" in problem.message

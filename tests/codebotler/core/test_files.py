@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import (
-    MAX_BYTES,
+    MOST_FILE_BYTES,
     Appender,
     make_folder,
     read_lines,
@@ -35,7 +35,7 @@ def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_pa
 
     latin, large = tmp_path / "latin.yaml", tmp_path / "large.yaml"
     latin.write_bytes("a: 1\nb: café\n".encode("latin-1"))
-    large.write_bytes(b"a" * (MAX_BYTES + 1))
+    large.write_bytes(b"a" * (MOST_FILE_BYTES + 1))
     refused(tmp_path / "no.yaml", "no such file")
     refused(tmp_path, "a folder")
     refused(latin, "UTF-8", 2)

@@ -11,17 +11,19 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills.declaration import INSIDE, RTL_WORDS, by_name
+from codebotler.core.phrases import phrase
+from codebotler.core.skills.declaration import RTL_WORDS, by_name
 from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.verbs import Verb, verb_of
 from codebotler.core.trace import Event, Outcome, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
+from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
-from codebotler.rtl.syntax import AROUND, LOOKS, QUESTIONS, TEXTS
-from codebotler.rtl.wording import done_to
+from codebotler.rtl.syntax import AROUND_WORDS, LOOK_RESULTS, QUESTIONS, TEXT_WORDS
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
@@ -188,7 +190,7 @@ def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: 
 
 
 def test_names_that_formulas_use_otherwise_are_refused() -> None:
-    assert {*AROUND, *LOOKS, *QUESTIONS, *TEXTS, INSIDE, "tr"} == RTL_WORDS
+    assert {*AROUND_WORDS, *LOOK_RESULTS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
 
 
 def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
@@ -294,7 +296,7 @@ def test_a_truth_that_cannot_be_is_refused_with_its_line(tmp_path: Path, truth: 
     path = tmp_path / "world.yaml"
     path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truth}\n")
     with pytest.raises(UserError) as caught:
-        World.read(path, skills_from(tmp_path / "lab.py"))
+        read_world(path, skills_from(tmp_path / "lab.py"))
     assert TRUTHS[truth] in str(caught.value)
     assert caught.value.line == 4
 
@@ -305,7 +307,7 @@ def test_truths_say_what_calls_come_to_however_they_are_quoted(tmp_path: Path) -
     truths = "read('a'): 7\n  read(\"b\"): Broken\n  gate a is shut: true\n"
     path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truths}")
     table = skills_from(tmp_path / "lab.py")
-    world = World.read(path, table)
+    world = read_world(path, table)
     robot = SimulatedRobot(world, skills=table)
     assert robot.perform("read", ["a"]) == 7
     with pytest.raises(RobotError, match="read: it is broken"):
@@ -313,7 +315,7 @@ def test_truths_say_what_calls_come_to_however_they_are_quoted(tmp_path: Path) -
     with pytest.raises(RobotError, match="open_gate: it is shut"):
         robot.perform("open_gate", ["a"])
     (tmp_path / "again.yaml").write_text(world.to_yaml())
-    assert World.read(tmp_path / "again.yaml", table) == world
+    assert read_world(tmp_path / "again.yaml", table) == world
 
 
 READS = (
@@ -465,7 +467,7 @@ def test_the_words_of_a_verb_follow_its_event(tmp_path: Path) -> None:
     robot = SimulatedRobot(WORLD, skills=table)
     robot.perform("stow", ["pen", "drawer"])
     assert robot.trace == (Event("stow", "drawer", more=("pen",)),)
-    assert done_to(robot.trace[0], "put") == "put pen into drawer"
+    assert phrase(robot.trace[0], "past") == "put pen into drawer"
 
 
 def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:

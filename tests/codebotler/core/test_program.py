@@ -10,7 +10,7 @@ from codebotler.core import program
 from codebotler.core.program import flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
-from codebotler.core.skills.values import NOTHING
+from codebotler.core.skills.values import NO_VALUE
 from codebotler.models.recorded import NAMES, recorded_model
 from codebotler.prompts.extract import program_of
 
@@ -130,7 +130,7 @@ def test_many_undefined_names_are_quickly_told() -> None:
 
 
 def test_a_ninth_skill_is_known() -> None:
-    skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NOTHING, "Wave."))
+    skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NO_VALUE, "Wave."))
     waves = in_task("wave()")
     (unknown,) = flaws(waves)
     assert (unknown.line, unknown.kind) == (2, "NameError")

@@ -7,7 +7,7 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.simulation import Simulation
 from codebotler.core.skills.table import Parameter, Recording, Skill, SkillTable
-from codebotler.core.skills.values import NOTHING, TEXT
+from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
 
@@ -40,7 +40,7 @@ def test_texts_and_options_of_events_are_parameters_of_their_skills() -> None:
     for skill in SKILLS.values():
         if skill.recording is not None:
             types = {parameter.name: parameter.type for parameter in skill.parameters}
-            assert types[skill.recording.text] == TEXT
+            assert types[skill.recording.text] == TEXT_TYPE
             assert skill.recording.options is None or types[skill.recording.options].is_list
 
 
@@ -50,7 +50,7 @@ def test_every_skill_travels_as_a_ros_action_with_one_goal_field_a_parameter() -
         assert [field.split()[-1] for field in skill.ros.goal] == [
             {"entity": "object"}.get(p.name, p.name) for p in skill.parameters
         ]
-        assert (skill.ros.result is None) == (skill.returns == NOTHING)
+        assert (skill.ros.result is None) == (skill.returns == NO_VALUE)
         assert skill.ros.server == f"/{skill.name}_server"
 
 
@@ -63,7 +63,7 @@ def test_a_simulated_robot_does_what_skills_ask_of_it() -> None:
                 assert [*inspect.signature(getattr(kind, name)).parameters][: len(wanted)] == wanted
 
 
-WAVE = Skill("wave", (Parameter("person"),), NOTHING, "Wave.", Recording("wave", "person"))
+WAVE = Skill("wave", (Parameter("person"),), NO_VALUE, "Wave.", Recording("wave", "person"))
 
 
 def test_one_more_skill_makes_a_longer_table_and_leaves_the_old_one() -> None:
@@ -79,8 +79,8 @@ def test_one_more_skill_makes_a_longer_table_and_leaves_the_old_one() -> None:
 @pytest.mark.parametrize(
     "row",
     [
-        Skill("say", (), NOTHING, "Another skill of that name."),
-        Skill("shout", (Parameter("text"),), NOTHING, "Another of that kind.", Recording("say", "text")),
+        Skill("say", (), NO_VALUE, "Another skill of that name."),
+        Skill("shout", (Parameter("text"),), NO_VALUE, "Another of that kind.", Recording("say", "text")),
     ],
 )
 def test_two_skills_share_neither_a_name_nor_a_kind_of_event(row: Skill) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from codebotler.core.errors import UserError
 from codebotler.core.labels import check_label
 from codebotler.core.world import HALLWAY, Person, Room, World, laid_out
-from codebotler.core.world_file import WorldFile
+from codebotler.core.world_file import WorldFile, read_world
 from codebotler.core.yaml_files import YamlFile
 
 GOOD = "robot: hall\nrooms:\n  - hall\n  - lab\n"
@@ -35,7 +35,7 @@ def read(text: str) -> World:
 def test_world_file_holds_all_that_a_world_is(tmp_path: Path) -> None:
     path = tmp_path / "w.yaml"
     path.write_text(FULL, encoding="utf-8")
-    assert World.read(path) == World(
+    assert read_world(path) == World(
         about="second floor, after lunch",
         robot="start_loc",
         rooms=(
@@ -180,7 +180,7 @@ def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "w.yaml"
     path.write_text("robot: attic\nrooms: [hall]\n", encoding="utf-8")
     with pytest.raises(UserError, match='"attic"') as error:
-        World.read(path)
+        read_world(path)
     assert (error.value.file, error.value.line) == (path, 1)
 
 

@@ -13,11 +13,12 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.cli.run import checker
-from codebotler.core.skills.declaration import POSE
+from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event
 from codebotler.core.world import Point, Room, World, laid_out, rooms_along
+from codebotler.core.world_file import read_world
 from codebotler.missions.log import EVENTS, Line, State
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import expect_poses, preflight
@@ -38,7 +39,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker
 from doubles import Answering
 
-WORLD = World.read(OFFICE)
+WORLD = read_world(OFFICE)
 MAP = RoomMap.of(WORLD)
 AS_WRITTEN = Rules(literals="as-written")
 THROUGH = "def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n    say('done')\n"
@@ -49,7 +50,7 @@ AROUND = THROUGH.replace("1')\n", "1')\n    go_to('start_loc')\n    go_to('suppl
 
 
 def rule(formula: str, *, name: str = "house") -> Rule:
-    return Rule(name, "Do as the house wants.", parse(formula, skills=SKILLS.with_skill(POSE)))
+    return Rule(name, "Do as the house wants.", parse(formula, skills=SKILLS.with_skill(POSE_IN_ROOM)))
 
 
 NEVER = rule('not tr.Exists(inside("printer room 2"))', name="never")

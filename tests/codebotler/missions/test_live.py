@@ -11,7 +11,7 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
-from codebotler.core.skills.values import TEXT, ValueType, written_call
+from codebotler.core.skills.values import TEXT_TYPE, ValueType, written_call
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot, StoppedError
@@ -72,7 +72,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
 
 def test_a_question_without_options_is_named_wherever_its_text_stands() -> None:
     given = (Parameter("choices", ValueType(is_list=True), is_options=True), Parameter("title"))
-    row = Skill("choose", given, TEXT, "Let somebody choose.", Recording("choose", "title", "choices"))
+    row = Skill("choose", given, TEXT_TYPE, "Let somebody choose.", Recording("choose", "title", "choices"))
     answering = Answering()
     answering.skills = SKILLS.with_skill(row)
     robot = LiveRobot(answering, Notes())
@@ -202,7 +202,7 @@ def test_answer_that_the_skill_does_not_have_loses_the_robot(
 
 
 def test_ninth_skill_needs_nothing_here() -> None:
-    row = Skill("measure", (Parameter("what"),), TEXT, "Measure.", Recording("measure", "what"))
+    row = Skill("measure", (Parameter("what"),), TEXT_TYPE, "Measure.", Recording("measure", "what"))
     robot, notes = live(giving("20 degrees"))
     robot.skills = SKILLS.with_skill(row)
     assert robot.perform("measure", ["the air"]) == "20 degrees"

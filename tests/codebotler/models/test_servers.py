@@ -14,7 +14,7 @@ from codebotler.models import http_client
 from codebotler.models.base import Model, ModelError, Reply, Usage
 from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts import Message, Prompt, prompt_for
+from codebotler.prompts import Prompt, PromptMessage, prompt_for
 from server import CHUNK, HUGE, TASK, Fault, Server
 
 T = TypeVar("T")
@@ -91,7 +91,7 @@ def test_settings_that_are_none_are_left_to_the_server(name: str, server: Server
 def test_chat_is_sent_as_messages(server: Server) -> None:
     prompt = PROMPT.after("def task_program():\n    pass\n", ["it does nothing"])
     ask(CHAT, server, prompt)
-    sent = [Message(m["role"], m["content"]) for m in server.requests[0].body["messages"]]
+    sent = [PromptMessage(m["role"], m["content"]) for m in server.requests[0].body["messages"]]
     assert tuple(sent) == prompt.messages
 
 

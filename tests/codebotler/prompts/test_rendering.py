@@ -8,16 +8,16 @@ from codebotler import prompts
 from codebotler.core.program import flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
-from codebotler.core.skills.values import NOTHING
+from codebotler.core.skills.values import NO_VALUE
 from codebotler.core.trace import Event, Option, Status
 from codebotler.core.world import Person, Room, World
-from codebotler.prompts import Message, Prompt, prompt_for, rendering, template_hash
+from codebotler.prompts import Prompt, PromptMessage, prompt_for, rendering, template_hash
 from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import Example, examples, task_end
 from codebotler.simulator import run
 from roboeval.suites.load import Suite
 
-WAVE = Skill("wave", (Parameter("person"),), NOTHING, "Wave at a person in the room.")
+WAVE = Skill("wave", (Parameter("person"),), NO_VALUE, "Wave at a person in the room.")
 PROMPT = prompt_for("Go to the lab.")
 
 
@@ -136,7 +136,7 @@ def test_chat_begins_with_the_rules_shows_the_examples_and_ends_with_the_instruc
     for question, answer, example in zip(shown[::2], shown[1::2], examples(), strict=True):
         assert question.text == example.instruction
         assert program_of(answer.text).source == example.program
-    assert last == Message("user", "Go to the lab.")
+    assert last == PromptMessage("user", "Go to the lab.")
 
 
 def test_text_is_python_up_to_the_opening_and_holds_each_instruction_as_a_comment() -> None:
@@ -208,7 +208,7 @@ def test_hash_is_that_of_all_but_the_instruction(monkeypatch: pytest.MonkeyPatch
     assert re.fullmatch("[0-9a-f]{64}", before)
     assert template_hash(SKILLS.with_skill(WAVE)) != before
     changes: dict[str, object] = {
-        "STOP": ("\n#",),
+        "STOP_TEXTS": ("\n#",),
         "OPENING": "def task_program() -> None:\n",
         "examples": lambda: examples()[1:],
         "_fenced": lambda program: program,

@@ -14,7 +14,7 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
-from codebotler.core.skills.values import NOTHING, TEXT, ValueType
+from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType
 from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
@@ -142,8 +142,8 @@ def test_whatever_is_spoken_is_shown_by_the_parameters_of_its_row() -> None:
         Parameter("title"),
         Parameter("guest"),
     )
-    table = SKILLS.with_skill(Skill("whisper", text, NOTHING, "Whisper.", Recording("whisper", "text")))
-    row = Skill("choose", choose, TEXT, "Let a guest choose.", Recording("choose", "title", "choices"))
+    table = SKILLS.with_skill(Skill("whisper", text, NO_VALUE, "Whisper.", Recording("whisper", "text")))
+    row = Skill("choose", choose, TEXT_TYPE, "Let a guest choose.", Recording("choose", "title", "choices"))
     table = table.with_skill(row)
     face = Face(LONG)
     robot = RobotWithFace(Simulated(WORLD, speed=None, skills=without_speech(table)), face, table)

@@ -19,9 +19,10 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.declaration import POSE
+from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Person, Point, Room, World
+from codebotler.core.world_file import read_world
 from codebotler.missions.live import LiveRobot
 from codebotler.missions.log import State
 from codebotler.missions.mission import Mission
@@ -322,8 +323,9 @@ import numpy
 before = numpy.random.get_state()[1].tolist()
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.core.world import World
+from codebotler.core.world_file import read_world
 from pathlib import Path
-robot = Pyrobosim(World.read(Path(sys.argv[1])), speed=None)
+robot = Pyrobosim(read_world(Path(sys.argv[1])), speed=None)
 robot.connect()
 ways = []
 for skill, argument in (("go_to", "kitchen"), ("pick", "mug"), ("go_to", "study"), ("place", "mug")):
@@ -504,9 +506,9 @@ def test_rooms_are_regexes_for_the_check_as_in_its_world() -> None:
 def test_rules_about_where_it_is_hold_along_its_own_way(
     tmp_path: Path, room: str, *, is_stopped: bool
 ) -> None:
-    world = World.read(OFFICE)
+    world = read_world(OFFICE)
     robot = Pyrobosim(world, speed=None)
-    formula = parse(f'not tr.Exists(inside("{room}"))', skills=SKILLS.with_skill(POSE))
+    formula = parse(f'not tr.Exists(inside("{room}"))', skills=SKILLS.with_skill(POSE_IN_ROOM))
     mission = Mission(tmp_path, robot.name)
     mission.draft("def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n")
     mission.check([])

@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from codebotler.core.skills.declaration import POSE
+from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
-from codebotler.core.skills.values import NOTHING
+from codebotler.core.skills.values import NO_VALUE
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import And, Formula, Inconclusive, Not, Or, explain, holds, parse
 
-WAVE = Skill("wave", (Parameter("person"),), NOTHING, "Wave at a person.", Recording("wave", "person"))
+WAVE = Skill("wave", (Parameter("person"),), NO_VALUE, "Wave at a person.", Recording("wave", "person"))
 YES_NO = (Option("yes"), Option("no"))
 LUNCH: Trace = (
     Event("goto", "alice's office"),
@@ -297,7 +297,7 @@ def test_the_time_grows_with_the_trace_and_no_faster(text: str) -> None:
 
 
 def test_where_the_robot_was_is_explained_by_the_room() -> None:
-    formula = parse('not tr.Exists(inside("server room"))', skills=SKILLS.with_skill(POSE))
+    formula = parse('not tr.Exists(inside("server room"))', skills=SKILLS.with_skill(POSE_IN_ROOM))
     found = explain(formula, (Event("goto", "hall"), Event("inside", "server room")))
     assert found is not None
     assert found.event == 1

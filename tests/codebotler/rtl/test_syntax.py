@@ -8,10 +8,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from codebotler.core.skills.declaration import POSE
+from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
-from codebotler.core.skills.values import NOTHING
+from codebotler.core.skills.values import NO_VALUE
 from codebotler.core.trace import Event
 from codebotler.rtl import (
     ActAtFirst,
@@ -31,7 +31,7 @@ from codebotler.rtl import (
     holds,
     parse,
 )
-from codebotler.rtl.syntax import DEEPEST
+from codebotler.rtl.syntax import DEEPEST_FORMULA
 
 LOBBY = Exists(EventPattern("goto", Regex("lobby")))
 ASK = EventPattern("ask", Regex("lunch"), Regex(".*"))
@@ -187,7 +187,7 @@ def test_deep_nesting_is_an_error_and_no_crash(text: str) -> None:
 
 
 def test_50_are_deep_enough_and_51_too_deep() -> None:
-    text = "not " * DEEPEST + 'tr.Exists(say("a"))'
+    text = "not " * DEEPEST_FORMULA + 'tr.Exists(say("a"))'
     assert str(parse(text)) == text
     with pytest.raises(RtlSyntaxError, match="more than 50 deep") as caught:
         parse("not " + text)
@@ -195,7 +195,7 @@ def test_50_are_deep_enough_and_51_too_deep() -> None:
 
 
 def test_each_part_of_a_constraint_may_be_deep() -> None:
-    deep = "not " * (DEEPEST - 1) + 'tr.Exists(say("a"))'
+    deep = "not " * (DEEPEST_FORMULA - 1) + 'tr.Exists(say("a"))'
     assert str(parse(f"{deep} and {deep}")) == f"{deep} and {deep}"
     with pytest.raises(RtlSyntaxError, match="nested"):
         parse(f"{deep} and not {deep}")
@@ -218,7 +218,7 @@ def test_escapes_that_python_does_not_know_mean_what_they_look_like() -> None:
 
 
 def test_a_further_skill_is_a_further_element() -> None:
-    wave = Skill("wave", (Parameter("person"),), NOTHING, "Wave at a person.", Recording("wave", "person"))
+    wave = Skill("wave", (Parameter("person"),), NO_VALUE, "Wave at a person.", Recording("wave", "person"))
     formula = parse('tr.Exists(wave("alice"))', skills=SKILLS.with_skill(wave))
     assert formula == Exists(EventPattern("wave", Regex("alice")))
     assert holds(formula, (Event("wave", "Alice"),))
@@ -244,9 +244,9 @@ def test_errors_and_formulas_travel_between_processes() -> None:
     ],
 )
 def test_house_rules_may_be_about_where_the_robot_is(text: str) -> None:
-    formula = parse(text, skills=SKILLS.with_skill(POSE))
+    formula = parse(text, skills=SKILLS.with_skill(POSE_IN_ROOM))
     assert str(formula) == text
-    assert parse(str(formula), skills=SKILLS.with_skill(POSE)) == formula
+    assert parse(str(formula), skills=SKILLS.with_skill(POSE_IN_ROOM)) == formula
     with pytest.raises(RtlSyntaxError, match="only house rules"):
         parse(text)
 
@@ -254,4 +254,4 @@ def test_house_rules_may_be_about_where_the_robot_is(text: str) -> None:
 @pytest.mark.parametrize("wrong", ['returned(True, inside("a"))', 'to("a", inside("b"))', 'inside("a", "b")'])
 def test_what_a_pose_cannot_have_is_refused(wrong: str) -> None:
     with pytest.raises(RtlSyntaxError):
-        parse(f"tr.Exists({wrong})", skills=SKILLS.with_skill(POSE))
+        parse(f"tr.Exists({wrong})", skills=SKILLS.with_skill(POSE_IN_ROOM))

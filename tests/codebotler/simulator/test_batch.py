@@ -19,7 +19,7 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill, SkillTable
-from codebotler.core.skills.values import TEXT
+from codebotler.core.skills.values import TEXT_TYPE
 from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key_of
@@ -41,7 +41,7 @@ WORLDS = (
 WORLD = WORLDS[0]
 RULES = Rules(limits=Limits(seconds=600, calls=60, ticks=2_000, text=200, trace=2_000))
 TABLE = SKILLS.with_skill(
-    Skill("wave", (Parameter("person"),), TEXT, "Wave at a person.", Recording("wave", "person"))
+    Skill("wave", (Parameter("person"),), TEXT_TYPE, "Wave at a person.", Recording("wave", "person"))
 )
 
 

@@ -22,7 +22,7 @@ from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.simulation import Simulation
 from codebotler.core.skills.table import Parameter, Recording, Skill
-from codebotler.core.skills.values import NOTHING
+from codebotler.core.skills.values import NO_VALUE
 from codebotler.core.trace import Outcome, Status, trace_data
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
@@ -424,7 +424,7 @@ def test_a_skill_of_ones_own_is_felt_by_its_own_run_only(
     lines: tuple[str, ...], batches: Worker, alone: Worker
 ) -> None:
     skills = SKILLS.with_skill(
-        Skill("wave", (Parameter("person"),), NOTHING, "Wave.", Recording("wave", "person"), does=wave)
+        Skill("wave", (Parameter("person"),), NO_VALUE, "Wave.", Recording("wave", "person"), does=wave)
     )
     new = [partial(SimulatedRobot, world, AS_WRITTEN, skills) for world in WORLDS]
     source = "\n    ".join(("def task_program():", *lines))

@@ -9,6 +9,7 @@ from codebotler.checking.check import check
 from codebotler.checking.rules import read_rules
 from codebotler.core.program import tree_of
 from codebotler.core.world import Person, Room, World
+from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.robots.open import open_robot
 from codebotler.rtl import holds, parse
@@ -36,7 +37,7 @@ def in_form(form: str, text: str) -> str:
 @pytest.mark.parametrize("theirs", FORMS)
 def test_program_and_world_file_in_any_form(ours: str, theirs: str, tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(in_form(theirs, WORLD))
-    outcome = run(in_form(ours, PROGRAM), World.read(tmp_path / "world.yaml"))
+    outcome = run(in_form(ours, PROGRAM), read_world(tmp_path / "world.yaml"))
     assert (outcome.status, outcome.trace[-1].text) == ("finished", "thé")
     assert holds(parse(in_form(ours, 'tr.Exists(at("café", say("thé")))')), outcome.trace)
     assert not holds(parse(in_form(theirs, 'tr.Exists(say("café"))')), outcome.trace)
@@ -44,7 +45,7 @@ def test_program_and_world_file_in_any_form(ours: str, theirs: str, tmp_path: Pa
 
 def test_escape_in_a_file_is_a_letter_like_any_other(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text('robot: start_loc\nrooms: [start_loc, "cafe\\u0301"]\n')
-    assert World.read(tmp_path / "world.yaml").rooms[1].name == NFC
+    assert read_world(tmp_path / "world.yaml").rooms[1].name == NFC
 
 
 def test_world_made_in_python_is_composed() -> None:

@@ -15,6 +15,7 @@ from codebotler.checking.problems import Check
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender
 from codebotler.core.world import Room, World
+from codebotler.core.world_file import read_world
 from codebotler.missions import log as mission_log
 from codebotler.missions.log import Line, State, Summary
 from codebotler.missions.mission import Mission, MissionError
@@ -129,7 +130,7 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
 
 
 def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> None:
-    world, model = World.read(OFFICE), recorded_model("recorded")
+    world, model = read_world(OFFICE), recorded_model("recorded")
     robot = Simulated(world, speed=None)
     with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
         assert len(examples(console)) >= 3
@@ -143,7 +144,7 @@ def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> 
 
 
 def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: Path) -> None:
-    office, model = World.read(OFFICE), recorded_model("recorded")
+    office, model = read_world(OFFICE), recorded_model("recorded")
     for world, count in ((office, 3), (WORLD, 0)):
         robot = Simulated(world, speed=None)
         with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:

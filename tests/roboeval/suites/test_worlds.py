@@ -11,9 +11,10 @@ import pytest
 
 from codebotler.core.errors import UserError
 from roboeval.suites.expression import ExpressionError, each_of, parsed, value
-from roboeval.suites.load import _suite_of, load_suite
+from roboeval.suites.load import load_suite
 from roboeval.suites.pairwise import covering, spread
 from roboeval.suites.schema import MOST_WORLDS
+from roboeval.suites.suite import _suite_of
 
 SUITE = "name: mine\nversion: 1\nabout: my tasks\nworlds: 12\nseed: 3\n"
 TASK = """\

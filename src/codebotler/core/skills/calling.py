@@ -1,4 +1,4 @@
-"""Calls the function of a user's own skill, and says what is wrong with what it does."""
+"""Calls the function of a user's own skill, and reports results and errors that it does not declare."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SKILL_FAILED = "SkillFailed"
 
 
 def called(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
-    """What the function of a skill returns; UserError where it returns or raises what it does not declare."""
+    """Call the function of a skill; UserError if it returns a value that it does not declare."""
     assert row.does is not None, "the robot was made with it"
     given = [
         [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)

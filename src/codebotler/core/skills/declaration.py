@@ -12,14 +12,19 @@ from types import FunctionType
 from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
+from codebotler.core.skills.kinds import INSIDE
+from codebotler.core.skills.own_modules import is_own_module
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, refuse
-from codebotler.core.skills.values import NOTHING, TEXT, ValueType, plain, value_type
+from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType, plain, value_type
 from codebotler.core.skills.verbs import Verb, verb_of
 
-TAKEN = frozenset({"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"})
-INSIDE = "inside"
+RESERVED_NAMES = frozenset(
+    {"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"}
+)
 BE = Verb("be inside", "is inside", "was inside", "being inside", "was in a room")
-POSE = Skill("(pose)", (Parameter("room"),), NOTHING, "", Recording(INSIDE, "room", names="room"), verb=BE)
+POSE_IN_ROOM = Skill(
+    "(pose)", (Parameter("room"),), NO_VALUE, "", Recording(INSIDE, "room", names="room"), verb=BE
+)
 """Not a skill: house rules see this event when the robot's pose enters a room."""
 RTL_WORDS = frozenset(
     {
@@ -27,10 +32,9 @@ RTL_WORDS = frozenset(
         *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies", INSIDE),
     }
 )
-"""What formulas call other things by than events."""
+"""Words with another meaning in formulas, which no event may have as its name."""
 _DECLARED: dict[str, Skill] = {}
-_BY_MODULE: dict[str, list[Skill]] = {}
-PAPER = "codebotler.core.skills.paper"
+PAPER_MODULE = "codebotler.core.skills.paper"
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
 
@@ -44,19 +48,9 @@ def all_names() -> list[str]:
     return list(_DECLARED)
 
 
-def declared_by(module: str) -> list[Skill]:
-    """The skills that a module has declared, in its order."""
-    return list(_BY_MODULE.get(module, ()))
-
-
-def forget(module: str) -> None:
-    """Forget what a module has declared that could not be run to its end."""
-    _BY_MODULE.pop(module, None)
-
-
 def by_event(kind: str) -> Skill | None:
     """The skill declared in this process that leaves events of a kind, which is all that these say of it."""
-    other = POSE if kind == INSIDE else None
+    other = POSE_IN_ROOM if kind == INSIDE else None
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 
 
@@ -111,7 +105,7 @@ def skill(
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
     """Declare a skill by a function that does it to a simulated robot, its first parameter.
 
-    A function without code (`...`) leaves the event of the skill, and returns a value of its type by lot; in
+    A function without code (`...`) leaves the event of the skill, and returns a random value of its type; in
     some of the worlds that a check imagines, it fails with each of its errors.
 
     Args:
@@ -127,7 +121,7 @@ def skill(
         names: the sort of thing that the text names, such as `room`; empty for what is spoken.
         to: the parameter that says whom it is for.
         when_tried: whether an attempt that fails is an event, too.
-        seconds: how long the simulated robot takes by its clock, besides driving.
+        seconds: how long the simulated robot takes by its clock, without driving.
         is_idle: whether it leaves the robot and its world as they are, however often it is executed.
         adds_event: whether its event is added for it when it ends; otherwise the function does that.
 
@@ -145,14 +139,14 @@ def skill(
 
 
 class _Declaration:
-    """One function, and what is said of it."""
+    """One function, with the options of its declaration."""
 
     def __init__(self, does: Callable[..., Any], said: Mapping[str, Any]) -> None:
         self.does, self.said = does, said
         self.name = does.__name__
 
     def skill(self) -> Skill:
-        """The skill, which its events are known by from now on."""
+        """Make the skill, and register it by its name."""
         self.check_options()
         self.check_name()
         parameters, returns = self.parameters(), self.returns()
@@ -179,9 +173,8 @@ class _Declaration:
             example=self.said["example"],
         )
         self.check_example(row)
-        _BY_MODULE.setdefault(self.does.__module__, []).append(row)
         known = _DECLARED.get(self.name)
-        if known is None or getattr(known.does, "__module__", "") != PAPER:
+        if known is None or getattr(known.does, "__module__", "") != PAPER_MODULE:
             _DECLARED[self.name] = row
         return row
 
@@ -190,13 +183,13 @@ class _Declaration:
         refuse(self.does, sentence)
 
     def check_options(self) -> None:
-        """Refuse options that are not what they must be."""
-        for name, (fits, wanted) in OPTIONS.items():
+        """Refuse options of the wrong type."""
+        for name, (fits, wanted) in SKILL_OPTIONS.items():
             if not fits(self.said[name]):
                 self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
 
     def check_example(self, row: Skill) -> None:
-        """Refuse an example that is no call of the skill."""
+        """Refuse an example that does not call the skill."""
         if not row.example:
             return
         import ast  # noqa: PLC0415 - children have no use for it
@@ -208,24 +201,27 @@ class _Declaration:
         match call:
             case ast.Call(ast.Name(name)) if name == self.name:
                 return
-        self.wrong(f"the example of {self.name} is no call of it: {row.call}")
+        self.wrong(f"the example of {self.name} does not call it: {row.call}")
 
     def check_name(self) -> None:
         kind = self.said["event"] or self.name
-        if self.name in TAKEN:
+        is_second = isinstance(self.does.__globals__.get(self.name), Skill)
+        if is_second and is_own_module(self.does.__module__):
+            self.wrong(f"there is a skill {self.name} already; choose another name")
+        if self.name in RESERVED_NAMES:
             self.wrong(f"{self.name} is a name that Python, every program or every robot has; choose another")
         if kind in RTL_WORDS:
             self.wrong(f"{kind} means something else in formulas; choose another name")
 
     def parameters(self) -> tuple[Parameter, ...]:
         code = self.does.__code__
-        if code.co_flags & COROUTINE:
+        if code.co_flags & COROUTINE_FLAG:
             self.wrong(f"{self.name} is async, but the function of a skill is not; write def")
         first = self.annotation(code.co_varnames[0]) if code.co_argcount else None
         if (
             not code.co_argcount
             or code.co_kwonlyargcount
-            or code.co_flags & MORE_ARGUMENTS
+            or code.co_flags & MORE_ARGUMENTS_FLAGS
             or value_type(first or object) is not None
         ):
             self.wrong(
@@ -241,9 +237,9 @@ class _Declaration:
                     f"the parameter {name} of {self.name} has no type; write {name}: str, or another one"
                 )
         types = [self.type_of(name, f"the type of the parameter {name}") for name in names]
-        if NOTHING in types:
+        if NO_VALUE in types:
             self.wrong(f"a parameter of {self.name} cannot be None; use {USABLE}")
-        asks = self.returns() == TEXT  # a question lists its options, and returns one of them
+        asks = self.returns() == TEXT_TYPE  # a question lists its options, and returns one of them
         return tuple(
             Parameter(n, t, asks and n == "options" and t == ValueType(is_list=True))
             for n, t in zip(names, types, strict=True)
@@ -329,17 +325,17 @@ class _Declaration:
             self.wrong(
                 f'"{ros}" is no ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
             )
-        odd = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
-        if odd:
-            self.wrong(f"{odd[0]} of {self.name} would be no field of a ROS message; use small letters")
+        unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
+        if unusable:
+            self.wrong(f"{unusable[0]} of {self.name} cannot be a field of a ROS message; use small letters")
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)
 
 
-SORTS = ("room", "object", "object or person", "thing", "")
-COROUTINE, MORE_ARGUMENTS = 0x80, 0x04 | 0x08  # among the flags of code
-OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+SORTS_OF_THINGS = ("room", "object", "object or person", "thing", "")
+COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # among the flags of code
+SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a text such as "open {door}"'),
     "past": (lambda it: isinstance(it, str), "a text"),
     "results": (
@@ -362,7 +358,7 @@ OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "a name, or None",
     ),
     "text": (lambda it: isinstance(it, str), "the name of a parameter"),
-    "names": (lambda it: it in SORTS, "one of " + ", ".join(f'"{one}"' for one in SORTS)),
+    "names": (lambda it: it in SORTS_OF_THINGS, "one of " + ", ".join(f'"{one}"' for one in SORTS_OF_THINGS)),
     "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
     "when_tried": (lambda it: isinstance(it, bool), "True or False"),
     "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number from 0 on"),

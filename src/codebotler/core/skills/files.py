@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import re
-import sys
 from difflib import get_close_matches
-from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.declaration import OPTIONS, declared_by, forget
+from codebotler.core.skills.declaration import SKILL_OPTIONS
+from codebotler.core.skills.own_modules import is_own_module, module_of, place_of
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import OWN, Skill, SkillTable
+from codebotler.core.skills.table import Skill, SkillTable
 
 
 def skills_from(*files: Path | str) -> SkillTable:
@@ -39,47 +38,24 @@ def skills_from(*files: Path | str) -> SkillTable:
 
 def declared_in(path: Path) -> list[Skill]:
     """The skills that a file declares, in its order."""
-    return declared_by(loaded(path).__name__)
+    module = loaded(path)
+    found = [value for value in vars(module).values() if isinstance(value, Skill)]
+    return [row for row in dict.fromkeys(found) if getattr(row.does, "__module__", "") == module.__name__]
 
 
 def files_of(skills: SkillTable) -> dict[str, str]:
     """The names of the files that declare skills of a table, each with the SHA-256 of its content."""
     modules = {getattr(row.does, "__module__", "") for row in skills.rows}
-    paths = {Path(str(sys.modules[name].__file__)) for name in modules if name.startswith(OWN)}
+    paths = {Path(place_of(name)) for name in modules if is_own_module(name)}
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}
 
 
-def skill_in(path: str, name: str) -> Skill:
-    """A skill of a file by its name, in another process, say."""
-    found: Skill = getattr(loaded(Path(path)), name)
-    return found
-
-
 def loaded(path: Path) -> ModuleType:
-    """The module of a file, which is run once."""
+    """The module of a file, which is run once; UserError if it cannot be run."""
     try:
-        source = path.read_bytes()
-    except OSError as error:
-        raise UserError(f"it cannot be read ({error.strerror})", file=path) from None
-    where = str(path.resolve())
-    name = OWN + hashlib.sha256(where.encode() + b"\0" + source).hexdigest()[:16]
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = spec_from_loader(name, None, origin=where)
-    assert spec is not None, "it has a name"
-    module = module_from_spec(spec)
-    module.__file__ = where
-    sys.modules[name] = module
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:  # so that it can import what lies beside it, as a script can
-        sys.path.append(folder)
-    try:
-        exec(compile(source, str(path), "exec", dont_inherit=True), vars(module))  # noqa: S102 - the user's own code
+        return module_of(path)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever the file raises
-        del sys.modules[name]
-        forget(name)
         raise _refused(path, error) from None
-    return module
 
 
 UNKNOWN_OPTION = re.compile(r"skill\(\) got an unexpected keyword argument '(\w+)'")
@@ -95,8 +71,8 @@ def _refused(path: Path, error: BaseException) -> UserError:
     is_ours = isinstance(error, UserError)
     sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
     if named := UNKNOWN_OPTION.match(str(error)):
-        alike = get_close_matches(named[1], OPTIONS, 1)
-        hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(OPTIONS)}"
+        alike = get_close_matches(named[1], SKILL_OPTIONS, 1)
+        hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(SKILL_OPTIONS)}"
         sentence = f"@skill has no option {named[1]}; {hint}"
     return UserError(sentence, file=path, line=lines[-1] if lines else None)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from codebotler.core.skills.declaration import skill
+from codebotler.core.skills.kinds import CHECK, GOTO, SAY
 from codebotler.core.skills.simulation import Simulation
 from codebotler.core.skills.table import RosAction, SkillTable
 from codebotler.core.skills.verbs import Verb
@@ -41,7 +42,7 @@ def get_all_rooms(sim: Simulation) -> list[str]:
         *("look for", "looks for", "looked for", "looking for", "looked around"),
         results=("not found", "found"),
     ),
-    event="check",
+    event=CHECK,
     adds_event=False,
     names="object or person",
     ros=RosAction("IsInRoom", "/is_in_room_server", ("string object",), "bool"),
@@ -55,7 +56,7 @@ def is_in_room(sim: Simulation, entity: str) -> bool:
 
 @skill(
     verb=Verb("go to", "drives to", "went to", "going to"),
-    event="goto",
+    event=GOTO,
     names="room",
     when_tried=True,
     adds_event=False,
@@ -94,7 +95,7 @@ def ask(sim: Simulation, person: str, question: str, options: list[str]) -> str:
 )
 def say(sim: Simulation, message: str) -> None:
     """Say a message aloud in the room the robot is in."""
-    sim.record("say", message)
+    sim.record(SAY, message)
 
 
 @skill(

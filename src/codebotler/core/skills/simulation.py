@@ -1,4 +1,4 @@
-"""What the functions of skills can do to a robot in a simulated world."""
+"""The operations that functions of skills have on a robot in a simulated world."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, NoReturn, Protocol
 
 
 class Simulation(Protocol):
-    """What a skill can do to a robot in a simulated world; whatever fails is a RobotError."""
+    """A robot in a simulated world, as functions of skills see it; each failure is a RobotError."""
 
     @property
     def room(self) -> str:
@@ -24,7 +24,7 @@ class Simulation(Protocol):
         """Whether an object or a person is here."""
 
     def ask(self, person: str, question: str, options: Sequence[Any]) -> Any:  # noqa: ANN401 - an option, or its number
-        """Ask somebody here, who chooses one of the options."""
+        """Ask a person here, who chooses one of the options."""
 
     def take(self, obj: str) -> None:
         """Pick up an object that is here."""
@@ -40,10 +40,10 @@ class Simulation(Protocol):
         """What skills remember from one call to the next; empty when a run begins."""
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of the skill's type
-        """What comes of a skill of which nobody says what it does: a result of its type, or its error."""
+        """A random result of a skill without code: a value of its type, or one of its errors."""
 
     def truth(self, statement: str) -> bool:
-        """Whether a statement is true in this world: as its file says under `truths`, or else by lot."""
+        """Whether a statement is true in this world: as its file says under `truths`, or else at random."""
 
     def fail(self, kind: str) -> NoReturn:
         """End the skill with an error that it declares under `fails`."""

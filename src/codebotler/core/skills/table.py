@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from typing import Any, NoReturn, SupportsIndex
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.values import TEXT, ValueType, possible, written_call
+from codebotler.core.skills.own_modules import find_in, place_of
+from codebotler.core.skills.values import TEXT_TYPE, ValueType, possible, written_call
 from codebotler.core.skills.verbs import Verb
 
 
@@ -18,7 +18,7 @@ class Parameter:
     """One argument of a skill."""
 
     name: str  # by which a program may pass it
-    type: ValueType = TEXT
+    type: ValueType = TEXT_TYPE
     is_options: bool = False  # whether it lists the options of a question, which may be of any type
 
     @property
@@ -34,7 +34,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Recording:
-    """What a skill leaves in the trace."""
+    """The event that a skill leaves in the trace."""
 
     kind: str  # of the event, and its name in RTL, such as `goto`
     text: str  # the parameter whose value is the event's text; empty if it has none
@@ -55,7 +55,7 @@ class Recording:
         return self.names == "room"
 
 
-PACKAGE = "robot_actions_pkg"
+ROS_PACKAGE = "robot_actions_pkg"
 """Of the actions of the paper's skills."""
 
 
@@ -68,7 +68,7 @@ class RosAction:
     goal: tuple[str, ...] = ()  # its fields, in the order of the skill's parameters
     result: str | None = None  # the type of its only field, if it has one
     failure: str = ""  # the kind of its only error; if it is empty, the robot names the kind
-    package: str = PACKAGE
+    package: str = ROS_PACKAGE
 
     @property
     def definition(self) -> str:
@@ -89,7 +89,7 @@ class Skill:
         recording: its event in the trace; None for skills without one.
         ros: the action on a robot.
         verb: for people; without one, they read the skill's name and its arguments.
-        seconds: how long the simulated robot takes by its clock, besides driving.
+        seconds: how long the simulated robot takes by its clock, without driving.
         is_idle: whether it leaves the robot and its world as they are, however often it is executed.
         does: what it does to a simulated robot, its first argument.
         adds_event: whether the robot adds its event; otherwise, what it does adds that by itself.
@@ -116,11 +116,11 @@ class Skill:
         name = getattr(self.does, "__module__", "")
         module = sys.modules.get(name)
         if module is not None and getattr(module, self.name, None) is self:
-            return _declared_in, (module.__file__ if name.startswith(OWN) else name, self.name)
+            return find_in, (place_of(name), self.name)
         return super().__reduce_ex__(protocol)
 
     def doing(self, does: Callable[..., Any]) -> Skill:
-        """The same skill, which does something else."""
+        """Return this skill with another function."""
         return replace(self, does=does, is_idle=False)
 
     @property
@@ -130,7 +130,7 @@ class Skill:
 
     @property
     def is_by_lot(self) -> bool:
-        """Whether its function has no code, so that lots decide what comes of it."""
+        """Whether its function has no code, so that its results are random."""
         return hasattr(self.does, "__wrapped__")
 
     @property
@@ -165,19 +165,6 @@ def _sample(parameter: Parameter) -> object:
     else:
         one = parameter.name if value.base == "str" else possible(replace(value, is_list=False))[0]
     return [one] if value.is_list else one
-
-
-OWN = "codebotler_skills_"
-"""How the names of modules begin that files of a user's own skills are."""
-
-
-def _declared_in(module: str, name: str) -> Skill:
-    if module.endswith(".py"):
-        from codebotler.core.skills.files import skill_in  # noqa: PLC0415 - which needs this module
-
-        return skill_in(module, name)
-    found: Skill = getattr(import_module(module), name)
-    return found
 
 
 @dataclass(frozen=True)
@@ -225,20 +212,20 @@ class SkillTable(Mapping[str, Skill]):
         return f"SkillTable({', '.join(self)})"
 
     def with_skill(self, skill: Skill) -> SkillTable:
-        """This table and one more row."""
+        """Return this table with one more row."""
         return SkillTable((*self.rows, skill))
 
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """This table and those rows of another one that it lacks."""
+        """Return this table with the rows of another one that it lacks."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def without(self, names: Iterable[str]) -> SkillTable:
-        """The rows of this table that have none of these names."""
+        """Return this table without the rows that have these names."""
         left_out = {*names}
         return SkillTable(tuple(row for row in self.rows if row.name not in left_out))
 
     def doing(self, **does: Callable[..., Any]) -> SkillTable:
-        """The same skills, of which some do something else."""
+        """Return these skills, some with another function."""
         return SkillTable(tuple(s.doing(does[s.name]) if s.name in does else s for s in self.rows))
 
     @property

@@ -1,4 +1,4 @@
-"""The types of what skills are given and return: what fits them, and how they are written."""
+"""The types of arguments and results of skills: which values fit, and how programs write them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from typing import Any, Literal, TypeAlias, get_args, get_origin
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
-LARGEST = 2**53  # of whole numbers, which JSON and robots carry exactly
+LARGEST_WHOLE_NUMBER = 2**53  # of whole numbers, which JSON and robots carry exactly
 BASES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
 
 
 @dataclass(frozen=True)
 class ValueType:
-    """What a skill takes or returns.
+    """The type of an argument or a result of a skill.
 
     Args:
         base: the type of a single value; None for nothing at all.
-        is_list: whether it is a list of such values.
+        is_list: whether it is a list of these values.
         choices: the only values that fit, if they are listed.
         enum: what the function of the skill gets for a choice, where it wants no plain value.
     """
@@ -73,7 +73,7 @@ class ValueType:
             return False
         if isinstance(value, float) and not isfinite(value):
             return False
-        if given is int and abs(value) > LARGEST:  # type: ignore[arg-type]  # a whole number
+        if given is int and abs(value) > LARGEST_WHOLE_NUMBER:  # type: ignore[arg-type]  # a whole number
             return False
         return not self.choices or value in self.choices
 
@@ -92,11 +92,11 @@ PLURALS: Mapping[Base, str] = {
     "float": "numbers",
     "bool": "truth values",
 }
-TEXT, TRUTH, NOTHING = ValueType(), ValueType("bool"), ValueType(None)
+TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None)
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
-    """What a function has returned, with the values of enumerations in their place."""
+    """A result without enumerations: each member is replaced by its value."""
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.value if isinstance(value, Enum) else value
@@ -105,7 +105,7 @@ def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
 def value_type(annotation: object) -> ValueType | None:
     """The type that an annotation means; None if it is none of those that skills can have."""
     if annotation is None or annotation is type(None):
-        return NOTHING
+        return NO_VALUE
     if isinstance(annotation, type) and annotation in BASES:
         return ValueType(BASES[annotation])
     if isinstance(annotation, type) and issubclass(annotation, Enum):
@@ -127,16 +127,16 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def possible(value: ValueType) -> tuple[Any, ...]:
-    """Some values of a type, from which a result is drawn by lot."""
+    """Some values of a type, of which a random one is the result."""
     if value.is_list:
         some = possible(ValueType(value.base, choices=value.choices))
         return [some[0]], [], [some[0], some[-1]]
     if value.base is None:
         return (None,)
-    return value.choices or SOME[value.base]
+    return value.choices or SAMPLE_VALUES[value.base]
 
 
-SOME: Mapping[Base, tuple[Scalar, ...]] = {
+SAMPLE_VALUES: Mapping[Base, tuple[Scalar, ...]] = {
     "bool": (True, False),
     "int": (1, 0, 2, 10),
     "float": (1.0, 0.0, 0.5, 100.0),

@@ -5,68 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
-PAST: Mapping[str, str] = {
-    **dict.fromkeys(
-        ("beat", "cut", "hit", "let", "put", "quit", "read", "reset", "set", "shut", "split"), ""
-    ),
-    "bend": "bent",
-    "bind": "bound",
-    "blow": "blew",
-    "bring": "brought",
-    "build": "built",
-    "buy": "bought",
-    "catch": "caught",
-    "choose": "chose",
-    "come": "came",
-    "dig": "dug",
-    "do": "did",
-    "draw": "drew",
-    "drive": "drove",
-    "feed": "fed",
-    "find": "found",
-    "fly": "flew",
-    "get": "got",
-    "give": "gave",
-    "go": "went",
-    "grind": "ground",
-    "hang": "hung",
-    "hear": "heard",
-    "hold": "held",
-    "keep": "kept",
-    "lay": "laid",
-    "lead": "led",
-    "leave": "left",
-    "lend": "lent",
-    "light": "lit",
-    "make": "made",
-    "meet": "met",
-    "ride": "rode",
-    "ring": "rang",
-    "run": "ran",
-    "say": "said",
-    "see": "saw",
-    "seek": "sought",
-    "send": "sent",
-    "shake": "shook",
-    "show": "showed",
-    "sit": "sat",
-    "speak": "spoke",
-    "spin": "spun",
-    "stand": "stood",
-    "stick": "stuck",
-    "sweep": "swept",
-    "swing": "swung",
-    "take": "took",
-    "teach": "taught",
-    "tell": "told",
-    "throw": "threw",
-    "turn": "turned",
-    "wear": "wore",
-    "wind": "wound",
-    "write": "wrote",
-}
-"""The past of irregular verbs that robots may need; empty where it is the verb itself."""
+IRREGULAR_VERBS = """
+    beat/beat bend/bent bind/bound blow/blew bring/brought build/built buy/bought catch/caught
+    choose/chose come/came cut/cut dig/dug do/did draw/drew drive/drove feed/fed find/found fly/flew
+    get/got give/gave go/went grind/ground hang/hung hear/heard hit/hit hold/held keep/kept lay/laid
+    lead/led leave/left lend/lent let/let light/lit make/made meet/met put/put quit/quit read/read
+    reset/reset ride/rode ring/rang run/ran say/said see/saw seek/sought send/sent set/set
+    shake/shook show/showed shut/shut sit/sat speak/spoke spin/spun split/split stand/stood
+    stick/stuck sweep/swept swing/swung take/took teach/taught tell/told throw/threw turn/turned
+    wear/wore wind/wound write/wrote
+"""
+PAST: Mapping[str, str] = dict(re.findall(r"(\w+)/(\w+)", IRREGULAR_VERBS))
+"""The past of irregular verbs that robots may need."""
 
 STRESSED_AT_THE_END = frozenset(
     {
@@ -74,7 +26,10 @@ STRESSED_AT_THE_END = frozenset(
         *("permit", "refer", "reset", "submit", "transfer", "unplug"),
     }
 )
-PLACE = re.compile(r"\{(\w+)\}")
+PARAMETER = re.compile(r"\{(\w+)\}")
+
+
+VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
 
 
 @dataclass(frozen=True)
@@ -107,10 +62,10 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
     head = head.lower()
     if not (head.isascii() and head.isalpha()):
         raise ValueError(f'the verb "{template}" must begin with a verb such as "open"')
-    for name in PLACE.findall(template):
+    for name in PARAMETER.findall(template):
         if name not in parameters:
             raise ValueError(f'the verb "{template}" names {{{name}}}, which is no parameter')
-    if set("{}") & set(PLACE.sub("", template)):
+    if set("{}") & set(PARAMETER.sub("", template)):
         raise ValueError(f'the verb "{template}" has a brace that is no parameter in braces')
     fixed, brace, _ = rest.partition("{")
     particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
@@ -122,7 +77,7 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
         base, third, before, ing = (f"{form} {particle}".strip() for form in forms)
         return Verb(base, third, before, ing, results=results)
     order = {name: str(number) for number, name in enumerate(parameters)}
-    return Verb(*forms, results=results, object=PLACE.sub(lambda found: f"{{{order[found[1]]}}}", rest))
+    return Verb(*forms, results=results, object=PARAMETER.sub(lambda found: f"{{{order[found[1]]}}}", rest))
 
 
 def _third(verb: str) -> str:
@@ -133,7 +88,7 @@ def _third(verb: str) -> str:
 
 def _past(verb: str) -> str:
     if verb in PAST:
-        return PAST[verb] or verb
+        return PAST[verb]
     if verb.endswith("e"):
         return f"{verb}d"
     return f"{verb[:-1]}ied" if re.search(r"[^aeiou]y$", verb) else f"{_doubled(verb)}ed"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from codebotler.core.skills.declaration import INSIDE
+from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.world import Room, crossings
 from codebotler.rtl import And, EventPattern, Exists, Formula, Not
 from codebotler.simulator.rule_guard import Rule

@@ -232,15 +232,6 @@ class RosRobot:
             return "another worker has cancelled all goals"
 
 
-def class_for(options: Options) -> type[RosRobot]:
-    """The class of a robot that offers an action for each skill, or what the options' connection says."""
-    if options.connection is None:
-        return RosRobot
-    from codebotler.robots.ros.connected import ConnectedRobot  # noqa: PLC0415 - needs much more
-
-    return ConnectedRobot
-
-
 def ros_readiness(
     name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
 ) -> Readiness:

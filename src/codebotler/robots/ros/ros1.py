@@ -8,7 +8,8 @@ from urllib.parse import urlsplit
 
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.robot import OTHER_PYTHON, RosRobot, Waits, class_for, ros_readiness
+from codebotler.robots.ros.classes import class_for
+from codebotler.robots.ros.robot import OTHER_PYTHON, RosRobot, Waits, ros_readiness
 
 MASTER = "http://localhost:11311"
 NEEDS = ("rospy", "actionlib", "actionlib_msgs", "genpy", "genmsg", "netifaces")

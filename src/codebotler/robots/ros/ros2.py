@@ -11,7 +11,8 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.robot import RosRobot, Waits, class_for, ros_readiness
+from codebotler.robots.ros.classes import class_for
+from codebotler.robots.ros.robot import RosRobot, Waits, ros_readiness
 from codebotler.robots.ros.worker import lacks
 
 NEEDS = ("rclpy", "action_msgs", "sensor_msgs")

@@ -8,7 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.robot import RosRobot, Waits, class_for
+from codebotler.robots.ros.classes import class_for
+from codebotler.robots.ros.robot import RosRobot, Waits
 
 ADDRESS = "ws://localhost:9090"
 NOTE = "robots of ROS 2 behind it were tested against a stand-in for the protocol only"

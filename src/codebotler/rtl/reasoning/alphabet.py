@@ -6,12 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import Any, overload
 
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Option
 from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.rtl.semantics import is_match
 
-ANYTHING = Regex("")
+ANY_TEXT = Regex("")
 
 
 def elements(formula: Formula) -> Iterator[EventPattern]:
@@ -48,7 +49,7 @@ def alphabet(
     held = _texts([element.holding for alike in kinds.values() for element in alike], nothing="")
     events: list[Event] = []
     for kind, alike in kinds.items():
-        moves_by = moves if kind == "goto" else None
+        moves_by = moves if kind == GOTO else None
         aspects = [
             [
                 Event(kind, text, options, more=more)
@@ -63,7 +64,7 @@ def alphabet(
             ],
             [
                 Event(kind, "", place=place)
-                for place in (places if kind != "goto" or any(e.place for e in alike) else [""])
+                for place in (places if kind != GOTO or any(e.place for e in alike) else [""])
             ],
             [
                 Event(kind, "", holding=holding, to=to)
@@ -82,9 +83,9 @@ def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
         EventPattern(
             kind, element.text, element.options, element.mention, more=element.more, offers=element.offers
         ),
-        EventPattern(kind, ANYTHING, answer=element.answer, found=element.found),
-        EventPattern(kind, ANYTHING, place=element.place),
-        EventPattern(kind, ANYTHING, holding=element.holding, to=element.to),
+        EventPattern(kind, ANY_TEXT, answer=element.answer, found=element.found),
+        EventPattern(kind, ANY_TEXT, place=element.place),
+        EventPattern(kind, ANY_TEXT, holding=element.holding, to=element.to),
     )
 
 
@@ -93,7 +94,7 @@ def _distinct_events(
 ) -> Iterable[Event]:
     """Of all events that can be made of some aspects, the first for each set of elements that it matches.
 
-    There can be hundreds of thousands, so that each is told by the elements that match its aspects, as bits.
+    There can be hundreds of thousands, so that bits for the elements that match its aspects identify each.
     """
     patterns = zip(*map(aspects_of, alike), strict=True)
     matched = [
@@ -143,10 +144,10 @@ def _texts(wanted: Sequence[Text | None]) -> list[str | None]: ...
 @overload
 def _texts(wanted: Sequence[Text | None], nothing: str) -> list[str]: ...
 def _texts(wanted: Sequence[Text | None], nothing: str | None = None) -> list[Any]:
-    """Texts that match in all combinations, and what stands for there being none."""
+    """Texts that match in all combinations, with a placeholder for a missing text."""
     texts = _distinct(wanted)
     strings = distinct_strings(texts, outer=True) if texts else ()
-    if nothing == "":  # which stands for there being none, so that an empty text needs another spelling
+    if nothing == "":  # the placeholder for a missing text, so that an empty text needs another spelling
         strings = tuple(string or "x" for string in strings if string or _is_as_empty("x", texts))
     return [*dict.fromkeys([nothing, *strings])]
 

@@ -13,7 +13,7 @@ from codebotler.rtl import formulas
 MOST_STATES = 1_000
 """States that an automaton may have before it is minimized."""
 
-State: TypeAlias = Hashable
+AutomatonState: TypeAlias = Hashable
 Letter: TypeAlias = frozenset[formulas.EventPattern]
 """The elements of a formula that match an event."""
 
@@ -34,7 +34,7 @@ class Automaton:
     def of(cls, formula: formulas.Formula, letters: tuple[Letter, ...]) -> Automaton:
         """The automaton of a formula, reading these letters."""
         machine = machine_of(formula)
-        number: dict[State, int] = {machine.start: 0}
+        number: dict[AutomatonState, int] = {machine.start: 0}
         rows: list[list[int]] = []
         states = [machine.start]
         for state in states:  # the list grows as the loop runs
@@ -71,7 +71,7 @@ class Automaton:
 
     @cached_property
     def distances(self) -> tuple[int | None, ...]:
-        """For each state, the fewest events to an accepting one; None if none can be reached."""
+        """For each state, the fewest events to an accepting one; None if there is no way to one."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
         distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
         while border:
@@ -85,8 +85,8 @@ class Automaton:
 class Machine(NamedTuple):
     """An automaton before its states are numbered."""
 
-    start: State
-    step: Callable[[Any, Letter], State]
+    start: AutomatonState
+    step: Callable[[Any, Letter], AutomatonState]
     accepts: Callable[[Any], bool]
 
 
@@ -140,7 +140,7 @@ def _counter(element: formulas.EventPattern, number: int, most: int) -> Machine:
 
 
 def _during_stays(test: formulas.ActAtSome) -> Machine:
-    def step(state: str, letter: Letter) -> State:
+    def step(state: str, letter: Letter) -> AutomatonState:
         stays = state == "there" and test.departure not in letter
         if state == "done" or (stays and test.element in letter):
             return "done"
@@ -158,19 +158,19 @@ def _within(scope: formulas.Scope, inner: Machine) -> Machine:
     match scope.name.removeprefix("Only"):
         case "BeforeFirst":
 
-            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401 - as in Machine
+            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - as in Machine
                 came, here = state
                 return (True, here) if came or at in letter else (False, step(here, letter))
 
         case "AfterFirst":
 
-            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401 - of whichever part it is
+            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - of whichever part it is
                 came, here = state
                 return (True, start) if not came and at in letter else (came, step(here, letter))
 
         case "AfterLast":
 
-            def read(state: Any, letter: Letter) -> State:  # noqa: ANN401 - of whichever part it is
+            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - of whichever part it is
                 came, here = state
                 return (True, start) if at in letter else (came, step(here, letter))
 

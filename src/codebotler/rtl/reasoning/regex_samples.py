@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 
 from codebotler.rtl.formulas import Regex
-from codebotler.rtl.pattern import FLAGS, Tree, parse_tree
+from codebotler.rtl.pattern import PATTERN_FLAGS, Tree, parse_tree
 
 _MOST_SAMPLES = 4
 _MOST_SPELLED = 16
@@ -23,7 +23,7 @@ def failing(pattern: str) -> re.Pattern[str]:
     tree = parse_tree(pattern)
     _loosen(tree)
     tree.append(parse_tree("(?!)")[0])
-    compiled: re.Pattern[str] = import_module("re._compiler").compile(tree, FLAGS)
+    compiled: re.Pattern[str] = import_module("re._compiler").compile(tree, PATTERN_FLAGS)
     return compiled
 
 
@@ -111,7 +111,9 @@ def _spelled_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: A
 def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
     """Some characters of a set, those that it names first; a single one if it holds nearly all."""
     parser = import_module("re._parser")
-    one = import_module("re._compiler").compile(parser.SubPattern(parser.State(), [(op, arguments)]), FLAGS)
+    one = import_module("re._compiler").compile(
+        parser.SubPattern(parser.State(), [(op, arguments)]), PATTERN_FLAGS
+    )
     members = arguments if str(op) == "IN" else []
     codes = [codes for kind, codes in members if str(kind) in {"LITERAL", "RANGE"}]
     ends = [chr(end) for each in codes for end in (each if isinstance(each, tuple) else (each,))]

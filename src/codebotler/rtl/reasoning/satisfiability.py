@@ -13,6 +13,7 @@ from itertools import chain, compress, count
 from operator import getitem
 from typing import TypeAlias
 
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Trace
 from codebotler.rtl.formulas import Formula, Not
 from codebotler.rtl.reasoning.alphabet import alphabet, elements
@@ -41,12 +42,12 @@ class Reasoner:
         wanted = [*dict.fromkeys(chain.from_iterable(map(elements, formulas)))]
         rooms = None if moves is None else [*dict.fromkeys([start, *moves.values()])]
         events = alphabet(wanted, rooms, None if moves is None else [*moves])
-        if moves is not None and all(event.kind != "goto" for event in events):
-            events += [Event("goto", move) for move in moves]
+        if moves is not None and all(event.kind != GOTO for event in events):
+            events += [Event(GOTO, move) for move in moves]
         distinct: dict[tuple[object, ...], tuple[list[bool], Event]] = {}
         for event in events:
             row = [matches(element, (event,), 0) for element in wanted]
-            where = () if moves is None else (event.place, event.text if event.kind == "goto" else "")
+            where = () if moves is None else (event.place, event.text if event.kind == GOTO else "")
             distinct.setdefault((*row, *where), (row, event))
         rows, self.events = [row for row, _ in distinct.values()], [event for _, event in distinct.values()]
         self._matched = dict(zip(wanted, zip(*rows, strict=True), strict=True))
@@ -119,7 +120,7 @@ class Reasoner:
 def _driving(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
     """The automaton of the traces in which each event happens where the robot is."""
     lost = len(rooms)
-    kinds = [(event.text if event.kind == "goto" else "", event.place) for event in events]
+    kinds = [(event.text if event.kind == GOTO else "", event.place) for event in events]
     number = {kind: index for index, kind in enumerate(dict.fromkeys(kinds))}
     rows = [
         tuple(

@@ -73,7 +73,7 @@ _PLACE = re.compile(
     r"|(?:all|each|every) (?:the )?)$",
     re.IGNORECASE,
 )
-NEAR = 30  # characters before a thing, in which such words are looked for
+NEAR_CLAIM = 30  # characters before a thing, in which such words are looked for
 
 
 def _word(pattern: str) -> re.Pattern[str]:
@@ -103,12 +103,12 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
         (match.start(), -match.end(), kind)
         for kind, regex in enumerate(kinds)
         for match in regex.finditer(text)
-        if kind == 0 or not _PLACE.search(text, max(0, match.start() - NEAR), match.start())
+        if kind == 0 or not _PLACE.search(text, max(0, match.start() - NEAR_CLAIM), match.start())
     ]
-    reached = -1
+    last_end = -1
     for start, end, kind in sorted(named):
-        if -end > reached:
-            reached = -end
+        if -end > last_end:
+            last_end = -end
             yield start, -end, kind
 
 

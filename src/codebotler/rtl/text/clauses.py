@@ -62,7 +62,7 @@ _NO_SUBJECT = re.compile(
 _SINGULAR = re.compile(r"\b(?:(is|was|has|does)|are|were|have|do)(?:\b|n['\u2019]t)", re.IGNORECASE)
 # After such a word a clause lists nothing: `Bob is in`, `butter is missing`, `Alice has accepted`.
 _STATES = r"(?:there|here|in|out|gone|(?:un)?available|absent|yes|no|not|too|\w+(?:ed|ing))\b"
-NEAR = 40  # characters at the end of a clause, in which such a word is looked for
+NEAR_CLAUSE_END = 40  # characters at the end of a clause, in which such a word is looked for
 _STATE = re.compile(rf"\b{_STATES}\W*$", re.IGNORECASE)
 _LACK = re.compile(r"\b(?:missing|lacking|absent|unavailable|gone)\b", re.IGNORECASE)
 _UNFINISHED = re.compile(
@@ -244,7 +244,7 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
         return contrasts[-1]
     if done and joints[0] not in (",", "and"):  # what follows a contrast is none of what comes before it
         return 0
-    may_list = bool(done) and _STATE.search(done[-1][-NEAR:]) is None
+    may_list = bool(done) and _STATE.search(done[-1][-NEAR_CLAUSE_END:]) is None
     has_no_subject = _NO_SUBJECT.match(part.text) is not None and (may_list or joints[-1] == "and")
     if done and (has_no_subject or _SUBJECT.match(part.text)):
         return len(waiting)

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.trace import Names
 
-SHORT, REMEMBERED = 200, 1_000  # characters of a text that is remembered, and how many texts
+SHORT_TEXT, MOST_REMEMBERED_TEXTS = 200, 1_000  # characters of a text that is remembered, and how many texts
 
 
 class Matcher(ABC):
@@ -21,8 +21,8 @@ class Matcher(ABC):
         found = known.get(text)
         if found is None:
             found = self._matches(text)
-            if len(text) <= SHORT:
-                if len(known) >= REMEMBERED:
+            if len(text) <= SHORT_TEXT:
+                if len(known) >= MOST_REMEMBERED_TEXTS:
                     known.clear()
                 known[text] = found
         return found

@@ -91,7 +91,7 @@ def _is_ignored(match: re.Match[str], text: str) -> bool:
 
 
 def _is_pronoun(match: re.Match[str], before: str) -> bool:
-    """Whether `one` stands for something, as in `some one` and `would take one`."""
+    """Whether `one` means a thing, as in `some one` and `would take one`."""
     return _PRONOUN.search(before) is not None or (
         _TAKES.search(before) is not None and _LAST.match(match.string, match.end()) is not None
     )

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import msgspec
 
 from codebotler.core.skills.table import Parameter, SkillTable
-from codebotler.core.skills.values import TEXT, Scalar
+from codebotler.core.skills.values import TEXT_TYPE, Scalar
 from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, kept
@@ -205,6 +205,6 @@ def _fits(parameter: Parameter, given: object) -> bool:
 def signatures(skills: SkillTable) -> dict[str, tuple[type, ...]]:
     """The types of the arguments of each skill, where that is all there is to them."""
     return {
-        skill.name: tuple(str if p.type == TEXT else object for p in skill.parameters)
+        skill.name: tuple(str if p.type == TEXT_TYPE else object for p in skill.parameters)
         for skill in skills.rows
     }

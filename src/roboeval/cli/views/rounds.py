@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rich.console import Group, RenderableType
@@ -12,7 +13,26 @@ from roboeval.analysis.metrics import judged_count
 from roboeval.cli.views.results import ruled
 
 if TYPE_CHECKING:
-    from roboeval.cli.rounds import Round
+    from roboeval.analysis.summary import Summary
+
+
+@dataclass(frozen=True)
+class Round:
+    """How a round of a run did.
+
+    Args:
+        number: from 0, for the first programs.
+        summary: the verdicts on all programs after it.
+        requests: how many programs were requested in it.
+        accepted: how many programs the check accepts after it.
+        tokens: the tokens of its requests, as far as the model counts them.
+    """
+
+    number: int
+    summary: Summary
+    requests: int
+    accepted: int
+    tokens: int
 
 
 def rounds_view(rounds: Sequence[Round], *, repairs: bool) -> RenderableType:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Trace, trace_from
 from codebotler.rtl import Formula
 from codebotler.rtl.reasoning.alphabet import elements
 
 CIRCUMSTANCES = ("places", "holding", "to", "destinations")
-DRIVE = "goto"
 
 
 def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
@@ -28,7 +28,7 @@ def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
     """
     places = [event.place for event in trace]
     places += [event.destination or event.place for event in trace[-1:]]  # where the robot is at the end
-    drives = [number for number, event in enumerate(trace, 1) if event.kind == DRIVE]
+    drives = [number for number, event in enumerate(trace, 1) if event.kind == GOTO]
     led = [(number, trace[number - 1].destination) for number in drives]
     found = {
         "places": _changes(places, None),
@@ -81,7 +81,7 @@ def trace_of(verdict: Mapping[str, Any]) -> Trace:
             asked[event.kind] = to[number]
         seen = event.kind, event.text, event.options, event.answer, event.found
         led = None
-        if event.kind == DRIVE:
+        if event.kind == GOTO:
             led = destinations.get(number, places.get(number + 1, here))
         events.append(Event(*seen, here, 0.0, held, asked.get(event.kind), event.more, led))
     return tuple(events)

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from itertools import pairwise
 
-from codebotler.core.program import TASK
+from codebotler.core.program import TASK_FUNCTION
 from roboeval.mutation.operator import Context, Edits
 from roboeval.mutation.program_tree import ProgramTree, expression, is_pause, rewritten, skill_of, skills_in
 
@@ -152,7 +152,7 @@ def give_up(program: ProgramTree, _: Context) -> Edits:
 def stop_half_way(program: ProgramTree, _: Context) -> Edits:
     """Ends before all is done."""
     for node in program.nodes:
-        if isinstance(node, ast.FunctionDef) and node.name == TASK:
+        if isinstance(node, ast.FunctionDef) and node.name == TASK_FUNCTION:
             doing = [s for s in node.body[:-1] if skills_in(s) and not isinstance(s, ast.Return)]
             yield from ({statement: [statement, ast.Return()]} for statement in doing)
 

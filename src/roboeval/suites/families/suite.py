@@ -6,7 +6,7 @@ import hashlib
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 
 from codebotler.core.errors import UserError
@@ -15,7 +15,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted, listed
 from codebotler.models.recorded import InstructionSolutions, Solution
 from roboeval.suites.families.tasks import TrainedTask, family_names, suite_file, trained_task
-from roboeval.suites.load import Suite
+from roboeval.suites.suite import Suite
 from roboeval.suites.task import Task
 
 SIZE = 1_000_000_000
@@ -114,7 +114,7 @@ def _suite(which: FamilyTasks, skills: SkillTable) -> Suite:
         tasks={name: _named(name, one) for name, one in made.items()},
         digest=hashlib.sha256("\n".join([str(head.version), *digests]).encode()).hexdigest(),
         skills=skills,
-        families=which,
+        families=asdict(which),
         recorded=tuple(solutions for one in made.values() for solutions in _recorded(one)),
     )
 

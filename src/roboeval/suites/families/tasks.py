@@ -19,12 +19,12 @@ from codebotler.core.files import read_text
 from codebotler.core.program import Flaw, parsed
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import listed
-from codebotler.core.world_file import Name, Text
+from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.formulas import And
 from codebotler.rtl.syntax import parse
-from roboeval.suites.load import Suite
 from roboeval.suites.schema import MOST_WORLDS, SuiteFile
+from roboeval.suites.suite import Suite
 from roboeval.suites.task import Requirement, Task
 from roboeval.suites.taskfile import read_task
 
@@ -60,7 +60,7 @@ class WrongProgram(_Form):
     """A program that does not do what was asked, or not all of it."""
 
     about: Name
-    program: Text
+    program: YamlText
 
 
 class FamilyFile(_Form):
@@ -78,7 +78,7 @@ class FamilyFile(_Form):
     about: Name
     choose: dict[Name, Choice]
     task: dict[str, Any]
-    solution: Text
+    solution: YamlText
     wrong: Annotated[tuple[WrongProgram, ...], Field(min_length=1)]
 
 

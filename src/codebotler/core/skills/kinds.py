@@ -1,0 +1,14 @@
+"""The kinds of events: those of the paper's skills, and the one that house rules see of a robot's pose."""
+
+from __future__ import annotations
+
+from typing import Final
+
+GOTO: Final = "goto"
+SAY: Final = "say"
+ASK: Final = "ask"
+CHECK: Final = "check"
+PICK: Final = "pick"
+PLACE: Final = "place"
+INSIDE: Final = "inside"
+"""The robot's pose has entered a room; no skill does that."""

@@ -1,0 +1,61 @@
+"""Runs files of a user's own skills, each once, as modules that any process can find again."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from types import ModuleType
+
+from codebotler.core.errors import UserError
+
+OWN_MODULES = "codebotler_skills_"
+"""How the names of these modules begin."""
+
+
+def is_own_module(name: str) -> bool:
+    """Whether a module with this name is a file of a user's own."""
+    return name.startswith(OWN_MODULES)
+
+
+def module_of(path: Path) -> ModuleType:
+    """The module of a file, which is run once; whatever the file raises is raised here.
+
+    Raises:
+        UserError: the file cannot be read.
+    """
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"it cannot be read ({error.strerror})", file=path) from None
+    where = str(path.resolve())
+    name = OWN_MODULES + hashlib.sha256(where.encode() + b"\0" + source).hexdigest()[:16]
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = spec_from_loader(name, None, origin=where)
+    assert spec is not None, "it has a name"
+    module = module_from_spec(spec)
+    module.__file__ = where
+    sys.modules[name] = module
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:  # so that the file can import its neighbours, like a script
+        sys.path.append(folder)
+    try:
+        exec(compile(source, str(path), "exec", dont_inherit=True), vars(module))  # noqa: S102 - the user's own code
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def place_of(module: str) -> str:
+    """Where another process finds a module: the path of a user's own file, or the module's name."""
+    return str(sys.modules[module].__file__) if is_own_module(module) else module
+
+
+def find_in(place: str, name: str) -> object:
+    """Return what a module calls `name`; `place_of` says where the module is."""
+    module = module_of(Path(place)) if place.endswith(".py") else import_module(place)
+    return getattr(module, name)

@@ -1,0 +1,41 @@
+import pytest
+
+from codebotler.core.phrases import NO_ANSWER, phrase
+from codebotler.core.skills.verbs import VerbForm
+from codebotler.core.trace import Event, Option
+
+TEA = Event("ask", "Tea?", (Option("yes"), Option("2", is_text=False)), answer="yes")
+
+
+@pytest.mark.parametrize("form", ["base", "third", "past", "ing"])
+@pytest.mark.parametrize(
+    ("event", "parts"),
+    [
+        (Event("goto", "kitchen"), ["kitchen"]),
+        (Event("pick", "mug"), ["up", "mug"]),
+        (Event("check", "mug", found=False), ["mug", "not found"]),
+        (Event("vote", "tea"), ["vote", "tea"]),
+        (TEA, ["Tea?"]),
+    ],
+)
+def test_a_phrase_names_texts_and_results_in_every_form(
+    event: Event, parts: list[str], form: VerbForm
+) -> None:
+    assert [part for part in parts if part not in phrase(event, form)] == []
+    assert (("yes" in phrase(event, form)) == (event is TEA)) or form == "third"
+
+
+def test_a_question_has_its_options_where_the_verb_is_finite() -> None:
+    unanswered = Event("ask", "Tea?", TEA.options)
+    forms: list[VerbForm] = ["base", "third", "past", "ing"]
+    bracketed = [form for form in forms if "[yes | 2 (no text)]" in phrase(TEA, form)]
+    assert bracketed == ["third", "past"]
+    assert phrase(unanswered, "past").endswith(NO_ANSWER)
+    assert NO_ANSWER not in phrase(unanswered, "third")
+
+
+def test_texts_are_shown_and_quoted_as_the_caller_wants() -> None:
+    event = Event("pick", "mug")
+    assert '"' not in phrase(event, "past", quote="")
+    assert "MUG" in phrase(event, "past", show=str.upper)
+    assert len(phrase(Event("say", "x" * 500), "past")) < 100
