@@ -105,7 +105,8 @@ class LiveRobot:
         """Let time pass by the robot's clock, or raise StoppedError."""
         self._check_end()
         seconds = max(0.0, now - self.now)
-        self._note("sleep", seconds=round(seconds, 3))
+        at = {} if self.line is None else {"line": self.line}
+        self._note("sleep", seconds=round(seconds, 3), **at)
         self.robot.clock.wait(seconds)
         self._check_end()
 

@@ -409,7 +409,7 @@ class MissionSession:
         with self._lock:
             self._events.append(line)
             view = self._view
-            changes: dict[str, object] = {"progress": view.progress.after(line, view.program)}
+            changes: dict[str, object] = {"progress": view.progress.after(line)}
             if line["event"] == "state":
                 changes |= {"state": State(line["state"]), "reason": line.get("reason", "")}
                 changes["line"] = line.get("line")

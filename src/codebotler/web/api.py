@@ -71,24 +71,24 @@ class AskAgainForm(_Form):
     )
 
 
-class AnyText(JSONResponse):
-    """JSON in ASCII, which can hold the half characters of a program."""
+class AsciiJSONResponse(JSONResponse):
+    """JSON in ASCII, which can hold the lone surrogates of a program."""
 
     def render(self, content: object) -> bytes:
         """The response's body."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
-def refused(_request: Request, error: Exception) -> AnyText:
+def refused(_request: Request, error: Exception) -> AsciiJSONResponse:
     """Say what is wrong with a request, without sending it back."""
     assert isinstance(error, RequestValidationError), "registered for this error alone"
     told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
-    return AnyText({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
+    return AsciiJSONResponse({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(console: Console) -> APIRouter:
     """The addresses of the API."""
-    api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AnyText)
+    api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AsciiJSONResponse)
     _add_missions(api, console)
     _add_changes(api, console)
     _add_events(api, console)
@@ -100,13 +100,13 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
         """All missions, oldest first."""
-        with _refusing():
+        with as_http_errors():
             return [asdict(summary) for summary in missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
         """Begin a mission; writing and checking go on in the background. Refused while a mission runs."""
-        with _refusing():
+        with as_http_errors():
             session = console.begin(Order(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
         if not session.view.id:
@@ -137,7 +137,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         ] = "wall",
     ) -> Response:
         """The events as MCAP, which Foxglove opens."""
-        with _refusing(), installed():
+        with as_http_errors(), installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
 
         summary, events = _past(console, mission)
@@ -152,14 +152,14 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Replace the program; it is checked in the background."""
         _at_hand(console, mission)
-        with _refusing():
+        with as_http_errors():
             return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
         """Have the model write another program, which is then checked."""
         session = _at_hand(console, mission)
-        with _refusing():
+        with as_http_errors():
             session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
         return view_data(session.view)
 
@@ -167,7 +167,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
         """Run the program that the person saw, and no other."""
         session = _at_hand(console, mission)
-        with _refusing():
+        with as_http_errors():
             session.approve(approval.program, despite_problems=approval.despite_problems)
         return view_data(session.view)
 
@@ -201,7 +201,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
         """Check a program by the house rules, in the rooms of the current mission if there is one."""
-        with _refusing():
+        with as_http_errors():
             return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])
@@ -303,7 +303,7 @@ def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
 
 
 @contextmanager
-def _refusing() -> Iterator[None]:
+def as_http_errors() -> Iterator[None]:
     try:
         yield
     except MissionError as error:
