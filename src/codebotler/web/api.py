@@ -304,6 +304,7 @@ def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
 
 @contextmanager
 def as_http_errors() -> Iterator[None]:
+    """Answer our own errors with a status and a sentence."""
     try:
         yield
     except MissionError as error:

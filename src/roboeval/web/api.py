@@ -112,6 +112,7 @@ def _json(data: object) -> Response:
 
 @contextmanager
 def as_http_errors() -> Iterator[None]:
+    """Answer our own errors with a status and a sentence."""
     try:
         yield
     except MissingError as error:
