@@ -12,10 +12,11 @@ from typing import TypeAlias
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.batches.replay import outcomes
-from codebotler.simulator.fork_server import BatchServer, ForkServer
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import SkillPerformer, kept
-from codebotler.simulator.preparer import Prepared, Preparer
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
+from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.preparer_client import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER

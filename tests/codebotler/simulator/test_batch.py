@@ -23,9 +23,10 @@ from codebotler.core.skills.values import TEXT
 from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key_of
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import FEW, LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME

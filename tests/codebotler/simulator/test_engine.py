@@ -22,12 +22,14 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator import isolated_process, pool
+from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
-from codebotler.simulator.fork_server import BatchServer
-from codebotler.simulator.isolated_process import LostProcessError, compiled_file
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import FEW, WorkerPool
+from codebotler.simulator.process import bytecode, spawn
+from codebotler.simulator.process.errors import LostProcessError
+from codebotler.simulator.process.fork_server_client import BatchServer
+from codebotler.simulator.process.spawn import compiled_file
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, PREPARER
@@ -444,7 +446,7 @@ def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_an
 
 
 def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 1.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.LONGEST", 1.0)
 
     def slow(robot: SimulatedRobot, message: str) -> None:
         time.sleep(2.5)
@@ -621,13 +623,13 @@ def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     def compiled(file: str, shown: str) -> bytes:
         prelude = LIKE_MACOS if shown == "<codebotler.simulator.sandbox>" else ""
         source = Path(file).read_text(encoding="utf-8")
-        return isolated_process.compiled_source(
+        return bytecode.compiled_source(
             source.replace('"""The isolated', prelude + '"""The isolated', 1), shown
         )
 
     with TemporaryFile() as file:
-        monkeypatch.setattr(isolated_process, "compiled_file", lambda *_: file)
-        file.write(isolated_process.compiled_modules(compiled, BATCH_SERVER))
+        monkeypatch.setattr(spawn, "compiled_file", lambda *_: file)
+        file.write(bytecode.compiled_modules(compiled, BATCH_SERVER))
         file.flush()
         programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
         outcomes = list(run([(program, WORLD) for program in programs], workers=1))
@@ -725,7 +727,7 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
 
 HANDED_OVER = f"""
 from hashlib import sha256
-from codebotler.simulator.isolated_process import compiled, compiled_modules
+from codebotler.simulator.process.bytecode import compiled, compiled_modules
 print(sha256(compiled_modules(compiled, {FORK_SERVER!r})).hexdigest())
 """
 
@@ -770,14 +772,14 @@ def test_an_interrupt_while_code_is_compiled_leaves_nothing_open(monkeypatch: py
         raise KeyboardInterrupt
 
     before = set(Path("/proc/self/fd").iterdir())
-    monkeypatch.setattr(isolated_process, "compiled_modules", interrupted)
+    monkeypatch.setattr(spawn, "compiled_modules", interrupted)
     with pytest.raises(KeyboardInterrupt):
         compiled_file("no role that was compiled before")
     assert set(Path("/proc/self/fd").iterdir()) == before
 
 
 def test_a_limit_on_the_size_of_files_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(isolated_process, "_written_file", isolated_process._written_file.__wrapped__)
+    monkeypatch.setattr(spawn, "_written_file", spawn._written_file.__wrapped__)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
     try:

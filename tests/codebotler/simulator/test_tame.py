@@ -13,7 +13,7 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.preparer import LONG, Prepared, Preparer, is_exhausted
+from codebotler.simulator.process.preparer_client import LONG, Prepared, Preparer, is_exhausted
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import tame

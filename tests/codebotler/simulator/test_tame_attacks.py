@@ -27,7 +27,8 @@ from codebotler.core.trace import Outcome, Status, trace_data
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
