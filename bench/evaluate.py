@@ -20,12 +20,13 @@ from functools import cache, partial
 from itertools import chain, count, groupby, repeat
 from pathlib import Path
 
+from codebotler.simulator.rules import PAPER, Rules
+
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
 from codebotler.simulator.batches.replay import REPLAYED
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled
 from roboeval.evaluation.engines import Local, Work

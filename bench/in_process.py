@@ -15,13 +15,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any, Protocol, Self, TypeAlias
 
+from codebotler.simulator.fork_server import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
+from codebotler.simulator.rules import PAPER, Rules
+
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
-from codebotler.simulator.fork_server import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
 from codebotler.simulator.ledger import texts_in
 from codebotler.simulator.robot import Argument, SimulatedRobot
-from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.sandbox import REFUSED, execution
 from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fuel import prepared

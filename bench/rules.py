@@ -22,6 +22,8 @@ from functools import cache, lru_cache, partial
 from itertools import chain, count, repeat
 from pathlib import Path
 
+from codebotler.simulator.rules import finds, resolve_room
+
 from check import Source, real
 from codebotler.checking.check import checks_on
 from codebotler.checking.problems import Check, Sample
@@ -37,7 +39,6 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
-from codebotler.simulator.rules import finds, resolve_room
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge

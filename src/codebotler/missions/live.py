@@ -20,8 +20,8 @@ from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names_of
-from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
 TELLING = 6.0  # seconds within which a robot has been told to stop
 
@@ -60,7 +60,7 @@ class LiveRobot:
         self._guard, self._room_map = guard, room_map
         self.on_broken: Callable[[RuleViolationError], None] = lambda _: self.stop()
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
-        self.rules = Rules(literals="as-written", limits=ENDLESS, clock_starts=starts)
+        self.rules = SimulationSettings(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # of the program, which calls a skill there
         self._place, self._held = place, ""
         self._here = [place]  # where the robot may be, as rules name it

@@ -18,8 +18,8 @@ from codebotler.simulator.process.fork_server_client import BatchServer, ForkSer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.process.preparer_client import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import SkillProtocol
 
 EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
@@ -130,7 +130,7 @@ class Worker:
         lowercase = robot.rules.literals == "lowercase"
         return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
 
-    def begin_to_prepare(self, source: str, skills: SkillTable, rules: Rules) -> None:
+    def begin_to_prepare(self, source: str, skills: SkillTable, rules: SimulationSettings) -> None:
         """Compile a program while the caller makes ready the robots with which it will run next."""
         try:
             self._preparer.ask_ahead(source, lowercase=rules.literals == "lowercase", skills=tuple(skills))

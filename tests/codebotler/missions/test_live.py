@@ -19,7 +19,7 @@ from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, Result, RobotLostError
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
-from codebotler.simulator.rules import PAPER
+from codebotler.simulator.settings import PAPER
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from roboeval.suites.load import Suite

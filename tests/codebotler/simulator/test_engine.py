@@ -31,15 +31,15 @@ from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.spawn import compiled_file
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, PREPARER
+from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
 OTHER = World((Room("elsewhere"),), "elsewhere")
-AS_WRITTEN = Rules(literals="as-written")
+AS_WRITTEN = SimulationSettings(literals="as-written")
 FUTEX = {"x86_64": 202, "aarch64": 98}
 LIBRARY = 'sys.modules["_ctypes"].dlopen(None, 0)'
 
@@ -547,7 +547,7 @@ def test_suite_sets_the_limits() -> None:
         "for i in range(3): say('abcde')": "texts of more than 12 characters in all",
     }
     pairs = ((f"def task_program():\n    {body}\n", WORLD) for body in bodies)
-    outcomes = run(pairs, workers=1, rules=Rules(limits=limits))
+    outcomes = run(pairs, workers=1, rules=SimulationSettings(limits=limits))
     assert [outcome.error.message for outcome in outcomes if outcome.error] == list(bodies.values())
 
 
@@ -759,7 +759,9 @@ def task_program():
 def test_a_fork_server_compiles_next_to_nothing_and_modules_name_no_folder() -> None:
     """Compiling the standard library would take most of its start; a path would differ between machines."""
     worker = Worker(one_process_per_run=True)
-    outcome = worker.run(MODULES_TOLD, lambda: SimulatedRobot(WORLD, Rules(literals="as-written")))
+    outcome = worker.run(
+        MODULES_TOLD, lambda: SimulatedRobot(WORLD, SimulationSettings(literals="as-written"))
+    )
     worker.close()
     number, compiled, *told = said(outcome)
     assert int(number) > 200

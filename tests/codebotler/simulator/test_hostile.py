@@ -37,8 +37,8 @@ from codebotler.simulator.process.exit_status import PROCESSOR_TIME
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import BATCH_SERVER
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import judge
 from roboeval.suites.load import Requirement, Scenario
@@ -47,7 +47,7 @@ BURN = {  # all the processor time that there is; another one does so in `make t
     *("cpu_counter_replaced", "cpu_power", "cpu_recursion_by_except", "cpu_regex", "cpu_uncounted_code"),
 }
 PROGRAMS = sorted((Path(__file__).parents[2] / "hostile").glob("*.py"))
-AS_WRITTEN = Rules(literals="as-written")
+AS_WRITTEN = SimulationSettings(literals="as-written")
 SECRET = "hush-" + os.urandom(8).hex()
 MARKER = "i-was-here-" + os.urandom(8).hex()
 NOBODY = 65534

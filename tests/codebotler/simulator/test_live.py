@@ -15,8 +15,8 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.rules import ENDLESS, PAPER
 from codebotler.simulator.sandbox import LIVE_SERVER, PROGRAM
+from codebotler.simulator.settings import ENDLESS, PAPER
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 

@@ -29,7 +29,7 @@ SIMULATION = (
         for name in ("cachedproperty", "errors", "regex_flags", "trace", "unicode", "words", "world")
     ),
     *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py")) if path.stem != "files"),
-    *(f"{SIMULATOR}.{name}" for name in ("fact_sampler", "ledger", "robot", "rules", "sampled_robot")),
+    *(f"{SIMULATOR}.{name}" for name in ("fact_sampler", "ledger", "robot", "settings", "sampled_robot")),
 )
 
 
