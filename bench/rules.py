@@ -22,8 +22,6 @@ from functools import cache, lru_cache, partial
 from itertools import chain, count, repeat
 from pathlib import Path
 
-from codebotler.simulator.rules import finds, resolve_room
-
 from check import Source, real
 from codebotler.checking.check import checks_on
 from codebotler.checking.problems import Check, Sample
@@ -40,6 +38,7 @@ from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.settings import finds, resolve_room
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.source import recorded_completions
