@@ -25,7 +25,7 @@ from codebotler.core.world import Room, World
 from codebotler.simulator.batches.replay import REPLAYED
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import PAPER, Rules
+from codebotler.simulator.settings import PAPER, SimulationSettings
 from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled
 from roboeval.evaluation.engines import Local, Work
@@ -59,7 +59,7 @@ def pairs(suite: Suite) -> list[Pair]:
 # --- the three ways
 
 
-def isolated(pool: WorkerPool, rules: Rules, part: Sequence[Pair]) -> list[Status]:
+def isolated(pool: WorkerPool, rules: SimulationSettings, part: Sequence[Pair]) -> list[Status]:
     """Ours: isolated, a few programs in a child, each in all of its worlds."""
     REPLAYED.clear()  # what other times have left
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
@@ -88,7 +88,7 @@ def forget(time: int) -> None:  # noqa: ARG001 - once for each time
     compiled.cache_clear()
 
 
-def run_bare(part: Sequence[Pair], time: int = 0, rules: Rules = PAPER) -> None:
+def run_bare(part: Sequence[Pair], time: int = 0, rules: SimulationSettings = PAPER) -> None:
     """Run pairs in this process."""
     forget(time)
     for pair in part:
@@ -99,7 +99,7 @@ NOWHERE = World((Room("nowhere"),), "nowhere")
 
 
 def in_process(
-    processes: ProcessPoolExecutor, times: Iterator[int], rules: Rules, part: Sequence[Pair]
+    processes: ProcessPoolExecutor, times: Iterator[int], rules: SimulationSettings, part: Sequence[Pair]
 ) -> None:
     """No isolation: the same programs in as many processes."""
     share = -(-len(part) // (8 * WORKERS))

@@ -18,14 +18,14 @@ from typing import IO, Any, Protocol, Self, TypeAlias
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
-from codebotler.simulator.fork_server import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
 from codebotler.simulator.ledger import texts_in
+from codebotler.simulator.process.fork_server_client import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
 from codebotler.simulator.robot import Argument, SimulatedRobot
-from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.sandbox import REFUSED, execution
 from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.sandbox.preparer import answer
+from codebotler.simulator.settings import PAPER, SimulationSettings
 from codebotler.simulator.skill_protocol import described, settings_of
 
 CPU_SECONDS = 30
@@ -94,7 +94,7 @@ class Reused(Bare):
         time.sleep = self.sleep
         self.provided = dict(vars(self.namespace))
 
-    def run(self, pair: tuple[str, World], rules: Rules = PAPER) -> None:
+    def run(self, pair: tuple[str, World], rules: SimulationSettings = PAPER) -> None:
         """Run a program in a world."""
         source, world = pair
         code = compiled(source)
@@ -212,7 +212,7 @@ class OrdinaryProcess:
         rules: how the worlds are simulated.
     """
 
-    def __init__(self, rules: Rules = PAPER) -> None:
+    def __init__(self, rules: SimulationSettings = PAPER) -> None:
         self.rules = rules
         surroundings = {"PYTHONHASHSEED": "0", "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"}
         self._process = subprocess.Popen(

@@ -37,8 +37,8 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
-from codebotler.simulator.rules import finds, resolve_room
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.settings import finds, resolve_room
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.source import recorded_completions

@@ -17,10 +17,10 @@ from pathlib import Path
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
-from codebotler.simulator.rules import Limits, Rules
+from codebotler.simulator.settings import Limits, SimulationSettings
 
 PYTHONS_OWN = re.compile("0x[0-9a-f]+|(?<=maximum recursion depth exceeded)[a-z ]+", re.IGNORECASE)
-RULES = Rules(limits=Limits(ticks=2_000, calls=60))
+RULES = SimulationSettings(limits=Limits(ticks=2_000, calls=60))
 AMY = Person("amy", ("yes", "no", "hello|kitchen", ".*"))
 WORLD = World(
     (

@@ -530,6 +530,3 @@ def test_pages(served: PageServer, opened: OpenPage, shoot: Shoot, screen: Scree
     page.locator("summary", has_text="The world").first.click()
     expect(page.locator(".unfolded .floorplan")).to_be_visible()
     look("completion")
-    page.goto(f"http://localhost:{served.port}/api")
-    expect(page.locator("h1")).to_be_visible()
-    look("runs-api")

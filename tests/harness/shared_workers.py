@@ -14,8 +14,8 @@ from typing import TypeVar
 import pytest
 
 from codebotler.core.trace import Outcome
-from codebotler.simulator.fork_server import ForkServer
 from codebotler.simulator.ledger import SkillPerformer
+from codebotler.simulator.process.fork_server_client import ForkServer
 from codebotler.simulator.worker import NOTHING, EngineError, Job, Meanwhile, NewRobot, Worker
 
 Started = TypeVar("Started")

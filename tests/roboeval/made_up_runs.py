@@ -10,7 +10,7 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 from made_results import VERDICT, results_of
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run
@@ -24,7 +24,7 @@ SUITE = Suite(
     "small",
     1,
     "small tasks",
-    Rules(),
+    SimulationSettings(),
     {n: replace(TASK, name=n, path=Path(f"{n}.yaml")) for n in NAMES},
     "0" * 64,
 )

@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console, RenderableType
 
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.load import Suite, Task
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800\n"
@@ -26,7 +26,7 @@ TASK = Task(
     accepted=(),
     path=Path("Visit.yaml"),
 )
-SUITE = Suite("small", 1, "", Rules(), {"Visit": TASK, "Wait": replace(TASK, name="Wait")}, "0")
+SUITE = Suite("small", 1, "", SimulationSettings(), {"Visit": TASK, "Wait": replace(TASK, name="Wait")}, "0")
 
 
 def row(

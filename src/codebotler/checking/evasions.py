@@ -18,7 +18,7 @@ from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.rule_guard import Rule
-from codebotler.simulator.rules import resolve_room
+from codebotler.simulator.settings import resolve_room
 
 ACTS = {"drive": GOTO, "take": PICK, "put": PLACE, "look": CHECK, "ask": ASK}
 """The kind of event that each method of a simulated robot adds."""

@@ -17,8 +17,8 @@ from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError, names_of
-from codebotler.simulator.rules import finds
 from codebotler.simulator.sampled_robot import PEOPLE
+from codebotler.simulator.settings import finds
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
 ALWAYS_BROKEN = "all that a robot can do breaks it"

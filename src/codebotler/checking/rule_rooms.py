@@ -12,7 +12,7 @@ from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.rule_guard import Rule
-from codebotler.simulator.rules import found_in
+from codebotler.simulator.settings import found_in
 
 
 def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:

@@ -15,10 +15,10 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.words import listed
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.isolated_process import PROCESSOR_TIME
+from codebotler.simulator.process.exit_status import PROCESSOR_TIME
 from codebotler.simulator.rule_guard import Rule, RuleGuard
-from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import NOTHING, Job, Meanwhile, Worker
 
 SAMPLES, MOST_SAMPLES = 5, 10_000
@@ -34,7 +34,7 @@ class CheckSettings:
     samples: int = SAMPLES
     seed: int = 0  # of the worlds: the same ones on every machine
     strict: bool = False  # whether to draw also what the program takes for granted
-    rules: Rules = AS_WRITTEN
+    rules: SimulationSettings = AS_WRITTEN
     skills: SkillTable = SKILLS
     house_rules: tuple[Rule, ...] = ()  # what a program must keep to in every world
 

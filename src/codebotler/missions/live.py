@@ -22,8 +22,8 @@ from codebotler.robots import base
 from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names_of
-from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
 
 class Note(Protocol):
@@ -62,7 +62,7 @@ class LiveRobot:
         self._button = button or StopButton(robot)
         self.broken_rule: dict[str, object] = {}  # the log entry of the rule that stopped the mission
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
-        self.rules = Rules(literals="as-written", limits=ENDLESS, clock_starts=starts)
+        self.rules = SimulationSettings(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # of the program, which calls a skill there
         self._place, self._held = place, ""
         self._here = [place]  # where the robot may be, as rules name it
@@ -93,7 +93,8 @@ class LiveRobot:
         """Let time pass by the robot's clock, or raise StoppedError."""
         self._check_end()
         seconds = max(0.0, now - self.now)
-        self._note("sleep", seconds=round(seconds, 3))
+        at = {} if self.line is None else {"line": self.line}
+        self._note("sleep", seconds=round(seconds, 3), **at)
         self.robot.clock.wait(seconds)
         self._check_end()
 

@@ -76,7 +76,7 @@ def write_mcap(
     writer = Writer(file)
     writer.start(profile="", library=f"codebotler {__version__}")
     channels: dict[str, int] = {}
-    skills, way = _Skills(events), _Way(summary.program)
+    skills, way = _Skills(events), _Way()
 
     def time(line: Line) -> int:
         seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
@@ -167,8 +167,8 @@ class _Skills:
 class _Way:
     """The rooms, and the robot's way through them."""
 
-    def __init__(self, program: str) -> None:
-        self._program, self._progress = program, Progress()
+    def __init__(self) -> None:
+        self._progress = Progress()
         self._world: World | None = None
         self._at: Point | None = None
 
@@ -178,7 +178,7 @@ class _Way:
             self._world = map_from(line)
             yield Item(ROOMS, foxglove.scene_update(self._world.rooms, at), "foxglove.SceneUpdate")
         else:
-            self._progress = self._progress.after(line, self._program)
+            self._progress = self._progress.after(line)
         now, before = self._position(), self._at
         if now is None or now == before:
             return

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
 
-from codebotler.core.program import parsed
 from codebotler.core.skills import kinds
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.table import Recording
@@ -55,7 +50,7 @@ class Progress:
     skill: str = ""  # the skill under way
     subject: str = ""  # its first argument
     activity: str = ""  # the skill in words, such as `driving to supply room`, also once it is cancelled
-    line: int | None = None  # of the program, which calls the skill under way; None if that is not known
+    line: int | None = None  # of the program, that waits for a skill or sleeps; None if unknown
     clock: float = 0.0  # seconds by the robot's clock since the program began
     room: str = ""  # the destination, or the last that was reached, in the program's words
     left: str = ""  # the room before it, in which the robot still is if it cannot go
@@ -70,8 +65,8 @@ class Progress:
     held: str = ""  # what the robot holds
     moments: tuple[Moment, ...] = ()  # the last 200
 
-    def after(self, line: Line, program: str) -> Progress:
-        """The progress after one more event of a program."""
+    def after(self, line: Line) -> Progress:
+        """The progress after one more event."""
         event = line["event"]
         if event == "state":
             return self.with_state(State(line["state"]), line["clock"])
@@ -80,14 +75,9 @@ class Progress:
             place = AT.search(line["text"])
             return now.moved((float(place[1]), float(place[2]))) if place else now
         if event == "skill":
-            now = now.with_skill(line, program)
+            now = now.with_skill(line)
         elif event == "sleep" and line["seconds"]:
-            now = replace(
-                now,
-                doing=event_text(line),
-                activity=activity(line),
-                line=line_of(program, "sleep", (line["seconds"],)),
-            )
+            now = replace(now, doing=event_text(line), activity=activity(line), line=line.get("line"))
         elif event in SKILL_ENDS:
             now = now.with_result(line["result"]) if event == "result" else now.with_failure(event)
             still = self.activity if event == "cancelled" else ""
@@ -104,19 +94,19 @@ class Progress:
         clock = self.clock if state in STOPS else max(self.clock, clock)
         return replace(self, clock=clock, has_begun=self.has_begun or state is State.RUNNING)
 
-    def with_skill(self, line: Line, program: str) -> Progress:
+    def with_skill(self, line: Line) -> Progress:
         """The progress when a skill begins."""
         name = line["skill"]
         recording = _recording(name)
         drives = recording is not None and recording.is_drive
-        arguments = tuple(map(_plain, line["arguments"].values()))
+        subject = next(iter(line["arguments"].values()), "")
         now = replace(
             self,
             doing=event_text(line),
             skill=name,
-            line=line.get("line") or line_of(program, name, arguments),
+            line=line.get("line"),
             is_driving=drives,
-            subject=str(next(iter(arguments), "")).strip(),
+            subject=str(subject).strip(),
             activity=activity(line),
         )
         return replace(now, room=now.subject, left=self.room) if drives else now
@@ -193,48 +183,3 @@ def _moment(line: Line, words: str) -> Moment:
     if event == "result" and spoken and spoken.options:
         return Moment(clock, ANSWER, shortened(str(line["result"])))
     return Moment(clock, event, words)
-
-
-def _plain(argument: object) -> object:
-    return tuple(argument) if isinstance(argument, list) else argument
-
-
-def line_of(program: str, skill: str, given: Sequence[object]) -> int | None:
-    """The line of a program that calls a skill, or `sleep`, with these arguments; None if several do."""
-    lines = {line for line, fixed in _calls(program).get(skill, ()) if _fits(fixed, given)}
-    return lines.pop() if len(lines) == 1 else None
-
-
-UNKNOWN: Any = object()
-
-
-def _fits(fixed: Sequence[object], given: Sequence[object]) -> bool:
-    return all(one is UNKNOWN or one == other for one, other in zip(fixed, given, strict=False))
-
-
-@lru_cache(maxsize=16)
-def _calls(program: str) -> Mapping[str, Sequence[tuple[int, tuple[object, ...]]]]:
-    """The calls of each skill and of `sleep`, with the arguments that are constants."""
-    tree = parsed(program)
-    if not isinstance(tree, ast.Module):
-        return {}
-    found: dict[str, list[tuple[int, tuple[object, ...]]]] = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and (name := _name_of(node.func)):
-            found.setdefault(name, []).append((node.lineno, tuple(_values(node))))
-    return found
-
-
-def _name_of(function: ast.expr) -> str:
-    """The name of a skill, or `sleep`; empty for other functions."""
-    if isinstance(function, ast.Name) and (function.id == "sleep" or by_name(function.id)):
-        return function.id
-    is_sleep = isinstance(function, ast.Attribute) and function.attr == "sleep"
-    return "sleep" if is_sleep else ""
-
-
-def _values(call: ast.Call) -> Iterator[object]:
-    for argument in call.args:
-        if isinstance(argument, ast.Starred):
-            return
-        yield argument.value if isinstance(argument, ast.Constant) else UNKNOWN

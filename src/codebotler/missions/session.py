@@ -334,7 +334,7 @@ class MissionSession:
         """Take an event of the mission, which holds its lock meanwhile."""
         with self._lock:
             self._events.append(line)
-            self._change(progress=self._view.progress.after(line, self._view.program))
+            self._change(progress=self._view.progress.after(line))
         self.on_event(line)
 
     def _show(self, **changes: object) -> None:

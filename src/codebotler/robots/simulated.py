@@ -24,9 +24,9 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import ENDLESS, WORDS_FOR_PEOPLE, Rules, resolve_room
+from codebotler.simulator.settings import ENDLESS, WORDS_FOR_PEOPLE, SimulationSettings, resolve_room
 
-ROBOT_RULES = Rules(
+ROBOT_RULES = SimulationSettings(
     literals="as-written", people="own-name-or-word", words_for_people=WORDS_FOR_PEOPLE, limits=ENDLESS
 )
 METRES_PER_SECOND = 0.5

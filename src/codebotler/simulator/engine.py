@@ -14,14 +14,14 @@ from codebotler.core.trace import Outcome
 from codebotler.core.world import World
 from codebotler.simulator.pool import WorkerPool, cores
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import PAPER, Rules
+from codebotler.simulator.settings import PAPER, SimulationSettings
 
 
 def run(
     pairs: Iterable[tuple[str, World]],
     *,
     workers: int | None = None,
-    rules: Rules = PAPER,
+    rules: SimulationSettings = PAPER,
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:

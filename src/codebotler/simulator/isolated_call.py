@@ -21,13 +21,10 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 
-from codebotler.simulator.isolated_process import (
-    ONE_AT_A_TIME,
-    IsolatedProcess,
-    LostProcessError,
-    ProtocolError,
-    cause_of_death,
-)
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.exit_status import cause_of_death
+from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.spawn import ONE_AT_A_TIME
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter

@@ -11,7 +11,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
-from codebotler.simulator.rules import Limits, Rules
+from codebotler.simulator.settings import Limits, SimulationSettings
 
 FEW = 50  # calls of which nothing is remembered
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
@@ -27,7 +27,7 @@ REFUSED: SkillAnswer = ("stop", True)
 class SkillPerformer(Protocol):
     """A robot, as a run needs it; executing a skill may take as long as it likes."""
 
-    rules: Rules
+    rules: SimulationSettings
     skills: SkillTable
     is_live: bool  # time passes by itself: sleeping takes it, and each skill refuels the program
     line: int | None  # of a live program, which asks for something there

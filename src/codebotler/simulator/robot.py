@@ -18,7 +18,15 @@ from codebotler.core.skills.values import Scalar, as_text, plain, possible, writ
 from codebotler.core.trace import Event, Option, Trace, attempted, options_of
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.rules import PAPER, Matching, Rules, choose, finds, is_called, resolve_room
+from codebotler.simulator.settings import (
+    PAPER,
+    Matching,
+    SimulationSettings,
+    choose,
+    finds,
+    is_called,
+    resolve_room,
+)
 
 if TYPE_CHECKING:
     from codebotler.simulator.rule_guard import RuleGuard
@@ -56,7 +64,7 @@ class Somebody:
         """Whether they are in the room now."""
         return self.looks_before == 0 and not self.is_gone
 
-    def answer(self, question: str, rules: Rules) -> Answer | None:
+    def answer(self, question: str, rules: SimulationSettings) -> Answer | None:
         """What they answer, if anything."""
         for topic, answer in self.person.topics:
             if finds(question, topic, rules.matching):
@@ -77,7 +85,7 @@ class SimulatedRobot:
     def __init__(
         self,
         world: World,
-        rules: Rules = PAPER,
+        rules: SimulationSettings = PAPER,
         skills: SkillTable = SKILLS,
         *,
         guard: RuleGuard | None = None,

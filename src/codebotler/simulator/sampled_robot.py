@@ -20,12 +20,12 @@ from codebotler.core.words import brief
 from codebotler.core.world import Room, World, laid_out
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.robot import SimulatedRobot, Thing, no_room, own_skills
-from codebotler.simulator.rules import Rules, finds
+from codebotler.simulator.settings import SimulationSettings, finds
 
 if TYPE_CHECKING:
     from codebotler.simulator.rule_guard import RuleGuard
 
-AS_WRITTEN = Rules(literals="as-written")  # for a program that a robot is to run: nothing in it is changed
+AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves a program unchanged, as a robot will run it
 
 SOMEBODY = "somebody"
 PEOPLE = frozenset(  # words that mean whoever is there
@@ -183,7 +183,7 @@ class SampledRobot(SimulatedRobot):
         self,
         room_map: RoomMap,
         sampler: FactSampler,
-        rules: Rules = AS_WRITTEN,
+        rules: SimulationSettings = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         *,
         guard: RuleGuard | None = None,

@@ -10,13 +10,10 @@ from typing import TypeAlias
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.isolated_process import (
-    IsolatedProcess,
-    LostProcessError,
-    ProtocolError,
-    cause_of_death,
-)
 from codebotler.simulator.ledger import LAST_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.exit_status import cause_of_death
+from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 

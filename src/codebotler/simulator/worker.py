@@ -12,13 +12,14 @@ from typing import TypeAlias
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.batches.replay import outcomes
-from codebotler.simulator.fork_server import BatchServer, ForkServer
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import SkillPerformer, kept
-from codebotler.simulator.preparer import Prepared, Preparer
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
+from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.preparer_client import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import SkillProtocol
 
 EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
@@ -129,7 +130,7 @@ class Worker:
         lowercase = robot.rules.literals == "lowercase"
         return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
 
-    def begin_to_prepare(self, source: str, skills: SkillTable, rules: Rules) -> None:
+    def begin_to_prepare(self, source: str, skills: SkillTable, rules: SimulationSettings) -> None:
         """Compile a program while the caller makes ready the robots with which it will run next."""
         try:
             self._preparer.ask_ahead(source, lowercase=rules.literals == "lowercase", skills=tuple(skills))

@@ -33,7 +33,8 @@ POLICY = (
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
 """`unsafe-eval` and inline styles are what NiceGUI needs: Vue builds its templates and handlers in the
-browser, Quasar and CodeMirror write styles. No inline script runs but those that bear this answer's nonce."""
+browser, Quasar and CodeMirror write styles. The guard writes a nonce into each page because NiceGUI puts the
+page's own content into inline scripts, so no hash is known beforehand, and it has no option for nonces."""
 
 PLAIN_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
 HEADERS = {

@@ -28,7 +28,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
 from codebotler.core.words import listed
 from codebotler.missions.mission import SHUTTING_DOWN
-from codebotler.web import api, api_page, face, page
+from codebotler.web import api, face, page
 from codebotler.web.access import Access, PageAddress, Role
 from codebotler.web.console import Console
 from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
@@ -134,7 +134,6 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
     for pages in further:
         pages.add(Site(app, frame, runs))
     app.add_exception_handler(RequestValidationError, api.refused)
-    api_page.add(app, frame)
     app.mount("/static", StaticFiles(directory=STATIC))
     core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard allows ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]

@@ -27,7 +27,7 @@ from codebotler.rtl import Inconclusive, holds
 from codebotler.rtl.semantics import visible
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.rules import PAPER
+from codebotler.simulator.settings import PAPER
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
 from roboeval.evaluation.failures import NO_PROGRAM, Verdict, failure

@@ -12,14 +12,14 @@ from codebotler.core.words import counted, listed
 from codebotler.core.world import Answer, Person, World
 from codebotler.rtl.regex_words import choices, one_of
 from codebotler.rtl.wording import few, quoted, room_name
-from codebotler.simulator.rules import Rules, choose, finds
+from codebotler.simulator.settings import SimulationSettings, choose, finds
 
 FEWEST_TIMES = 3  # that steps must be repeated to be a cycle
 LONGEST_CYCLE = 100  # steps
 
 
 def remarks_on(
-    verdict: Mapping[str, Any], trace: Trace, world: World | None, rules: Rules | None
+    verdict: Mapping[str, Any], trace: Trace, world: World | None, rules: SimulationSettings | None
 ) -> list[str]:
     """Return sentences that explain a run beside its failed checks; events of the trace have their places."""
     remarks = []
@@ -72,7 +72,7 @@ def cycle_at_end(trace: Trace) -> Cycle | None:
 # --- answers in a fixed order
 
 
-def misplaced_questions(trace: Trace, world: World, rules: Rules) -> Iterator[str]:
+def misplaced_questions(trace: Trace, world: World, rules: SimulationSettings) -> Iterator[str]:
     """Yield a sentence for each room where a question got the answer to another, which does not fit."""
     for room in world.rooms:
         match room.people:
@@ -89,11 +89,11 @@ def misplaced_questions(trace: Trace, world: World, rules: Rules) -> Iterator[st
                 break
 
 
-def _has_topic(question: Event, person: Person, rules: Rules) -> bool:
+def _has_topic(question: Event, person: Person, rules: SimulationSettings) -> bool:
     return any(finds(question.text, topic, rules.matching) for topic, _ in person.topics)
 
 
-def _fits(answer: Answer, question: Event, rules: Rules) -> bool:
+def _fits(answer: Answer, question: Event, rules: SimulationSettings) -> bool:
     """Whether an option says the answer, rather than a yes or a no to it."""
     chosen = choose(answer, question.text, question.options, rules)
     return chosen is not None and (

@@ -14,7 +14,7 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
 from codebotler.rtl.wording import is_clear
-from codebotler.simulator.rules import whole_words
+from codebotler.simulator.settings import whole_words
 from roboeval.evaluation.failures import failure
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of
@@ -168,8 +168,7 @@ def _slow(task: Task) -> Iterator[Finding]:
         if (text := slow_text(pattern)) is not None:
             message = (
                 f"finding the regex {pattern!r} of {one.where} takes much longer the longer a text is, "
-                f"such as {text.prefix + text.unit!r} with {text.unit!r} many times more; let no two repeats "
-                "match the same text"
+                f"such as one that begins with {text!r}; let no two repeats match the same text"
             )
             yield Finding("slow-regex", pattern, message, task.path, one.line)
 

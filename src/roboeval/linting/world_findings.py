@@ -18,7 +18,7 @@ from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
-from codebotler.simulator.rules import resolve_room
+from codebotler.simulator.settings import resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, Kind
 from roboeval.suites.load import Check, Requirement, Scenario, Task

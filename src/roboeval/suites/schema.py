@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from codebotler.core.labels import check_regex
 from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
-from codebotler.simulator.rules import WORDS_FOR_PEOPLE, Limits, Rules
+from codebotler.simulator.settings import WORDS_FOR_PEOPLE, Limits, SimulationSettings
 
 MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
 
@@ -206,7 +206,7 @@ class RulesFile(_Form):
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0
-    clock_starts: Annotated[datetime, BeforeValidator(_moment)] = Rules().clock_starts
+    clock_starts: Annotated[datetime, BeforeValidator(_moment)] = SimulationSettings().clock_starts
 
     @model_validator(mode="before")
     @classmethod
@@ -215,10 +215,10 @@ class RulesFile(_Form):
             return {"words_for_people": WORDS_FOR_PEOPLE, **data}
         return data
 
-    def rules(self) -> Rules:
+    def rules(self) -> SimulationSettings:
         """The rules it describes."""
         values = {name: value for name, value in self if name != "skill_seconds"}
-        return Rules(**values | {"limits": Limits(**dict(self.limits))})
+        return SimulationSettings(**values | {"limits": Limits(**dict(self.limits))})
 
 
 class SuiteFile(_Form):

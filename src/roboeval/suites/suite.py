@@ -17,7 +17,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
 from codebotler.core.yaml_files import YamlFile
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.house import HouseRules
 from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MOST_WORLDS, SuiteFile
@@ -54,7 +54,7 @@ class Suite:
     name: str
     version: int
     about: str
-    rules: Rules
+    rules: SimulationSettings
     tasks: Mapping[str, Task]
     digest: str
     folder: Path | None = None

@@ -41,13 +41,13 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
     @api.get("")
     def list_runs() -> Response:
         """All runs: who wrote them, how far they have come, how many completions pass."""
-        with _refusing():
+        with as_http_errors():
             return _json(all_runs.data())
 
     @api.get("/{run}")
     def show_run(run: str, evaluation: Evaluation = None) -> Response:
         """One run with every prompt and every kind of failure."""
-        with _refusing():
+        with as_http_errors():
             return _json(run_details(store.open(run, evaluation)))
 
     _add_report(api, store)
@@ -61,7 +61,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         limit: Annotated[int, Query(ge=1, le=MOST, description="How many to return.")] = 100,
     ) -> Response:
         """Completions of a run, of a prompt, or those that failed in some way; in order, a part of them."""
-        with _refusing():
+        with as_http_errors():
             found = store.open(run, evaluation).select(chosen)
         part = [entry_data(row) for row in found[offset : offset + limit].iter_rows(named=True)]
         return _json({"total": found.height, "offset": offset, "completions": part})
@@ -71,7 +71,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         run: str, task: str, prompt: int, index: int, evaluation: Evaluation = None
     ) -> Response:
         """One completion: its program, and in each world what the robot did, what failed there, and why."""
-        with _refusing():
+        with as_http_errors():
             snapshot = store.open(run, evaluation)
             row = snapshot.row(name_of((task, prompt, index)))
             if row is None:
@@ -87,7 +87,7 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
     @api.get("/{run}/report")
     def show_report(run: str) -> Response:
         """The report of a run, as `roboeval run` or `roboeval report` has written it there."""
-        with _refusing():
+        with as_http_errors():
             text = store.report(run)
         if text is None:
             raise HTTPException(404, "this run has no report")
@@ -98,7 +98,7 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
     @api.get("/{run}/tables/{table}.csv")
     def show_table(run: str, table: str) -> Response:
         """A table of the report of a run, as CSV."""
-        with _refusing():
+        with as_http_errors():
             text = store.report(run, f"tables/{table}.csv") if TABLE.fullmatch(table) else None
         if text is None:
             raise HTTPException(404, "this run has no such table")
@@ -111,7 +111,8 @@ def _json(data: object) -> Response:
 
 
 @contextmanager
-def _refusing() -> Iterator[None]:
+def as_http_errors() -> Iterator[None]:
+    """Answer our own errors with a status and a sentence."""
     try:
         yield
     except MissingError as error:

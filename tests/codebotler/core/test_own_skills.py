@@ -27,7 +27,7 @@ from codebotler.rtl.syntax import AROUND_WORDS, LOOK_RESULTS, QUESTIONS, TEXT_WO
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
-from codebotler.simulator.rules import PAPER
+from codebotler.simulator.settings import PAPER
 
 HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"
 EVERY = (

@@ -34,14 +34,14 @@ from codebotler.robots.spelling import SpellingRobot
 from codebotler.rtl import parse
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
-from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from doubles import Answering
 
 WORLD = read_world(OFFICE)
 MAP = RoomMap.of(WORLD)
-AS_WRITTEN = Rules(literals="as-written")
+AS_WRITTEN = SimulationSettings(literals="as-written")
 THROUGH = "def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n    say('done')\n"
 SLEEPS = "import time\n\n\ndef task_program():\n    time.sleep(60)\n"
 AROUND = THROUGH.replace("1')\n", "1')\n    go_to('start_loc')\n    go_to('supply room')\n").replace(

@@ -19,7 +19,7 @@ from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, Result, RobotLostError
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
-from codebotler.simulator.rules import PAPER
+from codebotler.simulator.settings import PAPER
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from roboeval.suites.load import Suite
@@ -132,7 +132,9 @@ def test_events_tell_what_was_asked_and_what_came_of_it() -> None:
 def test_everything_is_taken_down_in_order() -> None:
     robot, notes = live(giving(None, "Yes"))
     robot.perform("say", ["hello"])
+    robot.line = 3
     robot.sleep_until(5)
+    robot.line = None
     robot.perform("ask", ["ann", "Tea?", OPTIONS])
     one, two = {"number": 1, "skill": "say"}, {"number": 2, "skill": "ask"}
     named = {"person": "ann", "question": "Tea?", "options": ("Yes", " no ")}
@@ -140,7 +142,7 @@ def test_everything_is_taken_down_in_order() -> None:
         ("skill", {**one, "arguments": {"message": "hello"}}),
         ("feedback", {**one, "text": "doing say"}),
         ("result", {**one, "result": None}),
-        ("sleep", {"seconds": 5}),
+        ("sleep", {"seconds": 5, "line": 3}),
         ("skill", {**two, "arguments": named}),
         ("feedback", {**two, "text": "doing ask"}),
         ("result", {**two, "result": "Yes"}),

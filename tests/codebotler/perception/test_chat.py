@@ -17,7 +17,7 @@ from codebotler.models import rate_limit
 from codebotler.perception import Detector, PerceptionError, Sighting, image_of, jpeg_of, open_detector
 from codebotler.perception.chat import FENCED, LONGEST_REPLY, SYSTEM, TRIES, sighting_in
 from codebotler.perception.open import LOOKING
-from codebotler.rtl.reasoning.backtracking import Attack, is_superlinear
+from codebotler.rtl.reasoning.backtracking import RepeatedText, is_slow
 from server import Fault, Request, Server
 
 PICTURE = Image.new("RGB", (64, 40), (200, 30, 30))
@@ -157,7 +157,7 @@ def test_replies_that_cannot_be_used(reply: str, fault: str) -> None:
 
 @pytest.mark.parametrize("unit", ["\n", " ", " \n", "\n ```"])
 def test_a_fence_is_looked_for_in_linear_time(unit: str) -> None:
-    assert not is_superlinear(FENCED.fullmatch, Attack("```json\n", unit, "x"))
+    assert not is_slow(FENCED.fullmatch, RepeatedText(unit, "```json\n", "x"))
 
 
 def test_model_is_told_what_was_wrong_and_asked_again(server: Server, detector: Detector) -> None:

@@ -13,11 +13,11 @@ from types import CodeType
 import pytest
 
 from codebotler.checking.check import check, check_on
-from codebotler.simulator import isolated_process
-from codebotler.simulator.fork_server import BatchServer, ForkServer
-from codebotler.simulator.isolated_process import IsolatedProcess
 from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
-from codebotler.simulator.preparer import Preparer
+from codebotler.simulator.process import bytecode
+from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
+from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.preparer_client import Preparer
 from codebotler.simulator.sandbox import BATCH_SERVER
 from codebotler.simulator.worker import Worker
 from processes import are_gone
@@ -132,8 +132,8 @@ def test_an_interrupt_ends_the_pool_of_the_process_and_the_next_check_has_anothe
 def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "module.py"
     file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
-    wanted = isolated_process.compiled_source(file.read_text(encoding="utf-8"), "module")
-    assert isolated_process.code_of(str(file), "module") == wanted
+    wanted = bytecode.compiled_source(file.read_text(encoding="utf-8"), "module")
+    assert bytecode.code_of(str(file), "module") == wanted
     get_code = SourceFileLoader.get_code
 
     def without_columns(self: SourceFileLoader, name: str) -> CodeType | None:
@@ -141,16 +141,16 @@ def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pyte
         return code and code.replace(co_linetable=b"")
 
     monkeypatch.setattr(SourceFileLoader, "get_code", without_columns)
-    assert isolated_process.code_of(str(file), "module") == wanted
+    assert bytecode.code_of(str(file), "module") == wanted
 
 
 def test_bytecode_that_is_damaged_is_not_taken(tmp_path: Path) -> None:
     file = tmp_path / "module.py"
     file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
-    wanted = isolated_process.compiled_source(file.read_text(encoding="utf-8"), "module")
-    bytecode = Path(cache_from_source(str(file)))
+    wanted = bytecode.compiled_source(file.read_text(encoding="utf-8"), "module")
+    cached = Path(cache_from_source(str(file)))
     py_compile.compile(str(file), doraise=True)
-    whole = bytecode.read_bytes()
+    whole = cached.read_bytes()
     for damaged in (whole[:20], whole[:16] + b"\xff" * 9, whole[:16] + marshal.dumps(1)):
-        bytecode.write_bytes(damaged)
-        assert isolated_process.code_of(str(file), "module") == wanted
+        cached.write_bytes(damaged)
+        assert bytecode.code_of(str(file), "module") == wanted

@@ -23,12 +23,13 @@ from codebotler.core.skills.values import TEXT_TYPE
 from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key_of
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import FEW, LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
-from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
+from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import EngineError, Job, Worker
 from in_process import all_of
 from processes import are_gone, children_of
@@ -39,7 +40,7 @@ WORLDS = (
     World((Room("hall", (), (Person("eve"),)),), "hall"),
 )
 WORLD = WORLDS[0]
-RULES = Rules(limits=Limits(seconds=600, calls=60, ticks=2_000, text=200, trace=2_000))
+RULES = SimulationSettings(limits=Limits(seconds=600, calls=60, ticks=2_000, text=200, trace=2_000))
 TABLE = SKILLS.with_skill(
     Skill("wave", (Parameter("person"),), TEXT_TYPE, "Wave at a person.", Recording("wave", "person"))
 )
@@ -61,7 +62,7 @@ def started(worker: Worker) -> Iterator[Worker]:
     worker.close()
 
 
-def robot(world: World = WORLD, rules: Rules = RULES) -> SimulatedRobot:
+def robot(world: World = WORLD, rules: SimulationSettings = RULES) -> SimulatedRobot:
     return SimulatedRobot(world, rules)
 
 
@@ -225,7 +226,7 @@ def test_how_deep_data_may_be_nested_is_decided_alone(
         return task("go_to('lab')", "x, y = [], []", f"for _ in range({depth}): x, y = [x], [y]", shows)
 
     def new_robot() -> SimulatedRobot:
-        return SimulatedRobot(WORLD, Rules(limits=Limits(text=1_000_000)))
+        return SimulatedRobot(WORLD, SimulationSettings(limits=Limits(text=1_000_000)))
 
     fits, fails = 1, 50_000
     while fails - fits > 1:
@@ -283,7 +284,7 @@ def test_runs_that_say_the_same_elsewhere_or_by_other_rules_are_replayed(
     worker: Worker, other_worker: Worker, replays: list[str]
 ) -> None:
     says = saying("hello, everybody")
-    short = Rules(limits=Limits(calls=1))
+    short = SimulationSettings(limits=Limits(calls=1))
     new_robots = [partial(robot, WORLDS[0]), partial(robot, WORLDS[1]), partial(robot, WORLDS[0], short)]
     (told,) = worker.run_all([(says, new_robots)])
     assert len(replays) == len(new_robots)
@@ -549,7 +550,7 @@ def test_a_child_that_is_not_believed_ends_at_once(monkeypatch: pytest.MonkeyPat
 # --- replay
 
 
-def follow(calls: object, order: object, moments: object = (), rules: Rules = RULES) -> Replay:
+def follow(calls: object, order: object, moments: object = (), rules: SimulationSettings = RULES) -> Replay:
     transcript = decoded(json.dumps([calls, order, moments, {"end": "finished"}]).encode())
     assert transcript is not None
     replay = Replay(robot(rules=rules))
@@ -559,7 +560,7 @@ def follow(calls: object, order: object, moments: object = (), rules: Rules = RU
 
 STOPPED: list[object] = ["", [], "time", None]  # where only time went by
 A, B = ["say", ["a"], "ok", None], ["say", ["b"], "ok", None]
-TIGHT = Rules(limits=Limits(seconds=10, calls=2, text=5, trace=20))
+TIGHT = SimulationSettings(limits=Limits(seconds=10, calls=2, text=5, trace=20))
 LONG = ["say", ["x" * 6], "stop", None]
 REFUSED: dict[str, Callable[[], object]] = {
     "an answer that is none": lambda: follow([["get_current_location", [], "ok", None]], [0]),
@@ -608,7 +609,7 @@ REFUSED: dict[str, Callable[[], object]] = {
         [["is_in_room", ["unicorn"], "ok", False]],
         [0] * 60,
         [[59, 11.0]],
-        rules=Rules(limits=Limits(seconds=10)),
+        rules=SimulationSettings(limits=Limits(seconds=10)),
     ),
     "time that goes back": lambda: follow([A], [0, 0, 0], [[1, 2.0], [2, 1.0]]),
 }
@@ -698,7 +699,7 @@ def test_a_robot_of_ones_own_kind_shares_no_outcome(worker: Worker) -> None:
 
 @pytest.mark.parametrize(("question", "options"), [(200, []), (201, []), (190, [11]), (5, [200]), (5, [201])])
 def test_a_text_may_be_so_long_whatever_else_is_given(question: int, options: list[int]) -> None:
-    ledger = Ledger(SimulatedRobot(WORLD, Rules(limits=Limits(text=200))))
+    ledger = Ledger(SimulatedRobot(WORLD, SimulationSettings(limits=Limits(text=200))))
     ledger.perform("ask", ("", "q" * question, tuple(Option("o" * size) for size in options)))
     is_too_long = max(question, *options, 0) > 200
     assert (ledger.limit == "a text of more than 200 characters") == is_too_long
@@ -743,7 +744,7 @@ def test_what_was_done_before_is_done_again_in_the_same_way(
     history: list[Call], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.simulator.ledger.FEW", 0)
-    rules = Rules(limits=Limits(trace=250_000))
+    rules = SimulationSettings(limits=Limits(trace=250_000))
     told = []
     for kind in (Ledger, RememberingLedger):
         ledger = kind(SimulatedRobot(WORLD, rules))

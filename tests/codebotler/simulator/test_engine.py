@@ -22,22 +22,24 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator import isolated_process, pool
+from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
-from codebotler.simulator.fork_server import BatchServer
-from codebotler.simulator.isolated_process import LostProcessError, compiled_file
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import FEW, WorkerPool
+from codebotler.simulator.process import bytecode, spawn
+from codebotler.simulator.process.errors import LostProcessError
+from codebotler.simulator.process.fork_server_client import BatchServer
+from codebotler.simulator.process.spawn import compiled_file
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, PREPARER
+from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
 OTHER = World((Room("elsewhere"),), "elsewhere")
-AS_WRITTEN = Rules(literals="as-written")
+AS_WRITTEN = SimulationSettings(literals="as-written")
 FUTEX = {"x86_64": 202, "aarch64": 98}
 LIBRARY = 'sys.modules["_ctypes"].dlopen(None, 0)'
 
@@ -444,7 +446,7 @@ def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_an
 
 
 def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 1.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.LONGEST", 1.0)
 
     def slow(robot: SimulatedRobot, message: str) -> None:
         time.sleep(2.5)
@@ -545,7 +547,7 @@ def test_suite_sets_the_limits() -> None:
         "for i in range(3): say('abcde')": "texts of more than 12 characters in all",
     }
     pairs = ((f"def task_program():\n    {body}\n", WORLD) for body in bodies)
-    outcomes = run(pairs, workers=1, rules=Rules(limits=limits))
+    outcomes = run(pairs, workers=1, rules=SimulationSettings(limits=limits))
     assert [outcome.error.message for outcome in outcomes if outcome.error] == list(bodies.values())
 
 
@@ -621,13 +623,13 @@ def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     def compiled(file: str, shown: str) -> bytes:
         prelude = LIKE_MACOS if shown == "<codebotler.simulator.sandbox>" else ""
         source = Path(file).read_text(encoding="utf-8")
-        return isolated_process.compiled_source(
+        return bytecode.compiled_source(
             source.replace('"""The isolated', prelude + '"""The isolated', 1), shown
         )
 
     with TemporaryFile() as file:
-        monkeypatch.setattr(isolated_process, "compiled_file", lambda *_: file)
-        file.write(isolated_process.compiled_modules(compiled, BATCH_SERVER))
+        monkeypatch.setattr(spawn, "compiled_file", lambda *_: file)
+        file.write(bytecode.compiled_modules(compiled, BATCH_SERVER))
         file.flush()
         programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
         outcomes = list(run([(program, WORLD) for program in programs], workers=1))
@@ -725,7 +727,7 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
 
 HANDED_OVER = f"""
 from hashlib import sha256
-from codebotler.simulator.isolated_process import compiled, compiled_modules
+from codebotler.simulator.process.bytecode import compiled, compiled_modules
 print(sha256(compiled_modules(compiled, {FORK_SERVER!r})).hexdigest())
 """
 
@@ -757,7 +759,9 @@ def task_program():
 def test_a_fork_server_compiles_next_to_nothing_and_modules_name_no_folder() -> None:
     """Compiling the standard library would take most of its start; a path would differ between machines."""
     worker = Worker(one_process_per_run=True)
-    outcome = worker.run(MODULES_TOLD, lambda: SimulatedRobot(WORLD, Rules(literals="as-written")))
+    outcome = worker.run(
+        MODULES_TOLD, lambda: SimulatedRobot(WORLD, SimulationSettings(literals="as-written"))
+    )
     worker.close()
     number, compiled, *told = said(outcome)
     assert int(number) > 200
@@ -770,14 +774,14 @@ def test_an_interrupt_while_code_is_compiled_leaves_nothing_open(monkeypatch: py
         raise KeyboardInterrupt
 
     before = set(Path("/proc/self/fd").iterdir())
-    monkeypatch.setattr(isolated_process, "compiled_modules", interrupted)
+    monkeypatch.setattr(spawn, "compiled_modules", interrupted)
     with pytest.raises(KeyboardInterrupt):
         compiled_file("no role that was compiled before")
     assert set(Path("/proc/self/fd").iterdir()) == before
 
 
 def test_a_limit_on_the_size_of_files_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(isolated_process, "_written_file", isolated_process._written_file.__wrapped__)
+    monkeypatch.setattr(spawn, "_written_file", spawn._written_file.__wrapped__)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
     try:

@@ -26,7 +26,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import PAPER, Limits, Rules
+from codebotler.simulator.settings import PAPER, Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
 from in_process import OrdinaryProcess, all_of, without_addresses
 from random_programs import broken_programs, programs, tame_programs
@@ -43,7 +43,7 @@ FUZZ = settings(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example],
 )
 Check = TypeVar("Check", bound=Callable[..., None])
-RULES = Rules(limits=Limits(ticks=2_000, calls=60))
+RULES = SimulationSettings(limits=Limits(ticks=2_000, calls=60))
 
 CLOSED_BY_AN_ERROR = """
 def spoken():
@@ -234,7 +234,7 @@ Runs = dict[tuple[str, World], Outcome]
 
 
 def differences(
-    worker: Worker, batch: Batch, alone: Runs, rules: Rules
+    worker: Worker, batch: Batch, alone: Runs, rules: SimulationSettings
 ) -> Iterator[tuple[str, World, Outcome]]:
     """The runs of a batch that end otherwise than alone; those that nobody decided there are none."""
     jobs = [(source, [partial(SimulatedRobot, world, rules) for world in worlds]) for source, worlds in batch]
@@ -244,7 +244,7 @@ def differences(
             yield source, worlds[run_number], outcome
 
 
-def assert_alike(worker: Worker, batch: Batch, alone: Runs, rules: Rules) -> None:
+def assert_alike(worker: Worker, batch: Batch, alone: Runs, rules: SimulationSettings) -> None:
     """Fail with the fewest programs that show a difference, if there is one."""
     if not any(differences(worker, batch, alone, rules)):
         return

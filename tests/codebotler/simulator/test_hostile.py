@@ -33,11 +33,12 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Outcome, Status, outcome_data
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
-from codebotler.simulator.fork_server import BatchServer
-from codebotler.simulator.isolated_process import PROCESSOR_TIME, IsolatedProcess
+from codebotler.simulator.process.exit_status import PROCESSOR_TIME
+from codebotler.simulator.process.fork_server_client import BatchServer
+from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import BATCH_SERVER
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import judge
 from roboeval.suites.load import Requirement, Scenario
@@ -46,7 +47,7 @@ BURN = {  # all the processor time that there is; another one does so in `make t
     *("cpu_counter_replaced", "cpu_power", "cpu_recursion_by_except", "cpu_regex", "cpu_uncounted_code"),
 }
 PROGRAMS = sorted((Path(__file__).parents[2] / "hostile").glob("*.py"))
-AS_WRITTEN = Rules(literals="as-written")
+AS_WRITTEN = SimulationSettings(literals="as-written")
 SECRET = "hush-" + os.urandom(8).hex()
 MARKER = "i-was-here-" + os.urandom(8).hex()
 NOBODY = 65534
@@ -318,7 +319,9 @@ def reach(
     before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("codebotler.simulator.preparer.SERVES", 10_000)  # one that is replaced would look new
+        patch.setattr(
+            "codebotler.simulator.process.preparer_client.SERVES", 10_000
+        )  # one that is replaced would look new
         yield reach
     for pid in carry_the_marker():  # a test has failed; nothing of it stays
         os.kill(pid, signal.SIGKILL)
@@ -401,7 +404,7 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
 def test_program_that_is_silent_for_too_long_is_ended_though_it_computes(
     reach: Reach, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 0.5)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.LONGEST", 0.5)
     outcome = reach.run("def task_program():\n    sum(range(10**12))\n")
     assert outcome.status is Status.TIMEOUT
     assert outcome.error is not None

@@ -21,7 +21,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Formula, holds, parse
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 
 WORLD = World(
@@ -33,7 +33,7 @@ WORLD = World(
     ),
     "hall",
 )
-AS_WRITTEN = Rules(literals="as-written")
+AS_WRITTEN = SimulationSettings(literals="as-written")
 
 
 def rule(formula: str, *, refuse: bool = False, name: str = "house") -> Rule:
@@ -79,7 +79,7 @@ def test_every_room_that_a_request_may_mean_counts() -> None:
 
 def test_a_thing_counts_by_the_name_that_is_recorded() -> None:
     world = World((Room("hall", ("cup|mug",)),), "hall")
-    as_happened = Rules(literals="as-written", events="as-happened")
+    as_happened = SimulationSettings(literals="as-written", events="as-happened")
     for formula in ('not tr.Exists(pick("cup"))', 'not tr.Exists(place("cup"))'):
         one = SimulatedRobot(world, as_happened, guard=RuleGuard([rule(formula)]))
         if "place" in formula:
@@ -164,13 +164,13 @@ def test_all_names_of_a_room_are_those_of_one_room() -> None:
             refused(one, "say", "done")
 
 
-AS_HAPPENED = Rules(literals="as-written", events="as-happened")
+AS_HAPPENED = SimulationSettings(literals="as-written", events="as-happened")
 
 
 @pytest.mark.parametrize("rules", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
 @pytest.mark.parametrize("name", ["^cup[|]mug$", "^mug$"])
 def test_a_thing_whose_name_is_a_regex_counts_by_it_and_by_the_words_of_the_request(
-    rules: Rules, name: str
+    rules: SimulationSettings, name: str
 ) -> None:
     world = World((Room("hall", ("cup|mug",)), Room("office")), "hall")
 
@@ -196,7 +196,7 @@ def test_a_room_is_without_a_word_if_none_of_its_names_has_it() -> None:
 
 
 @pytest.mark.parametrize("rules", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
-def test_a_drive_that_fails_has_happened(rules: Rules) -> None:
+def test_a_drive_that_fails_has_happened(rules: SimulationSettings) -> None:
     one = SimulatedRobot(WORLD, rules, guard=RuleGuard([rule('not tr.AtLeast(goto(".*"), 2)')]))
     with pytest.raises(RobotError, match="attic"):
         one.perform("go_to", ["attic"])
@@ -246,7 +246,7 @@ def swap_for(sim: Simulation, what: str) -> None:
     ],
 )
 def test_what_a_skill_of_a_user_does_inside_counts(
-    tmp_path: Path, rules: Rules, calls: list[str], formula: str, *, breaks: bool
+    tmp_path: Path, rules: SimulationSettings, calls: list[str], formula: str, *, breaks: bool
 ) -> None:
     (tmp_path / "own.py").write_text(OWN)
     skills = skills_from(tmp_path / "own.py")

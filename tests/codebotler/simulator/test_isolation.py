@@ -22,7 +22,7 @@ BECOME = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups"]
 CHECK = """
 import json, os, sys
 from codebotler.simulator.engine import run
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.core.trace import outcome_data
 from codebotler.core.world import Room, World
 
@@ -31,7 +31,7 @@ programs = [
     "import os, signal\\ndef task_program():\\n    " + body.replace("PARENT", str(os.getpid()))
     for body in json.loads(sys.argv[1])
 ]
-outcomes = run([(p, world) for p in programs], workers=1, rules=Rules(literals="as-written"),
+outcomes = run([(p, world) for p in programs], workers=1, rules=SimulationSettings(literals="as-written"),
                require_isolation=True)
 print(os.geteuid(), json.dumps([outcome_data(outcome) for outcome in outcomes]))
 """

@@ -15,8 +15,8 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.rules import ENDLESS, PAPER
 from codebotler.simulator.sandbox import LIVE_SERVER, PROGRAM
+from codebotler.simulator.settings import ENDLESS, PAPER
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 
@@ -123,7 +123,7 @@ def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
 def test_program_may_compute_for_long_if_it_acts_in_between(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 3.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.LONGEST", 3.0)
     program = (
         "def task_program():\n"
         "    for i in range(20):\n"

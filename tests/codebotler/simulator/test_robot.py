@@ -9,7 +9,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.robot import Result, SimulatedRobot, Thing
-from codebotler.simulator.rules import Matching, Rules, _pattern, choose, resolve_room
+from codebotler.simulator.settings import Matching, SimulationSettings, _pattern, choose, resolve_room
 
 Texts: TypeAlias = tuple[str, ...]
 
@@ -401,5 +401,5 @@ def test_events_say_where_they_happen_and_where_drives_lead() -> None:
 
 
 def test_rules_are_the_suites_own() -> None:
-    rules = Rules(literals="as-written")
+    rules = SimulationSettings(literals="as-written")
     assert SimulatedRobot(World((Room("a"),), "a"), rules).rules is rules

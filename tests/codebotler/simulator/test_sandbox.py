@@ -8,7 +8,7 @@ import pytest
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 
 Outcomes: TypeAlias = dict[str, Outcome]
 
@@ -42,7 +42,7 @@ def all_of(*tables: dict[str, tuple[str, object]]) -> dict[str, str]:
     return {name: program for table in tables for name, (program, _) in table.items()}
 
 
-def run_all(programs: dict[str, str], rules: Rules) -> Outcomes:
+def run_all(programs: dict[str, str], rules: SimulationSettings) -> Outcomes:
     pairs = ((program, HOUSE) for program in programs.values())
     return dict(zip(programs, run(pairs, workers=2, rules=rules), strict=True))
 
@@ -612,7 +612,7 @@ def outcomes() -> Outcomes:
     for number, name in enumerate(FAILS):
         programs |= {name: FAILS[name][0], f"after {name}": task(f"say('honest {number}')")}
     ordered = [*SLOW, *(name for name in programs if name not in SLOW)]
-    return run_all({name: programs[name] for name in ordered}, Rules())
+    return run_all({name: programs[name] for name in ordered}, SimulationSettings())
 
 
 @pytest.mark.parametrize("name", WORKS)
@@ -637,8 +637,8 @@ def test_program_fails_with_the_right_status_and_leaves_the_next_one_alone(
     assert said(outcomes[f"after {name}"]) == [f"honest {list(FAILS).index(name)}"]
 
 
-def one(program: str, rules: Rules | None = None, world: World = HOUSE) -> Outcome:
-    (outcome,) = run([(program, world)], workers=1, rules=rules or Rules())
+def one(program: str, rules: SimulationSettings | None = None, world: World = HOUSE) -> Outcome:
+    (outcome,) = run([(program, world)], workers=1, rules=rules or SimulationSettings())
     return outcome
 
 
@@ -673,7 +673,11 @@ CLOCK: dict[str, tuple[str, object]] = {
 @pytest.fixture(scope="module")
 def clock() -> list[str]:
     body = "".join(f"say(str({expression}))\n" for expression, _ in CLOCK.values())
-    return said(one("import datetime\n" + task("time.sleep(90.5)\n" + body), Rules(literals="as-written")))
+    return said(
+        one(
+            "import datetime\n" + task("time.sleep(90.5)\n" + body), SimulationSettings(literals="as-written")
+        )
+    )
 
 
 @pytest.mark.parametrize("name", CLOCK)
@@ -712,7 +716,7 @@ def test_trace_up_to_the_limit_is_kept_and_nothing_happens_after_it() -> None:
 
 def test_literals_are_kept_as_written_where_the_suite_wants_it() -> None:
     program = task('"""Doc."""\nsay(\'ABC\')\nsay(f\'X{1:X}\')\nsay(task_program.__doc__)')
-    assert said(one(program, Rules(literals="as-written"))) == ["ABC", "X1", "Doc."]
+    assert said(one(program, SimulationSettings(literals="as-written"))) == ["ABC", "X1", "Doc."]
     assert said(one(program)) == ["abc", "x1", "doc."]
 
 
@@ -778,7 +782,7 @@ say(str(sys.getrecursionlimit() > 900))
 print("x")
 say(str(random.random()))
 """
-    rules = Rules(literals="as-written")
+    rules = SimulationSettings(literals="as-written")
     pairs = [(task(looks), HOUSE), (marks + task("say('a')"), HOUSE), (task(looks + "\n"), HOUSE)]
     before, between, after = run(pairs, workers=1, rules=rules)
     assert said(between) == ["a"]

@@ -10,10 +10,10 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import PAPER, WORDS_FOR_PEOPLE, Rules, choose, resolve_room
+from codebotler.simulator.settings import PAPER, WORDS_FOR_PEOPLE, SimulationSettings, choose, resolve_room
 from roboeval.suites.schema import RulesFile
 
-STRICT = Rules(
+STRICT = SimulationSettings(
     literals="as-written",
     matching="whole-words",
     people="own-name-or-word",
@@ -31,7 +31,7 @@ WORLD = World(
 )
 
 
-def robot(world: World = WORLD, rules: Rules = STRICT) -> SimulatedRobot:
+def robot(world: World = WORLD, rules: SimulationSettings = STRICT) -> SimulatedRobot:
     return SimulatedRobot(world, rules)
 
 
@@ -53,11 +53,11 @@ def test_words_for_people_are_usual_ones_where_a_suite_names_none() -> None:
     assert robot(rules=rules).rules.words_for_people == WORDS_FOR_PEOPLE
     assert RulesFile.model_validate(
         {"people": "own-name-or-word", "words_for_people": ["dog"]}
-    ).rules() == Rules(people="own-name-or-word", words_for_people=("dog",))
+    ).rules() == SimulationSettings(people="own-name-or-word", words_for_people=("dog",))
     assert RulesFile().rules() == PAPER
 
 
-WORDS = Rules(
+WORDS = SimulationSettings(
     matching="whole-words",
     words_for_yes=("sure", "love to", "i am", "i do"),
     words_for_no=("not", r"\w+n['\u2019]t", "another time", "busy", "decline"),

@@ -13,11 +13,11 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.preparer import LONG, Prepared, Preparer, is_exhausted
+from codebotler.simulator.process.preparer_client import LONG, Prepared, Preparer, is_exhausted
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
+from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
 from in_process import all_of
 
@@ -496,7 +496,9 @@ def names_of_ordinary_programs() -> list[str]:
     """All names that a program finds in a process of its own without doing anything for it."""
     worker = Worker(one_process_per_run=True)
     try:
-        outcome = worker.run(LISTS_ALL_NAMES, lambda: SimulatedRobot(WORLD, Rules(literals="as-written")))
+        outcome = worker.run(
+            LISTS_ALL_NAMES, lambda: SimulatedRobot(WORLD, SimulationSettings(literals="as-written"))
+        )
     finally:
         worker.close()
     assert outcome.status is Status.FINISHED
@@ -584,7 +586,7 @@ def test_tame_programs_find_each_name_that_is_allowed() -> None:
     raising = "".join(f"    if name == '{name}': raise {name}(name)\n" for name in errors)
     tried = "".join(USES_ONE.format(*use) for use in uses.items())
     program = f"import time\ndef f(name):\n{raising}def task_program():\n{tried}"
-    rules = Rules(literals="as-written", limits=Limits(ticks=10_000))
+    rules = SimulationSettings(literals="as-written", limits=Limits(ticks=10_000))
     worker = Worker()
     try:
         known = worker.run_tame([(program, [lambda: SimulatedRobot(WORLD, rules)])])

@@ -27,11 +27,12 @@ from codebotler.core.trace import Outcome, Status, trace_data
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.sandbox.fuel import prepared
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import arguments_of
 from codebotler.simulator.worker import NewRobot, Worker
 
@@ -39,7 +40,7 @@ FOLDER = Path(__file__).parents[2] / "hostile_tame"
 PROGRAMS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.py"))}
 TAME = [name for name, source in PROGRAMS.items() if "\n# tame: yes\n" in source]
 WILD = [name for name, source in PROGRAMS.items() if "\n# tame: no\n" in source]
-AS_WRITTEN = Rules(literals="as-written")
+AS_WRITTEN = SimulationSettings(literals="as-written")
 AMY = Person("amy", ("yes", "no", ".*"))
 BOB = Person(".*", ("no", "yes"))
 WORLDS = (

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import html
 import http.client
 import json
 import os
 import re
-import shlex
 import signal
 import socket
 import subprocess
@@ -226,7 +224,6 @@ def test_what_is_asked_wrongly_is_said(
         ("DELETE", "/api/missions/current", "GET"),
         ("POST", "/api/missions/current/program", "PUT"),
         ("GET", "/api/check", "POST"),
-        ("PATCH", "/api", "GET"),
     ],
 )
 def test_another_method_is_told_which_are_taken(
@@ -292,27 +289,6 @@ def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServ
 def test_the_api_is_described(server: PageServer) -> None:
     described = server.call("GET", "/api/openapi.json").data["paths"]
     assert {"/api/missions", "/api/missions/{mission}/stop", "/api/check"} <= described.keys()
-    page = server.call("GET", "/api").text
-    assert all(path in page for path in described)
-    assert 'id="stop"' in page
-    assert '<a href="/missions">Missions</a>' in page
-
-
-def test_each_command_of_the_page_about_the_api_is_one_that_works(server: PageServer) -> None:
-    """But for those that need what an example cannot know."""
-    begun(server, HELLO)
-    page = server.call("GET", "/api").text
-    commands = [html.unescape(text) for text in re.findall(r"<pre[^>]*>(.*?)</pre>", page)]
-    assert len(commands) == page.count("<section>")
-    for text in commands:
-        words = shlex.split(text.replace("$TOKEN", server.token))
-        if words[-1].endswith(("/events", "/stop", "/approve", ".mcap")) or "/RUN" in words[-1]:
-            continue  # endless, or of a mission that runs, or of a run to be named
-        given = dict(zip(words[3:-1:2], words[4:-1:2], strict=True))
-        path = words[-1].removeprefix(f"http://localhost:{server.port}")
-        answer = server.call(given.get("-X", "GET"), path, json.loads(given.get("-d", "null")))
-        assert words[:3] == ["curl", "-H", f"Authorization: Bearer {server.token}"]
-        assert answer.status in {200, 201, 202, 409}, (text, answer.text)
 
 
 def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from codebotler.checking.check import check
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.log import State, Summary
-from codebotler.missions.progress import MOST, MOST_STEPS, Find, Moment, Progress, line_of
+from codebotler.missions.progress import MOST, MOST_STEPS, Find, Moment, Progress
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import title
 from codebotler.robots.simulated import OFFICE
@@ -32,14 +32,6 @@ from codebotler.web.storyboard import (
     strips,
 )
 
-PROGRAM = """def task_program():
-    for room in get_all_rooms():
-        go_to(room)
-    go_to("kitchen")
-    say("hello")
-    say("hello")
-    ask("ann", "tea?", ["yes", "no"])
-"""
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -58,32 +50,15 @@ def done(skill: str, *, result: object = None) -> dict[str, Any]:
 def after(*lines: dict[str, Any]) -> Progress:
     progress = Progress()
     for each in lines:
-        progress = progress.after(each, PROGRAM)
+        progress = progress.after(each)
     return progress
-
-
-@pytest.mark.parametrize(
-    ("skill", "given", "where"),
-    [
-        ("go_to", ["kitchen"], None),  # either of two calls
-        ("go_to", ["study"], 3),
-        ("say", ["hello"], None),
-        ("ask", ["ann", "tea?", ("yes", "no")], 7),
-        ("pick", ["mug"], None),
-    ],
-)
-def test_a_line_is_named_only_where_no_other_can_be_meant(
-    skill: str, given: list[object], where: int | None
-) -> None:
-    assert line_of(PROGRAM, skill, given) == where
-    assert line_of("no program (", skill, given) is None
 
 
 def test_progress_tells_what_goes_on_and_where() -> None:
     driving = after(call("go_to", location="study"), line("feedback", text="at (1.5, -2.0)"))
     assert (driving.doing, driving.room, driving.at) == ('drives to "study"', "study", (1.5, -2.0))
     assert driving.is_driving
-    there = driving.after(line("result", number=1, skill="go_to", result=None), PROGRAM)
+    there = driving.after(line("result", number=1, skill="go_to", result=None))
     assert (there.doing, there.skill, there.is_driving, there.room) == ("", "", False, "study")
 
 
@@ -151,11 +126,10 @@ def test_a_robot_that_was_stopped_on_its_way_is_where_its_dot_is() -> None:
 
 
 def test_a_program_that_sleeps_is_said_to_wait() -> None:
-    program = "def task_program():\n    say('a')\n    time.sleep(30)\n"
-    sleep = line("sleep", seconds=30.0)
-    now = Progress().after(sleep, program)
+    sleep = line("sleep", seconds=30.0, line=3)
+    now = Progress().after(sleep)
     assert (now.doing, now.line) == ("waits for 30 s", 3)
-    assert now.after(line("stop", by="x"), program).moments[-1].text == "stopped by x while waiting for 30 s"
+    assert now.after(line("stop", by="x")).moments[-1].text == "stopped by x while waiting for 30 s"
     assert [text for _, text in timeline([sleep, line("stop", by="x")])][-1].endswith(
         "while waiting for 30 s"
     )
@@ -192,10 +166,9 @@ def test_a_stop_is_one_event_with_what_it_interrupted() -> None:
 
 
 def test_the_line_is_the_one_that_the_program_says() -> None:
-    twice = "def task_program():\n    say('a')\n    say('a')\n"
     spoken = call("say", message="a")
-    assert Progress().after(spoken, twice).line is None
-    assert Progress().after({**spoken, "line": 3}, twice).line == 3
+    assert after(spoken).line is None
+    assert after({**spoken, "line": 3}).line == 3
 
 
 def test_a_robot_that_looks_for_ever_fills_no_memory() -> None:

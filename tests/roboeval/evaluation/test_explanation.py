@@ -15,7 +15,7 @@ from rich.console import Console, RenderableType
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Explanation, Formula, explain, parse
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 from made_results import as_driven, results_of, row_of
 from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
@@ -58,7 +58,7 @@ TASK = Task(
     accepted=(),
     path=Path("Visit.yaml"),
 )
-SUITE = Suite("small", 1, "", Rules(), {"Visit": TASK}, "0")
+SUITE = Suite("small", 1, "", SimulationSettings(), {"Visit": TASK}, "0")
 
 GOTO, HELLO = Event("goto", "office"), Event("say", "hello")
 FINE = Outcome(Status.FINISHED, (GOTO, HELLO))
@@ -426,9 +426,10 @@ def test_the_name_of_a_rule_keeps_its_own_letters() -> None:
 
 def test_a_program_whose_texts_were_lowered_is_shown_with_its_capitals() -> None:
     said = Outcome(Status.FINISHED, (GOTO, Event("say", "good day")))
-    for rules, told in ((Rules(), '"Good Day"'), (Rules(literals="as-written"), '"good day"')):
+    usual, kept = SimulationSettings(), SimulationSettings(literals="as-written")
+    for rules, told in ((usual, '"Good Day"'), (kept, '"good day"')):
         suite = replace(SUITE, rules=rules)
         written = replace(completion(), program="def task_program():\n    say('Good Day')\n")
         text = printed(completion_view(row(written, said), written, suite), 120)
         assert f"said {told}" in text
-        assert (LOWERED in text) is (rules == Rules())
+        assert (LOWERED in text) is (rules == SimulationSettings())

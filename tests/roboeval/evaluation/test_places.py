@@ -21,7 +21,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
 from codebotler.rtl.semantics import visible
 from codebotler.simulator.rule_guard import Rule
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from made_results import results_of
 from roboeval.analysis.breakdown import never_returned
@@ -38,7 +38,7 @@ from roboeval.suites.load import Requirement, Scenario, Suite, Task
 ROOMS = ("office", "bob's office", "lab", "lab 1", "kitchen")
 THINGS = ("mug", "red mug", "pen")
 OFFICES = World((Room("office"), Room("bob's office"), Room("kitchen", ("mug",))), "kitchen", about="w")
-STRICT = Rules(literals="as-written", matching="whole-words")
+STRICT = SimulationSettings(literals="as-written", matching="whole-words")
 SAYS_THERE = 'tr.Exists(at("bob\'s office", say("hi")))'
 THERE = "def task_program():\n    go_to(\"bob's office\")\n    say('hi')\n"
 
@@ -50,7 +50,7 @@ def worker() -> Iterator[Worker]:
     made.close()
 
 
-def suite_of(world: World, rules: Rules, *formulas: str, skills: SkillTable = SKILLS) -> Suite:
+def suite_of(world: World, rules: SimulationSettings, *formulas: str, skills: SkillTable = SKILLS) -> Suite:
     require = tuple(Requirement(one, "is_so", parse(one), "Location") for one in formulas)
     task = Task("T", "s", (), ("p",), (), (), (Scenario(world, require),), None, (), Path("T.yaml"))
     return Suite("mine", 1, "", rules, {"T": task}, "0", skills=skills)
@@ -89,7 +89,7 @@ def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:
 
 @pytest.mark.parametrize("matching", ["whole-words", "label-in-request"])
 def test_rooms_whose_names_contain_each_other(worker: Worker, matching: Any) -> None:  # noqa: ANN401 - a literal
-    rules = Rules(literals="as-written", matching=matching)
+    rules = SimulationSettings(literals="as-written", matching=matching)
     suite = suite_of(OFFICES, rules, SAYS_THERE, 'tr.Exists(at("kitchen", goto("office")))')
     assert expect_agreement(worker, suite, THERE) == [matching == "whole-words", True]
 
@@ -151,7 +151,7 @@ FORMULAS = st.recursive(
     max_leaves=3,
 )
 RULES = st.builds(
-    Rules,
+    SimulationSettings,
     literals=st.just("as-written"),
     matching=st.sampled_from(["whole-words", "label-in-request"]),
     events=st.sampled_from(["as-requested", "as-happened"]),
@@ -159,7 +159,7 @@ RULES = st.builds(
 
 
 def expect_the_same_answers(
-    worker: Worker, world: World, rules: Rules, program: str, formulas: list[str]
+    worker: Worker, world: World, rules: SimulationSettings, program: str, formulas: list[str]
 ) -> None:
     suite = suite_of(world, rules, *dict.fromkeys(formulas))
     expect_agreement(worker, suite, program)
@@ -190,12 +190,12 @@ ABOUT_CARRYING = [
 
 @settings(max_examples=2)
 @example(OFFICES, STRICT, THERE, [SAYS_THERE])
-@example(OFFICES, Rules(), THERE, [SAYS_THERE])
+@example(OFFICES, SimulationSettings(), THERE, [SAYS_THERE])
 @example(OFFICES, STRICT, CARRIES, ABOUT_CARRYING)
 @example(OFFICES, AS_HAPPENED, CARRIES, ABOUT_CARRYING)
 @given(worlds(), RULES, PROGRAMS, SOME_FORMULAS)
 def test_judge_explanations_and_searches_agree(
-    worker: Worker, world: World, rules: Rules, program: str, formulas: list[str]
+    worker: Worker, world: World, rules: SimulationSettings, program: str, formulas: list[str]
 ) -> None:
     expect_the_same_answers(worker, world, rules, program, formulas)
 
@@ -204,7 +204,7 @@ def test_judge_explanations_and_searches_agree(
 @settings(max_examples=300)
 @given(worlds(), RULES, PROGRAMS, SOME_FORMULAS)
 def test_judge_explanations_and_searches_agree_at_length(
-    worker: Worker, world: World, rules: Rules, program: str, formulas: list[str]
+    worker: Worker, world: World, rules: SimulationSettings, program: str, formulas: list[str]
 ) -> None:
     expect_the_same_answers(worker, world, rules, program, formulas)
 

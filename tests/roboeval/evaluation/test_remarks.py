@@ -6,7 +6,7 @@ import pytest
 
 from codebotler.core.trace import Event, Option, Status, Trace
 from codebotler.core.world import Answer, Person, Room, World
-from codebotler.simulator.rules import PAPER, Rules
+from codebotler.simulator.settings import PAPER, SimulationSettings
 from roboeval.evaluation.remarks import cycle_at_end, misplaced_questions, remarks_on
 
 THERE, LOOK, BACK = Event("goto", "lab"), Event("check", "mug", found=False), Event("goto", "hall")
@@ -139,7 +139,7 @@ def test_answer_that_became_a_no_is_remarked_on_as_well() -> None:
 @pytest.mark.parametrize(("answer", "told"), [(-1, "the last option"), (2, "option 2"), ("tea", '"tea"')])
 def test_answers_are_described(answer: Answer, told: str) -> None:
     person = Person("jill", ("yes", answer))
-    (remark,) = misplaced_questions((asked("which?", "tea", "milk"),), world(person), Rules())
+    (remark,) = misplaced_questions((asked("which?", "tea", "milk"),), world(person), SimulationSettings())
     assert f"2nd gets {told}" in remark
 
 

@@ -20,8 +20,8 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Outcome, RunError, Status
-from codebotler.simulator.isolated_process import ONE_AT_A_TIME
 from codebotler.simulator.pool import shared_pool
+from codebotler.simulator.process.spawn import ONE_AT_A_TIME
 from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate, is_met

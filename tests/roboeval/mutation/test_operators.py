@@ -19,7 +19,7 @@ from codebotler.core.skills.simulation import Simulation
 from codebotler.core.trace import Event, Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
-from codebotler.simulator.rules import Limits, Rules
+from codebotler.simulator.settings import Limits, SimulationSettings
 from roboeval.mutation.mutants import OPERATORS
 from roboeval.mutation.operator import Context, Operator
 from roboeval.mutation.program_tree import changed, read
@@ -35,7 +35,7 @@ WORLD = World(
     robot="hall",
 )
 CONTEXT = Context.of([WORLD])
-RULES = Rules(literals="as-written", limits=Limits(calls=20))
+RULES = SimulationSettings(literals="as-written", limits=Limits(calls=20))
 
 
 @skill(fails={"CupFull": "the cup is full"})

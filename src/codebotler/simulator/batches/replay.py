@@ -12,8 +12,9 @@ import msgspec
 from codebotler.core.skills.table import Parameter, SkillTable
 from codebotler.core.skills.values import TEXT_TYPE, Scalar
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, kept
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
 from codebotler.simulator.sandbox import MAX_FRAME
 from codebotler.simulator.skill_protocol import Description, described

@@ -3,7 +3,7 @@ from datetime import UTC, datetime
 import pytest
 
 from codebotler.core.trace import Option
-from codebotler.simulator.rules import PAPER, Limits, Matching, Rules, choose, finds
+from codebotler.simulator.settings import PAPER, Limits, Matching, SimulationSettings, choose, finds
 
 
 def test_rules_of_the_paper_are_those_that_the_published_verdicts_rest_on() -> None:
@@ -14,13 +14,13 @@ def test_rules_of_the_paper_are_those_that_the_published_verdicts_rest_on() -> N
     )
     assert PAPER.clock_starts == datetime(2024, 1, 1, 12, 0, 0, tzinfo=UTC)
     assert PAPER.limits == Limits(seconds=3600, calls=1000, ticks=200_000, text=10_000, trace=1_000_000)
-    assert Rules() == PAPER
+    assert SimulationSettings() == PAPER
 
 
 @pytest.mark.parametrize("matching", ["label-in-request", "whole-words"])
 @pytest.mark.parametrize("label", ["(?i)yes", "(?x) yes # or no", "(?s).*yes", ".*yes|(?i:no)"])
 def test_a_label_may_have_flags(label: str, matching: Matching) -> None:
     options = (Option("later"), Option("Yes"))
-    assert choose(label, "Tea?", options, Rules(matching=matching)) == 1
+    assert choose(label, "Tea?", options, SimulationSettings(matching=matching)) == 1
     assert finds("oh yes", label, matching)
     assert not finds("later", label, matching)

@@ -10,13 +10,10 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from codebotler.core.trace import Outcome, RunError, Status
-from codebotler.simulator.isolated_process import (
-    IsolatedProcess,
-    LostProcessError,
-    ProtocolError,
-    cause_of_death,
-    start,
-)
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.exit_status import cause_of_death
+from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.spawn import start
 from codebotler.simulator.sandbox import MAX_CODE, PLAIN, PREPARER, REFUSED, TAME
 
 MAX_SOURCE = 5_000_000

@@ -1,4 +1,4 @@
-"""The rules by which programs are simulated, which a suite chooses, and what requests mean by them."""
+"""How programs are simulated, as a suite chooses it, and what requests mean by it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Rules:
+class SimulationSettings:
     """How a suite wants its worlds simulated; the defaults are those of the paper's suite."""
 
     # The string literals of a program are lowered before the run, as the authors of the paper did.
@@ -54,7 +54,7 @@ class Rules:
     clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # what clocks show when the run starts
 
 
-PAPER = Rules()
+PAPER = SimulationSettings()
 ENDLESS = Limits(calls=10**12, trace=10**12)  # on a robot, where each skill refuels the program
 
 
@@ -94,7 +94,7 @@ def _anchored(label: str) -> str:
     return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
 
 
-def is_called(person: Person, request: str, rules: Rules) -> bool:
+def is_called(person: Person, request: str, rules: SimulationSettings) -> bool:
     """Whether a request means a person: by no name, their own, or a word for people."""
     if rules.people == "answer-to-any-name" or not request.strip():
         return True
@@ -113,7 +113,9 @@ def _resolved(rooms: tuple[str, ...], request: str, matching: Matching) -> str |
     return next((room for room in rooms if finds(request, room, matching)), None)
 
 
-def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Rules = PAPER) -> int | None:
+def choose(
+    answer: Answer, question: str, options: tuple[Option, ...], rules: SimulationSettings = PAPER
+) -> int | None:
     """The position of the option that an answer means.
 
     The answer is looked for in the options. Failing that, a yes or a no is looked for in other words, if the
@@ -132,7 +134,7 @@ def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Ru
     return _in_other_words(means, options, rules) if found is None and rules.words_for_no else found
 
 
-def _in_other_words(answer: str, options: tuple[Option, ...], rules: Rules) -> int | None:
+def _in_other_words(answer: str, options: tuple[Option, ...], rules: SimulationSettings) -> int | None:
     """Which option means yes or no; the only one that does not mean no means yes, whatever it says."""
     if answer == "no":
         return _first_saying(rules.words_for_no, options, rules.matching)

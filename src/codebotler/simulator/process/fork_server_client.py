@@ -10,7 +10,9 @@ import sys
 
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import message
-from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, start
+from codebotler.simulator.process.errors import LostProcessError
+from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.spawn import start
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared

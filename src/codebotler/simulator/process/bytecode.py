@@ -1,0 +1,94 @@
+"""The code that isolated processes run: the modules of ours and of the standard library, compiled."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import inspect
+import marshal
+import os
+import sys
+from collections.abc import Callable
+from functools import cache
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from types import CodeType
+
+from codebotler.simulator.sandbox import BATCH_SERVER, PREPARER, WITHOUT_REFERENCES
+from codebotler.simulator.sandbox.stdlib import IMPORTED
+
+SIMULATOR = __package__.rpartition(".")[0]
+SANDBOX = Path(__file__).parents[1] / "sandbox"
+SKILLS = SANDBOX.parents[1] / "core" / "skills"
+CORE, BATCHES = "codebotler.core", f"{SIMULATOR}.batches"
+# What a child needs that has robots of its own, besides the sandbox.
+SIMULATION = (
+    f"{BATCHES}.process",
+    *(
+        f"{CORE}.{name}"
+        for name in ("cachedproperty", "errors", "regex_flags", "trace", "unicode", "words", "world")
+    ),
+    *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py")) if path.stem != "files"),
+    *(f"{SIMULATOR}.{name}" for name in ("fact_sampler", "ledger", "robot", "settings", "sampled_robot")),
+)
+
+
+def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
+    """The code of all modules that a process in one of the roles runs, by name, as one message."""
+    further = SIMULATION if role == BATCH_SERVER else ()
+    package = f"{SIMULATOR}.sandbox"
+    files = {package: str(SANDBOX / "__init__.py")}
+    files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}
+    files |= {name: inspect.getfile(importlib.import_module(name)) for name in ("__future__", "types")}
+    folder = SANDBOX.parents[1]
+    files |= {name: str(folder.joinpath(*name.split(".")[1:]).with_suffix(".py")) for name in further}
+    empty = [SIMULATOR.partition(".")[0], SIMULATOR, *([CORE, f"{CORE}.skills", BATCHES] if further else ())]
+    codes = {name: compiled_source("", f"<{name}>") for name in empty}
+    codes |= {name: compiler(file, f"<{name}>") for name, file in files.items()}
+    if role not in {PREPARER, BATCH_SERVER}:
+        codes |= {name: code_of(str(file), file.name) for name, file in stdlib_files().items()}
+    return marshal.dumps(codes, WITHOUT_REFERENCES)
+
+
+def stdlib_files() -> dict[str, Path]:
+    """Nearly all modules of the standard library that programs can import, or that these are made of."""
+    folder, files = Path(os.__file__).parent, {}
+    for name in IMPORTED:
+        path = folder.joinpath(*name.split("."))
+        if path.with_suffix(".py").is_file():
+            files[name] = path.with_suffix(".py")
+        elif (path / "__init__.py").is_file():
+            files[name] = path / "__init__.py"
+            parts = (part for part in sorted(path.glob("*.py")) if part.stem != "__init__")
+            files |= {f"{name}.{part.stem}": part for part in parts}
+    return files
+
+
+def code_of(file: str, shown: str) -> bytes:
+    """The code of one module, the same however this interpreter was started; `shown` is in tracebacks."""
+    code = None
+    if not sys.flags.optimize:
+        with contextlib.suppress(EOFError, ImportError, ValueError):  # bytecode that is damaged
+            code = SourceFileLoader(shown, file).get_code(shown)
+    if code is None or all(column is None for _, _, column, _ in code.co_positions()):
+        # It was written by an interpreter that leaves columns out, so that it is shorter.
+        return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
+    return dumped(code, shown)
+
+
+compiled = cache(code_of)
+
+
+def compiled_source(source: str, shown: str) -> bytes:
+    """The same of a module that is in no file, or in another form there."""
+    return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), shown)
+
+
+def dumped(code: CodeType, shown: str) -> bytes:
+    """Code that names no path, whose length would move what comes after it in memory."""
+
+    def nameless(code: CodeType) -> CodeType:
+        parts = (nameless(part) if isinstance(part, CodeType) else part for part in code.co_consts)
+        return code.replace(co_filename=shown, co_consts=tuple(parts))
+
+    return marshal.dumps(nameless(code), WITHOUT_REFERENCES)

@@ -1,0 +1,23 @@
+"""What a process died of, by its exit status."""
+
+from __future__ import annotations
+
+import signal
+
+from codebotler.core.trace import RunError, Status
+from codebotler.simulator.sandbox import CPU_SECONDS
+
+PROCESSOR_TIME = "seconds of processor time"  # how the message of a program ends that computed for too long
+
+
+def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
+    """What a process died of without a last message, by its exit status or minus the signal."""
+    match -status:
+        case signal.SIGXCPU:
+            return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")
+        case signal.SIGSYS:
+            return Status.KILLED, RunError("ForbiddenCall", "the program made a forbidden system call")
+        case signal.SIGKILL:
+            return Status.KILLED, RunError("MemoryError", "the process was killed from outside")
+    how = f"signal {-status}" if status < 0 else f"exit status {status}"
+    return Status.KILLED, RunError("Crash", f"the process ended by itself ({how})")

@@ -1,0 +1,197 @@
+"""Exchanges messages with an isolated process, notices that it is stuck, and ends it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import marshal
+import os
+import signal
+import socket
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from codebotler.core.cachedproperty import cached_property
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.sandbox import HEADER, MAX_FRAME, MORE, PIECE, WITHOUT_REFERENCES
+
+LONGEST = 60.0  # seconds of waiting for a process in all; nothing that computes takes so long
+SILENCE = 1  # seconds after which a silent process is looked at
+SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
+
+
+class IsolatedProcess:
+    """One isolated process, seen from outside."""
+
+    def __init__(
+        self,
+        find_pid: Callable[[], int],  # which stays its own until the next run
+        channel: socket.socket,
+        wait: Callable[[], int],  # for its end; returns the exit status, or minus the signal
+        *,
+        has_seccomp: bool,  # so that it can be seen from outside whether it is isolated by now
+    ) -> None:
+        self._find_pid, self._channel, self._wait = find_pid, channel, wait
+        silence = struct.pack("ll", SILENCE, 0)
+        for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call less than settimeout
+            channel.setsockopt(socket.SOL_SOCKET, direction, silence)
+        self._has_seccomp = has_seccomp
+        self._buffer = bytearray()
+        self.patience = LONGEST  # seconds for which it will still be waited for
+
+    @cached_property
+    def pid(self) -> int:
+        """Its process id; a process without one is lost."""
+        try:
+            return self._find_pid()
+        except LostProcessError:
+            self.hang_up()
+            raise
+
+    def send(self, message: object, *, at_once: bool = False) -> None:
+        """Send a message; that the process is gone is noticed when it is listened to.
+
+        Where a program could see the heap, which what it reads leaves its mark on, a message goes in pieces:
+        each but the last is asked for more. So their sizes depend on the message only, and not on how quick
+        the process was.
+        """
+        data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # made of texts, numbers and the like
+        whole = len(data).to_bytes(HEADER, "big") + data
+        size = len(whole) if at_once else PIECE
+        for start in range(0, len(whole), size):
+            if start and (reply := self.receive()) != MORE:
+                if reply is None:
+                    return
+                raise ProtocolError("it speaks in the middle of a message")
+            self._send_piece(memoryview(whole)[start : start + size])
+
+    def _send_piece(self, rest: memoryview) -> None:
+        watch = StuckDetector(self)
+        while rest:
+            began = time.monotonic()
+            try:
+                rest = rest[self._channel.send(rest) :]
+            except BlockingIOError:  # nothing for so long
+                watch.check()
+            except OSError:
+                return
+            self._be_patient(began)
+
+    def receive(self) -> object:
+        """Its next message, which is JSON; None when it has hung up.
+
+        Raises ProtocolError if it is none, and TimeoutError if the process waits for what will never come.
+        """
+        frame = self.receive_bytes(MAX_FRAME)
+        if frame is None:
+            return None
+        try:
+            message, end = decode(str(frame, "ascii"))
+        except (ValueError, RecursionError):
+            message, end = None, 0
+        if message is None or end < len(frame):
+            raise ProtocolError("a frame says nothing")
+        return message
+
+    def receive_bytes(self, most: int) -> bytes | None:
+        """Its next frame, which may have so many bytes; None when it has hung up."""
+        watch = StuckDetector(self)
+        while True:
+            if len(self._buffer) >= HEADER:
+                end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
+                if end - HEADER > most:
+                    raise ProtocolError("a frame is too long")
+                if len(self._buffer) >= end:
+                    frame = bytes(self._buffer[HEADER:end])
+                    del self._buffer[:end]
+                    return frame
+            began = time.monotonic()
+            try:
+                piece = self._channel.recv(1 << 16)
+            except BlockingIOError:  # nothing for so long
+                watch.check()
+            except OSError:
+                return None
+            else:
+                if not piece:
+                    return None
+                self._buffer += piece
+            self._be_patient(began)
+
+    def _be_patient(self, since: float) -> None:
+        self.patience -= min(time.monotonic() - since, SILENCE)  # the rest is this process's own delay
+        if self.patience < 0:
+            raise TimeoutError
+
+    def kill(self) -> None:
+        """End it, if it has not ended, and do not wait for that."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+
+    def end(self) -> int:
+        """End it, if it has not ended, and return its exit status, or minus the signal."""
+        self.kill()
+        try:
+            return self._wait()
+        finally:
+            self.hang_up()
+
+    def ended(self) -> int:
+        """Wait a moment for it to end by itself; then like `end`."""
+        for _ in range(50):
+            if _stat(self.pid)[:1] in ([], ["Z"]):
+                break
+            time.sleep(0.002)
+        return self.end()
+
+    def reset_patience(self) -> None:
+        """Wait anew, since it has answered."""
+        self.patience = LONGEST
+
+    def hang_up(self) -> None:
+        """Close the channel."""
+        self._channel.close()
+
+    def was_isolated(self) -> bool:
+        """Whether its filter was installed, as far as can be seen; of a dead process until the next run."""
+        if not self._has_seccomp:
+            return True
+        try:
+            status = Path(f"/proc/{self.pid}/status").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            return False
+        return any(mode in status for mode in SECCOMP_MODES)
+
+
+class StuckDetector:
+    """Distinguishes a process that waits for nothing from one that computes.
+
+    A process that sleeps at two checks, and used no processor time between them, is stuck.
+    """
+
+    def __init__(self, process: IsolatedProcess) -> None:
+        self._process = process
+        self._used: int | None = None
+
+    def check(self) -> None:
+        """Raise TimeoutError if the process is stuck."""
+        fields = _stat(self._process.pid)
+        used = int(fields[11]) + int(fields[12]) if fields[:1] == ["S"] else None
+        if used is not None and used == self._used:
+            raise TimeoutError
+        self._used = used
+
+
+def _stat(pid: int) -> list[str]:
+    """What the kernel shows of a process, from its state on; nothing once it is gone."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return []
+    return stat.rpartition(")")[2].split()
+
+
+# A process puts no spaces around what it says, and so need not be asked for them as `json.loads` does.
+decode: Callable[[str], tuple[object, int]] = json.JSONDecoder().raw_decode
