@@ -20,7 +20,6 @@ from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.cluster import Fix, nearest_fix
 from roboeval.evaluation.explanation import (
     LOWERED,
-    as_written,
     cut_told,
     error_sentence,
     failing_first,
@@ -153,9 +152,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
         if (sentence := _sentence(completion)) is not None:  # no robot did anything
             PlainText("p", sentence, "trouble")
             return
-        if completion["lowered"]:
-            judged = as_written(judged, completion["program"])
-        if judged != completion["worlds"]:
+        if completion["lowered"] and judged:
             PlainText("p", LOWERED, "quiet")
         if not judged:
             PlainText("p", "It has not been judged yet.", "quiet")

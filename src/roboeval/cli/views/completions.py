@@ -16,7 +16,6 @@ from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
     GONE,
     LOWERED,
-    as_written,
     cut_told,
     error_sentence,
     failing_first,
@@ -85,8 +84,6 @@ def completion_view(
         return Group(*parts, Text(), Text(why_none, "red"))
     worlds = data["worlds"]
     if data["lowered"]:
-        worlds = as_written(worlds, data["program"])
-    if worlds != data["worlds"]:
         parts += [Text(), Text(LOWERED, "dim")]
     satisfied = []
     for number, world in failing_first(worlds):
