@@ -102,7 +102,7 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
     found = []
     for path in paths:
         first = open_current(path, names[0], ablated=ablated).results
-        second = open_current(path, names[1], ablated=ablated, beside=first).results
+        second = open_current(path, names[1], ablated=ablated, reuse_from=first).results
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:

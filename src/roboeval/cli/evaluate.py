@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.rows import JudgedRow
+    from roboeval.evaluation.runs.rows import Row
     from roboeval.evaluation.runs.source import Source
     from roboeval.evaluation.runs.table import TableBuilder
     from roboeval.suites.load import Suite
@@ -162,11 +162,11 @@ def _judged(
     ablated: bool,
     redo: bool,
     engine: OpenEngine,
-) -> Iterator[JudgedRow]:
+) -> Iterator[Row]:
     """Judge completions, in a run if there is one to keep the rows."""
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import judgements, row_line
-    from roboeval.evaluation.runs.rows import judged_row
+    from roboeval.evaluation.runs.rows import decode_row
 
     if run is not None:
         completions = source.completions
@@ -174,7 +174,7 @@ def _judged(
             run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
         )
     told = judgements(source.of(tasks), suite, ablated=ablated, engine=engine)
-    return (judged_row(row_line(completion, one)) for completion, one in told if one is not None)
+    return (decode_row(row_line(completion, one)) for completion, one in told if one is not None)
 
 
 def import_(

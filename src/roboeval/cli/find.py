@@ -50,7 +50,7 @@ def find(
     """
     from codebotler.simulator.pool import cores
     from roboeval.analysis.cluster import cluster_data, clusters, groups
-    from roboeval.analysis.search import Question, Search, found_by_task, looked_at
+    from roboeval.analysis.search import Question, found_by_task, looked_at, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, as_judged
@@ -61,9 +61,9 @@ def find(
     task = None if task is None else known.task(task).name
     question = Question(formula, negated, task, world)
     expect_question(question, known, ablated=ablation)
-    searching = Search(question, workers=workers or cores())
-    results = open_current(run, suite, ablated=ablation, see=searching.see).results
-    every = list(watched(searching.found(), "looking", len(results.places)))
+    lines: list[bytes] = []
+    results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
+    every = list(watched(search(lines, question, workers=workers or cores()), "looking", len(lines)))
     found = [one for one in every if one.worlds]
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = groups(failed, results.programs)

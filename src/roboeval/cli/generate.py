@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from codebotler.models.base import Model
     from codebotler.models.batch import BatchModel
     from codebotler.models.sampling import SamplingSettings
-    from roboeval.evaluation.generate import Pace, Progress
+    from roboeval.evaluation.generate import GenerationProgress, Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run
 
@@ -263,9 +263,9 @@ def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
 class Meter(ExitStack):
     """Shows the progress of a run: its rate, its tokens and the time left."""
 
-    progress: Progress | None = None
+    progress: GenerationProgress | None = None
 
-    def show(self, progress: Progress) -> None:
+    def show(self, progress: GenerationProgress) -> None:
         """Draw the bar; start it first, and note what was done before."""
         if self.progress is None:
             self.progress = progress

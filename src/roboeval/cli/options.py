@@ -251,16 +251,16 @@ def open_run(
     *,
     ablated: bool,
     rules: Path | None = None,
-    beside: Results | None = None,
-    see: Callable[[bytes], None] | None = None,
+    reuse_from: Results | None = None,
+    on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run; `see` is called with each line of its verdicts.
+    """Read a judged run; `on_line` is called with each line of its verdicts.
 
-    The completions are taken over from `beside`, another evaluation of the same run.
+    The completions are taken over from `reuse_from`, another evaluation of the same run.
     """
     from roboeval.evaluation.runs.results import read_results
 
-    read = partial(read_results, beside=beside, see=see)
+    read = partial(read_results, reuse_from=reuse_from, on_line=on_line)
     return Opened(*_opened(read, run, suite_name, ablated=ablated, rules=rules))
 
 
@@ -286,7 +286,7 @@ def _opened(
 
     again = command("evaluate", run, suite=suite_name, ablated=ablated, rules=rules)
     folder, key, suite = evaluation_of(run, load(suite_name, rules), ablated=ablated, again=again)
-    results = read(folder, key, suite, watch=lambda lines, total: watched(lines, "reading", total))
+    results = read(folder, key, suite, progress=lambda lines, total: watched(lines, "reading", total))
     if suite.house is not None and rules is not None:
         judged_by = results.head.get("house_rules") or {}
         if judged_by.get(suite.house.name) != suite.house.digest:
@@ -305,8 +305,8 @@ def open_current(
     *,
     ablated: bool,
     rules: Path | None = None,
-    beside: Results | None = None,
-    see: Callable[[bytes], None] | None = None,
+    reuse_from: Results | None = None,
+    on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
     """Read a judged run of which every verdict counts, as `open_run` does.
 
@@ -314,7 +314,7 @@ def open_current(
     """
     from codebotler.core.errors import UserError
 
-    opened = open_run(run, suite_name, ablated=ablated, rules=rules, beside=beside, see=see)
+    opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from, on_line=on_line)
     if (complaint := complaint_of(opened.results)) is not None:
         raise UserError(f"{complaint}; `{opened.again} --redo` judges the current programs")
     if opened.results.table.is_empty():

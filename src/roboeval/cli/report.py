@@ -110,13 +110,13 @@ def judged_run(
     run = results.run
     ablated = other = house = None
     if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
-        ablated = open_current(run.path, suite, ablated=True, beside=results).results
+        ablated = open_current(run.path, suite, ablated=True, reuse_from=results).results
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
         table = checked(results, engine=engine)
     if beside is not None:
-        other = open_current(run.path, beside, ablated=False, beside=results).results
+        other = open_current(run.path, beside, ablated=False, reuse_from=results).results
     if rules is not None:
-        house = open_current(run.path, suite, ablated=False, rules=rules, beside=results).results
+        house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results).results
     return JudgedRun(results, table, ablated=ablated, beside=other, house=house)

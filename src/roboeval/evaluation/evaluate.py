@@ -16,7 +16,7 @@ from roboeval.evaluation.judge import head, judgements, row_line
 from roboeval.evaluation.runs.completions import Completion, Key, name_of
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
 from roboeval.evaluation.runs.judged import selected_tasks
-from roboeval.evaluation.runs.rows import JudgedRow, Line, Seal, is_sealed, judged_row, read_lines_of
+from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
 from roboeval.suites.load import Suite
 
 
@@ -30,7 +30,7 @@ def evaluate_run(
     workers: int = 1,
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,  # those of the run, if they were read before
-) -> Iterator[JudgedRow]:
+) -> Iterator[Row]:
     """Judge those completions of tasks that an earlier evaluation has not judged; yield all their rows.
 
     Rows of other tasks stay. A completion whose judging takes too long has no row, and is tried again.
@@ -50,8 +50,8 @@ def evaluate_run(
             seal, left = Seal(), dict(written)
             for line in read_lines_of(rows.path, was or {}, seal=seal):
                 _expect_of_run(line, written, left, rows.path)
-                del left[line.row.key]
-                if _is_in(line.row.task, tasks):
+                del left[key_of(line.row)]
+                if _is_in(line.row["task"], tasks):
                     yield line.row
             left = {key: one for key, one in left.items() if _is_in(one.task, selected_tasks(about))}
             if was is not None and is_sealed(was) and (left or seal.is_broken(was)):
@@ -66,7 +66,7 @@ def evaluate_run(
                 rows.append(row)
                 seal.add(row)
                 del left[completion.key]
-                yield judged_row(row)
+                yield decode_row(row)
             finished = {**about, **seal.data()}
             if not left and finished != was:
                 rows.sync()
@@ -78,16 +78,17 @@ def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
 
 
 def _expect_of_run(
-    line: Line, written: Mapping[Key, Completion], left: Mapping[Key, Completion], file: Path
+    line: LocatedRow, written: Mapping[Key, Completion], left: Mapping[Key, Completion], file: Path
 ) -> None:
     """Raise UserError where a row judges what is not in the run, or judges it again."""
-    row, completion = line.row, written.get(line.row.key)
+    key = key_of(line.row)
+    completion = written.get(key)
     if completion is None:
-        sentence = f"judges {name_of(row.key)}, which is not in the run"
-    elif row.key not in left:
-        sentence = f"judges {name_of(row.key)} again"
-    elif completion.program_sha256 != row.program_sha256:
-        sentence = f"the program of {name_of(row.key)} has changed since it was judged"
+        sentence = f"judges {name_of(key)}, which is not in the run"
+    elif key not in left:
+        sentence = f"judges {name_of(key)} again"
+    elif completion.program_sha256 != line.row["program_sha256"]:
+        sentence = f"the program of {name_of(key)} has changed since it was judged"
     else:
         return
     raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)

@@ -14,8 +14,6 @@ from functools import partial
 from types import FrameType
 from typing import Any, Generic, TypeVar
 
-from msgspec import to_builtins
-
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
@@ -258,7 +256,7 @@ def judgement(verdicts: list[Verdict]) -> bytes:
     return bounded(
         {
             "passed": why is None,
-            "failure": None if why is None else to_builtins(why),
+            "failure": why,
             "verdicts": [verdict_data(verdict) for verdict in verdicts],
         }
     )

@@ -9,7 +9,7 @@ import pytest
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
 from roboeval.analysis import search as searching
-from roboeval.analysis.search import Found, Question, Search
+from roboeval.analysis.search import Found, Question
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES
 
 
@@ -36,10 +36,7 @@ def found(question: Question, rows: list[dict[str, Any]] | None = None) -> list[
 
 
 def search(rows: list[dict[str, Any]], question: Question, *, workers: int = 1) -> list[Found]:
-    searching = Search(question, workers=workers)
-    for one in rows:
-        searching.see(to_line(one))
-    return [*searching.found()]
+    return [*searching.search(list(map(to_line, rows)), question, workers=workers)]
 
 
 HALL = 'tr.Exists(goto("hall"))'
@@ -70,8 +67,7 @@ def test_what_cannot_be_judged_does_not_match() -> None:
 
 
 def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(searching, "BATCH", 3)
-    monkeypatch.setattr(searching, "SMALL", 2)
+    monkeypatch.setattr(searching, "MANY", 50)
     rows = [{**ROWS[n % 4], "index": n} for n in range(50)]
     assert search(rows, Question(HALL), workers=2) == search(rows, Question(HALL))
 

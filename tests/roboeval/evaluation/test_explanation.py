@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,6 @@ from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, OF_SUITE, com
 from roboeval.evaluation.judge import judge, judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.rows import RowData
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800"
@@ -87,12 +86,14 @@ def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False
 
 
 def completion_view(
-    row: RowData, written: Completion | None, suite: Suite, *, in_full: bool = False
+    row: Mapping[str, Any], written: Completion | None, suite: Suite, *, in_full: bool = False
 ) -> RenderableType:
     return view_of_completion(completion_data(row, written, suite), in_full=in_full)
 
 
-def results(rows: Sequence[RowData], written: Sequence[Completion], *, ablated: bool = False) -> Results:
+def results(
+    rows: Sequence[Mapping[str, Any]], written: Sequence[Completion], *, ablated: bool = False
+) -> Results:
     return results_of(rows, SUITE, completions=written, ablated=ablated)
 
 

@@ -83,11 +83,10 @@ def test_a_program_is_judged_by_what_its_prompt_asks_for(
     assert len(started) == 2 * 2  # each program once in each world
 
 
-def first_failure(suite: Suite, program: str) -> dict[str, Any] | None:
+def first_failure(suite: Suite, program: str) -> Failure | None:
     (row,) = judged(suite, program)
     assert row["passed"] == (row["failure"] is None)
-    why: dict[str, Any] | None = row["failure"]
-    return why
+    return row["failure"]
 
 
 GOOD = "def task_program():\n    go_to('the kitchen')\n    say('hi')\n"
@@ -208,7 +207,7 @@ def test_the_first_unsatisfied_world_decides() -> None:
         return Verdict("w", Outcome(status, (), error), (), satisfied=satisfied)
 
     verdicts = [verdict("A", satisfied=True), verdict("B", satisfied=False), verdict("C", satisfied=False)]
-    assert failure(verdicts) == Failure("PythonError", "B", 1)
+    assert failure(verdicts) == {"class": "PythonError", "kind": "B", "world": 1, "check": None}
     assert failure(verdicts[:1]) is None
 
 

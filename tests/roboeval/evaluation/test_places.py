@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from hypothesis import example, given, settings
@@ -30,7 +30,7 @@ from roboeval.analysis.tasks import prompt_data
 from roboeval.evaluation.explanation import CHANGED, completion_data
 from roboeval.evaluation.judge import is_met, judged, row_line, run_in_worlds
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.rows import judged_row
+from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, trace_of
 from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
@@ -62,7 +62,7 @@ def judge(worker: Worker, suite: Suite, program: str) -> tuple[Outcome, dict[str
     told = judged(suite, (name, outcomes), ablated=False)
     assert told is not None
     line = row_line(Completion(task="T", prompt=0, index=0, program=program), told[0])
-    assert judged_row(line, check_kinds=suite.skills is SKILLS).key == ("T", 0, 0)
+    assert key_of(decode_row(line, check_kinds=suite.skills is SKILLS)) == ("T", 0, 0)
     return outcomes[0], json.loads(line)
 
 
@@ -311,5 +311,5 @@ def test_rows_of_earlier_versions_answer_what_needs_no_places(worker: Worker) ->
     assert program["explanation"] == where if program["failure"]["check"] == SAYS_THERE else True
     (world,) = completion_data(old, None, suite)["worlds"]
     assert "place" not in world["steps"][0]
-    assert never_returned(old) is None
-    assert never_returned(row) is True
+    assert never_returned(cast("Row", old)) is None
+    assert never_returned(cast("Row", row)) is True

@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from roboeval.evaluation.requests import requested_tasks
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head
-from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, add_or_raise, read_lines_of
+from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_lines_of
 from roboeval.evaluation.runs.scope import Scope
 from roboeval.suites.load import ABLATED, Suite
 
@@ -71,7 +71,7 @@ class RunEvaluation:
             with path.open("rb") as file:
                 file.seek(at)
                 row: Row = json.loads(file.read(size))
-            if (row["task"], row["prompt"], row["index"]) == key:
+            if key_of(row) == key:
                 return row
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
             pass
@@ -84,16 +84,18 @@ def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
     return None if tasks is None else frozenset(tasks)
 
 
-Watch: TypeAlias = Callable[[Iterator[Line], int], Iterable[Line]]  # passes lines on; it gets their number
+ShowProgress: TypeAlias = Callable[
+    [Iterator[LocatedRow], int], Iterable[LocatedRow]
+]  # passes rows on; gets their number
 
 
-def unwatched(lines: Iterator[Line], _total: int) -> Iterable[Line]:
+def no_progress(lines: Iterator[LocatedRow], _total: int) -> Iterable[LocatedRow]:
     """Pass lines on."""
     return lines
 
 
 def read_judged(
-    run: Run, key: str, suite: Suite | None = None, *, task: str, watch: Watch = unwatched
+    run: Run, key: str, suite: Suite | None = None, *, task: str, progress: ShowProgress = no_progress
 ) -> RunEvaluation:
     """Read what an evaluation of a run says of one task, without its table; raise what is wrong."""
 
@@ -105,16 +107,16 @@ def read_judged(
     completions = {key: one for key, one in completions.items() if one.task == task}
     passed, stale = [], []
 
-    def add(row: JudgedRow) -> None:
-        if row.task != task:
+    def add(row: Row) -> None:
+        if row["task"] != task:
             return
-        written = completions.get(row.key)
-        if row.passed:
-            passed.append(row.key)
-        if written is None or written.program_sha256 != row.program_sha256:
-            stale.append(row.key)
+        written = completions.get(key_of(row))
+        if row["passed"]:
+            passed.append(key_of(row))
+        if written is None or written.program_sha256 != row["program_sha256"]:
+            stale.append(key_of(row))
 
-    head, places = read_rows(run, key, completions, add, watch=watch, wanted=wanted)
+    head, places = read_rows(run, key, completions, add, progress=progress, wanted=wanted)
     return RunEvaluation(
         run=run,
         key=key,
@@ -132,11 +134,11 @@ def read_rows(
     run: Run,
     key: str | None,
     completions: Iterable[Key],
-    add: Callable[[JudgedRow], None],
+    add: Callable[[Row], None],
     *,
     faults: list[UserError] | None = None,
-    see: Callable[[bytes], None] | None = None,
-    watch: Watch = unwatched,
+    on_line: Callable[[bytes], None] | None = None,
+    progress: ShowProgress = no_progress,
     wanted: Callable[[bytes], bool] = bool,
 ) -> tuple[Mapping[str, Any], Mapping[Key, tuple[int, int]]]:
     """Add each row of an evaluation; return its head, and where each row is in the file."""
@@ -145,11 +147,13 @@ def read_rows(
     total = sum(tasks is None or task in tasks for task, _, _ in completions)
     places: dict[Key, tuple[int, int]] = {}
     lines = (
-        iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults, wanted=wanted)
+        iter(())
+        if key is None
+        else read_lines_of(run.rows(key), head, on_line=on_line, faults=faults, wanted=wanted)
     )
-    for line in watch(lines, total):
+    for line in progress(lines, total):
         add(line.row)
-        places[line.row.key] = line.at, line.size
+        places[key_of(line.row)] = line.at, line.size
     return head, places
 
 

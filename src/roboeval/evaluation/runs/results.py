@@ -14,9 +14,10 @@ import polars as pl
 from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.completions import Key
 from roboeval.evaluation.runs.folder import Run, evaluation_of
-from roboeval.evaluation.runs.judged import RunEvaluation, Watch, read_rows, read_written, unwatched
-from roboeval.evaluation.runs.rows import JudgedRow, RowData, add_or_raise, read_checks
+from roboeval.evaluation.runs.judged import RunEvaluation, ShowProgress, no_progress, read_rows, read_written
+from roboeval.evaluation.runs.rows import Row, add_or_raise, key_of, read_checks
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
+from roboeval.evaluation.runs.traces import without_trace
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
 
@@ -61,9 +62,9 @@ class Results(RunEvaluation):
     table: pl.DataFrame  # as `load_results` gives it
     failed: Mapping[Key, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
 
-    def failed_row(self, key: Key) -> RowData:
+    def failed_row(self, key: Key) -> Row:
         """The row of a completion that failed, without traces of worlds that did not decide."""
-        row: RowData = json.loads(self.failed[key])
+        row: Row = json.loads(self.failed[key])
         return row
 
 
@@ -72,23 +73,25 @@ def read_results(
     key: str | None,
     suite: Suite | None = None,
     *,
-    beside: Results | None = None,  # another evaluation of the same run, whose completions are taken over
+    reuse_from: Results | None = None,  # another evaluation of the same run, whose completions are taken over
     keep_failed: bool = True,  # may take much memory
     faults: list[UserError] | None = None,
-    see: Callable[[bytes], None] | None = None,  # gets the line of each row
-    watch: Watch = unwatched,
+    on_line: Callable[[bytes], None] | None = None,  # gets the line of each row
+    progress: ShowProgress = no_progress,
 ) -> Results:
     """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
-    about, completions = (beside.about, beside.completions) if beside else read_written(run, faults)
+    about, completions = (
+        (reuse_from.about, reuse_from.completions) if reuse_from else read_written(run, faults)
+    )
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
     failed: dict[Key, bytes] = {}
 
-    def add(row: JudgedRow) -> None:
+    def add(row: Row) -> None:
         builder.add(row)
-        if keep_failed and row.failure is not None:
-            failed[row.key] = without_other_traces(row, row.failure.world)
+        if keep_failed and row["failure"] is not None:
+            failed[key_of(row)] = without_other_traces(row, row["failure"]["world"])
 
-    head, places = read_rows(run, key, completions, add, faults=faults, see=see, watch=watch)
+    head, places = read_rows(run, key, completions, add, faults=faults, on_line=on_line, progress=progress)
     table = builder.table()
     return Results(
         run=run,
@@ -106,12 +109,13 @@ def read_results(
     )
 
 
-def without_other_traces(row: JudgedRow, world: int) -> bytes:
+def without_other_traces(row: Row, world: int) -> bytes:
     """A row as JSON, with the trace of one world only: a run may fail often, with long traces."""
     verdicts = [
-        verdict if number == world else verdict.without_trace() for number, verdict in enumerate(row.verdicts)
+        verdict if number == world else without_trace(verdict)
+        for number, verdict in enumerate(row["verdicts"])
     ]
-    return msgspec.json.encode(msgspec.structs.replace(row, verdicts=tuple(verdicts)))
+    return msgspec.json.encode({**row, "verdicts": verdicts})
 
 
 def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:

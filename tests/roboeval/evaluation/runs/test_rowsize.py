@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -48,6 +49,7 @@ def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
             "sha256": hashlib.sha256(whole).hexdigest(),
         }
         assert verdict["trace"][0] == ["goto", "start"]
+        assert verdict["error"] is not None
         assert (verdict["error"]["message"], verdict["line"]) == ("\x00" * 1_000, 1)
     assert to_line(row([LOUD[:20]] * worlds, "\x00" * 1_000)) == line
 
@@ -67,7 +69,8 @@ def test_circumstances_are_bounded_with_their_events() -> None:
     assert [(e.place, e.holding, e.to, e.destination) for e in kept] == [
         (e.place, e.holding, e.to, e.destination) for e in drives[: len(kept)]
     ]
-    assert max(number for name in CIRCUMSTANCES[1:] for number, _ in first.get(name, [(0, "")])) <= len(kept)
+    entries: dict[str, Any] = {**first}
+    assert max(n for name in CIRCUMSTANCES[1:] for n, _ in entries.get(name, [(0, "")])) <= len(kept)
     assert trace_of(second)[1].place == ""
 
 
