@@ -15,7 +15,7 @@ from codebotler.core.program import TASK, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
 from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import Key, name_of
-from roboeval.evaluation.runs.judged import RunEvaluation
+from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of, key_of
 
 Lines: TypeAlias = tuple[str, ...]
@@ -83,7 +83,7 @@ def groups(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]
     return [rows for _, _, rows in sorted(placed, key=lambda one: one[:2])]
 
 
-def clusters(groups: Iterable[Sequence[Row]], results: RunEvaluation) -> Iterator[Cluster]:
+def clusters(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[Cluster]:
     """Say of each group why it fails and what would have helped."""
     programs = results.programs
     right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
@@ -108,7 +108,7 @@ def clusters(groups: Iterable[Sequence[Row]], results: RunEvaluation) -> Iterato
         )
 
 
-def nearest_fix(results: RunEvaluation, key: Key) -> Fix | None:
+def nearest_fix(results: Results, key: Key) -> Fix | None:
     """What turns one completion into one that passes; None if its program is gone or no other passes."""
     programs = results.programs
     if key not in programs:

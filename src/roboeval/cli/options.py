@@ -5,9 +5,8 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeVar
 
 import typer
 
@@ -17,11 +16,8 @@ from roboeval.cli.output import fail, note, watched
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.judged import RunEvaluation
     from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
-
-    Judged = TypeVar("Judged", bound=RunEvaluation)
 
 
 # --- what a shell completes
@@ -258,35 +254,20 @@ def open_run(
 
     The completions are taken over from `reuse_from`, another evaluation of the same run.
     """
-    from roboeval.evaluation.runs.results import read_results
-
-    read = partial(read_results, reuse_from=reuse_from, on_line=on_line)
-    return Opened(*_opened(read, run, suite_name, ablated=ablated, rules=rules))
-
-
-def open_completion(
-    run: Path, name: str, suite_name: str, *, ablated: bool, rules: Path | None = None
-) -> tuple[RunEvaluation, str]:
-    """Read a judged run as `open_run` does, but only the task of one completion, without a table."""
-    from roboeval.evaluation.runs.judged import read_judged
-    from roboeval.evaluation.runs.selection import parse_selection
-
-    def read(run: Run, key: str, suite: Suite, **how: Any) -> RunEvaluation:  # noqa: ANN401 - as it is called
-        task = parse_selection(name, suite).key[0]
-        return read_judged(run, key, suite, task=task, **how)
-
-    return _opened(read, run, suite_name, ablated=ablated, rules=rules)
-
-
-def _opened(
-    read: Callable[..., Judged], run: Path, suite_name: str, *, ablated: bool, rules: Path | None
-) -> tuple[Judged, str]:
     from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
+    from roboeval.evaluation.runs.results import read_results
 
     again = command("evaluate", run, suite=suite_name, ablated=ablated, rules=rules)
     folder, key, suite = evaluation_of(run, load(suite_name, rules), ablated=ablated, again=again)
-    results = read(folder, key, suite, progress=lambda lines, total: watched(lines, "reading", total))
+    results = read_results(
+        folder,
+        key,
+        suite,
+        reuse_from=reuse_from,
+        on_line=on_line,
+        progress=lambda lines, total: watched(lines, "reading", total),
+    )
     if suite.house is not None and rules is not None:
         judged_by = results.head.get("house_rules") or {}
         if judged_by.get(suite.house.name) != suite.house.digest:
@@ -296,7 +277,7 @@ def _opened(
     if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     more = _to_go_on(results, suite)
-    return results, command("evaluate", run, *more, suite=suite_name, ablated=ablated, rules=rules)
+    return Opened(results, command("evaluate", run, *more, suite=suite_name, ablated=ablated, rules=rules))
 
 
 def open_current(
@@ -324,7 +305,7 @@ def open_current(
     return opened
 
 
-def complaint_of(results: RunEvaluation) -> str | None:
+def complaint_of(results: Results) -> str | None:
     """A sentence about rows whose programs are no longer in the run; None without such rows."""
     from roboeval.evaluation.runs.completions import name_of
 
@@ -335,7 +316,7 @@ def complaint_of(results: RunEvaluation) -> str | None:
     return f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
 
 
-def unfinished_of(results: RunEvaluation) -> str | None:
+def unfinished_of(results: Results) -> str | None:
     """A clause about completions that are not judged yet; None without such completions."""
     from roboeval.evaluation.runs.completions import how_many
 
@@ -343,7 +324,7 @@ def unfinished_of(results: RunEvaluation) -> str | None:
     return None if count >= total else f"{count:,} of {how_many(total)} judged"
 
 
-def _to_go_on(results: RunEvaluation, suite: Suite) -> list[str]:
+def _to_go_on(results: Results, suite: Suite) -> list[str]:
     """Options with which a command goes on with an evaluation."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 

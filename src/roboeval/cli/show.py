@@ -27,7 +27,6 @@ from roboeval.cli.options import (
     load,
     named,
     note_houses,
-    open_completion,
     open_current,
     open_run,
     task_names,
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
     from roboeval.analysis.summary import Summary
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.judged import RunEvaluation
     from roboeval.evaluation.runs.results import Results
     from roboeval.evaluation.runs.selection import Selection
     from roboeval.suites.load import Suite
@@ -74,23 +72,20 @@ def show(
     if what and ablation:
         note("ablation: only common sense was required")
     is_one = what is not None and names_completion(what)
-    if what and is_one:
-        judged, again = open_completion(run, what, suite, ablated=ablation, rules=rules)
-        selection = parse_selection(what, judged.known_suite)
-        show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
-    elif in_full or with_reply:
+    if not is_one and (in_full or with_reply):
         option = "--all" if in_full else "--reply"
         fail(f"{option} applies to one completion; name it as TASK/PROMPT/INDEX, or leave out {option}")
+    judged, again = open_run(run, suite, ablated=ablation, rules=rules)
+    selection = parse_selection(what, judged.known_suite)
+    if selection.task is None:
+        show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
+        if rules is None:
+            note_houses([judged.run], suite)
+    elif is_one:
+        show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
     else:
-        judged, again = open_run(run, suite, ablated=ablation, rules=rules)
-        selection = parse_selection(what, judged.known_suite)
-        if selection.task is None:
-            show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
-            if rules is None:
-                note_houses([judged.run], suite)
-        else:
-            selection.expect_judged(judged)
-            show_part(judged, selection.task, selection.prompt, as_json=json)
+        selection.expect_judged(judged)
+        show_part(judged, selection.task, selection.prompt, as_json=json)
     if (complaint := complaint_of(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
     if not is_one and (unfinished := unfinished_of(judged)) is not None:
@@ -160,7 +155,7 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 
 
 def show_completion(
-    judged: RunEvaluation,
+    judged: Results,
     selection: Selection,
     suite: str,
     *,

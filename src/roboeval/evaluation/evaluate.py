@@ -14,8 +14,7 @@ from codebotler.core.words import brief
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import head, judgements, row_line
 from roboeval.evaluation.runs.completions import Completion, Key, name_of
-from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
-from roboeval.evaluation.runs.judged import selected_tasks
+from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
 from roboeval.suites.load import Suite
 

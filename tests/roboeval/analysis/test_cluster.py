@@ -76,7 +76,7 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     programs: dict[Key, str] = {("Visit", 0, 0): "No.", ("Visit", 0, 1): "I must not do that,\nsince ..."}
     programs |= {("Visit", 0, 2): "", ("Visit", 1, 0): RIGHT}
     results = results_of(rows, SUITE, programs)
-    refused, empty = clusters(groups(cast(list[Row], rows[:3]), programs), results)
+    refused, empty = clusters(groups(cast("list[Row]", rows[:3]), programs), results)
     assert [len(one.members) for one in (refused, empty)] == [2, 1]
     assert (refused.fix, refused.why) == (None, IN_WORDS["refusal"])
     text = printed(cluster_view(refused))

@@ -183,18 +183,14 @@ def read_lines_of(
     seal: Seal | None = None,
     on_line: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
-    wanted: Callable[[bytes], bool] = bool,
 ) -> Iterator[LocatedRow]:
-    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised.
-
-    Lines that are not `wanted` are passed over, whatever is in them.
-    """
+    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
     seal = seal or Seal()
     at, is_told = 0, False
     for number, line in read_lines(path, limit=LONGEST_LINE):
         seal.add(line)
         try:
-            if line.strip() and wanted(line):
+            if line.strip():
                 row = decode_row(line, check_kinds=not is_sealed(head))
                 if on_line is not None:
                     on_line(line)
