@@ -16,12 +16,12 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Trace
 from codebotler.core.world import World
 from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluation.judge import row_line
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, without_other_traces
 from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.table import TableBuilder, keys_where
+from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 VERDICT = {

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboeval.cli.engine_choice import engine_named
+from roboeval.cli.inputs import expect_same_suite, open_current
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -18,10 +20,7 @@ from roboeval.cli.options import (
     RunArgument,
     SuiteOption,
     WorkersOption,
-    engine_named,
-    expect_same_suite,
     named,
-    open_current,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 

@@ -12,6 +12,8 @@ from codebotler.cli.ending import STOPPED
 from codebotler.cli.options import SkillsOption
 from codebotler.core.errors import installed
 from codebotler.core.words import counted
+from roboeval.cli.engine_choice import engine_named
+from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -27,9 +29,6 @@ from roboeval.cli.options import (
     TasksOption,
     WorkersOption,
     WorldsOption,
-    command,
-    engine_named,
-    load,
     named,
 )
 from roboeval.cli.output import fail, metered, note, watched
@@ -165,8 +164,9 @@ def _judged(
 ) -> Iterator[Row]:
     """Judge completions, in a run if there is one to keep the rows."""
     from roboeval.evaluation.evaluate import evaluate_run
-    from roboeval.evaluation.judge import judgements, row_line
+    from roboeval.evaluation.judge import judgements
     from roboeval.evaluation.runs.rows import decode_row
+    from roboeval.evaluation.serialization import row_line
 
     if run is not None:
         completions = source.completions

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from roboeval.cli.inputs import load, open_current
 from roboeval.cli.options import (
     AblationOption,
     InWorldOption,
@@ -14,8 +15,6 @@ from roboeval.cli.options import (
     RunArgument,
     SuiteOption,
     TaskOption,
-    load,
-    open_current,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 

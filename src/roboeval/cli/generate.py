@@ -19,7 +19,9 @@ from codebotler.cli.options import (
 )
 from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
+from roboeval.cli.engine_choice import engine_named
 from roboeval.cli.evaluate import evaluate
+from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
     BudgetOption,
     ConcurrencyOption,
@@ -35,9 +37,6 @@ from roboeval.cli.options import (
     SuiteOption,
     TasksOption,
     WorkersOption,
-    command,
-    engine_named,
-    load,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report

@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.compare import checked
-from roboeval.cli.options import (
-    RulesOption,
-    SuiteOption,
-    WorkersOption,
-    command,
-    expect_same_suite,
-    named,
-    note_houses,
-    open_current,
-)
+from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
+from roboeval.cli.options import RulesOption, SuiteOption, WorkersOption, named
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:

@@ -16,22 +16,17 @@ from codebotler.cli.options import (
     PortOption,
     TokenOption,
 )
-from roboeval.cli.options import (
-    AblationOption,
-    JsonOption,
-    RulesOption,
-    RunArgument,
-    SuiteOption,
+from roboeval.cli.completion_names import task_names
+from roboeval.cli.inputs import (
     command,
     complaint_of,
     load,
-    named,
     note_houses,
     open_current,
     open_run,
-    task_names,
     unfinished_of,
 )
+from roboeval.cli.options import AblationOption, JsonOption, RulesOption, RunArgument, SuiteOption, named
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:

@@ -8,14 +8,19 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, to_text, write_whole
+from codebotler.core.skills.files import files_of
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import brief
-from roboeval.evaluation.engines import Local, OpenEngine
-from roboeval.evaluation.judge import head, judgements, row_line
+from codebotler.simulator.rules import PAPER
+from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
+from roboeval.evaluation.judge import judgements
 from roboeval.evaluation.runs.completions import Completion, Key, name_of
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
+from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 
@@ -41,7 +46,7 @@ def evaluate_run(
             for path in (run.rows(key), run.head(key)):
                 path.unlink(missing_ok=True)
         was = _expect_same(run, suite, ablated=ablated)
-        about = _head(suite, ablated=ablated, tasks=_selected(tasks, was))
+        about = evaluation_metadata(suite, ablated=ablated, tasks=_selected(tasks, was))
         if was is None:
             write_whole(run.head(key), to_text(about))
         written = {one.key: one for one in (run.read(suite) if completions is None else completions)}
@@ -96,8 +101,40 @@ def _expect_of_run(
 # --- by what a run is judged
 
 
-def _head(suite: Suite, *, ablated: bool, tasks: frozenset[str] | None) -> dict[str, Any]:
-    return {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
+WORDS = ("words_for_people", "words_for_yes", "words_for_no")  # rules that are left out where empty
+
+
+def evaluation_metadata(
+    suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
+) -> dict[str, Any]:
+    """The content of KEY.json: by what the rows of some tasks, or of all, are judged."""
+    rules = suite.rules
+    return {
+        "suite": suite.name,
+        "version": suite.version,
+        "digest": suite.digest,
+        **({} if suite.worlds is None else {"worlds": suite.worlds, "seed": suite.seed}),
+        "rules": {
+            "literals": rules.literals,
+            "matching": rules.matching,
+            "people": rules.people,
+            **{name: list(words) for name in WORDS if (words := getattr(rules, name))},
+            **({"events": rules.events} if rules.events != PAPER.events else {}),
+            "limits": {name: getattr(rules.limits, name) for name in ("seconds", "calls", "ticks")},
+            "skill_seconds": 0,
+            "clock_starts": rules.clock_starts.isoformat(),
+        },
+        **(
+            {}
+            if (house := suite.house) is None
+            else {"house_rules": {house.name or suite.name: house.digest}}
+        ),
+        **({} if suite.skills is SKILLS else {"skills": files_of(suite.skills)}),
+        "codebotler": __version__,
+        "python": PYTHON_VERSION,
+        "ablation": ablated,
+        "tasks": None if tasks is None else sorted(tasks),
+    }
 
 
 def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> frozenset[str] | None:
@@ -122,7 +159,7 @@ def _expect_same(run: Run, suite: Suite, *, ablated: bool) -> dict[str, Any] | N
             )
         return None
     was = load_head(path)
-    for name, now in _head(suite, ablated=ablated, tasks=None).items():
+    for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
             what = f"{CALLED.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
             raise UserError(f"was judged with another {what}; --redo starts over", file=path)

@@ -22,9 +22,10 @@ from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
 from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, OF_SUITE, completion_data
-from roboeval.evaluation.judge import judge, judgement
+from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.serialization import judgement
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800"

@@ -28,10 +28,11 @@ from roboeval.analysis.breakdown import never_returned
 from roboeval.analysis.search import Found, Question, answer
 from roboeval.analysis.tasks import prompt_data
 from roboeval.evaluation.explanation import CHANGED, completion_data
-from roboeval.evaluation.judge import is_met, judged, row_line, run_in_worlds
+from roboeval.evaluation.judge import is_met, judged, run_in_worlds
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, trace_of
+from roboeval.evaluation.serialization import row_line
 from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,18 +12,12 @@ from typing import Annotated, Any, NotRequired, TypeAlias, TypedDict
 import msgspec
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import read_lines, read_rows, to_line
+from codebotler.core.files import read_lines, read_rows
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
-from roboeval.evaluation.runs.traces import CIRCUMSTANCES, first_events
 
-MOST = 1_000_000  # bytes of a row
-MOST_OF_WORLD = 20_000  # bytes for each world, where there are so many worlds that they come to more
 LONGEST_LINE = 1_000_000_000  # bytes of a row that was written before rows were bounded
-ROW_HEADER_BYTES = 2_000  # left for the completion: the task's name is that of a file
-BETWEEN = 2  # bytes between two events
-HASH = "0" * 64
 KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is not a row of an evaluation"
 BROKEN = "was damaged or changed after the evaluation was finished"
@@ -241,47 +234,3 @@ class Seal:
 def is_sealed(head: Mapping[str, Any]) -> bool:
     """Whether a KEY.json is that of a finished evaluation; that of an earlier version never is."""
     return "rows" in head or "sha256" in head
-
-
-# --- how large a row may be
-
-
-def bounded(judgement: Mapping[str, Any]) -> bytes:
-    """A judgement as JSON that fits into a row: of a longer one each world has an equal share of it."""
-    whole = _json(judgement)
-    verdicts = judgement["verdicts"]
-    most = max(MOST, MOST_OF_WORLD * len(verdicts)) - ROW_HEADER_BYTES
-    if not verdicts or len(whole) < most:
-        return whole
-    longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH} for verdict in verdicts)
-    bare = [
-        {**first_events(verdict, 0), "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)
-    ]
-    share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
-    return _json({**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]})
-
-
-def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
-    trace = verdict["trace"]
-    beside = _sizes_beside(verdict)
-    size = 0
-    for kept, event in enumerate(trace):
-        size += len(_json(event)) + BETWEEN + beside[kept + 1]
-        if size > share:
-            whole = hashlib.sha256(_json(trace)).hexdigest()
-            cut = {"events": len(trace) - kept, "sha256": whole}
-            return {**first_events(verdict, kept), "cut": cut}
-    return verdict
-
-
-def _sizes_beside(verdict: Mapping[str, Any]) -> Counter[int]:
-    """How many bytes the circumstances of each event take, with the place where it led."""
-    sizes: Counter[int] = Counter()
-    for name in CIRCUMSTANCES:
-        for entry in verdict.get(name, ()):
-            sizes[max(1, entry[0] - (name == "places"))] += len(_json(entry)) + BETWEEN
-    return sizes
-
-
-def _json(data: object) -> bytes:
-    return to_line(data).removesuffix(b"\n")

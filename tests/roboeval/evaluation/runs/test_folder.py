@@ -19,11 +19,11 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.judge import TimeLimitExceeded, time_limit
 from roboeval.evaluation.runs.completions import Completion, read_completions
 from roboeval.evaluation.runs.folder import Run, tasks_to_judge
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import open_source, recorded_completions
+from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Suite, load_suite
 from seals import unseal
 

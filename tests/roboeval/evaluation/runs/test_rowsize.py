@@ -19,10 +19,10 @@ from roboeval.analysis.search import Question, answer
 from roboeval.cli.views.completions import completion_view
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judgement
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.rows import MOST, MOST_OF_WORLD, Row
+from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, trace_of
+from roboeval.evaluation.serialization import MOST, MOST_OF_WORLD, judgement
 from roboeval.suites.load import Suite, load_suite
 
 WORLD = World(rooms=(Room("start"),), robot="start", about="nobody is in")
