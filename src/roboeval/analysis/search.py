@@ -18,11 +18,11 @@ from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import can_judge, trace_of
 
-MANY = 2_000  # rows for which other processes are worth their start
+ROWS_FOR_PROCESSES = 2_000  # rows for which other processes are worth their start
 
 
 @dataclass(frozen=True)
-class Question:
+class SearchQuery:
     """What is looked for."""
 
     formula: str | None = None  # of RTL; None matches every trace
@@ -46,10 +46,10 @@ class Found:
         return tuple(sorted((*self.cut, *self.earlier)))
 
 
-def search(lines: Sequence[bytes], question: Question, *, workers: int = 1) -> Iterator[Found]:
+def search(lines: Sequence[bytes], question: SearchQuery, *, workers: int = 1) -> Iterator[Found]:
     """Answer for rows, in their order; where there are many, in so many processes."""
     look = partial(look_through, question=question)
-    if workers == 1 or len(lines) < MANY:
+    if workers == 1 or len(lines) < ROWS_FOR_PROCESSES:
         return iter(look(lines))
     return map_in_processes(look, lines, workers=workers, name=lambda line: sha256(line).digest())
 
@@ -71,13 +71,13 @@ def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
     return counted.agg(found=pl.len(), passed=pl.col("passed").sum())
 
 
-def look_through(lines: Sequence[bytes], question: Question) -> list[Found]:
+def look_through(lines: Sequence[bytes], question: SearchQuery) -> list[Found]:
     """Answer for some rows; the work of one process."""
     formula = None if question.formula is None else parse(question.formula)
     return [answer(json.loads(line), question, formula) for line in lines]
 
 
-def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) -> Found:
+def answer(row: Mapping[str, Any], question: SearchQuery, formula: Formula | None) -> Found:
     """Answer for one row."""
     worlds, cut, earlier = [], [], []
     for number, verdict in _asked(row, question):
@@ -90,7 +90,7 @@ def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) 
     return Found(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
 
 
-def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Mapping[str, Any]]]:
+def _asked(row: Mapping[str, Any], question: SearchQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """The verdicts that a question is about, counted from 1."""
     if question.task not in {None, row["task"]}:
         return

@@ -14,9 +14,9 @@ from roboeval.cli.inputs import expect_same_suite, open_current
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
+    HouseRulesOption,
     JsonOption,
     ProcessOption,
-    RulesOption,
     RunArgument,
     SuiteOption,
     WorkersOption,
@@ -125,7 +125,7 @@ def resample(
     workers: WorkersOption = None,
     engine: EngineOption = "local",
     one_process_per_run: ProcessOption = False,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
     json: JsonOption = False,
 ) -> None:
     """Compute how often programs would pass with rejection sampling.

@@ -11,10 +11,10 @@ from roboeval.cli.output import fail
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
 
-IN_THREADS = 2  # workers that one process keeps busy
+WORKERS_OF_A_PROCESS = 2  # workers that one process keeps busy
 
 
-MANY = 5_000  # programs for which it is worth while to start processes
+PROGRAMS_FOR_PROCESSES = 5_000  # programs for which it is worth while to start processes
 
 
 @contextmanager
@@ -31,7 +31,7 @@ def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[
         with closing(WorkerPool(workers, **isolation)) as pool:
 
             def local(programs: int) -> OpenEngine:
-                if programs < MANY or min(workers, cores()) <= IN_THREADS:
+                if programs < PROGRAMS_FOR_PROCESSES or min(workers, cores()) <= WORKERS_OF_A_PROCESS:
                     return Local(pool)
                 from roboeval.evaluation.processes import Processes
 

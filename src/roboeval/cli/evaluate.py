@@ -17,17 +17,17 @@ from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
+    HouseRulesOption,
     IsolationOption,
     JsonOption,
     KeepOption,
     ProcessOption,
     RedoOption,
-    RulesOption,
-    SeedOption,
     SourceArgument,
     SuiteOption,
     TasksOption,
     WorkersOption,
+    WorldSeedOption,
     WorldsOption,
     named,
 )
@@ -54,11 +54,11 @@ def evaluate(
     redo: RedoOption = False,
     workers: WorkersOption = None,
     worlds: WorldsOption = None,
-    seed: SeedOption = None,
+    seed: WorldSeedOption = None,
     engine: EngineOption = "local",
     require_isolation: IsolationOption = False,
     one_process_per_run: ProcessOption = False,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
     skills: SkillsOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -70,7 +70,7 @@ def evaluate(
         from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
         from roboeval.evaluation.runs.folder import Run, about_of, tasks_to_judge
-        from roboeval.evaluation.runs.scope import Scope
+        from roboeval.evaluation.runs.scope import JudgingScope
 
         judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
@@ -84,7 +84,7 @@ def evaluate(
             opened = opened_source(source, judged_by)
             run = run or opened.run
             about = {} if opened.run is None else about_of(opened.run)
-            scope = Scope.of(opened.completions, wanted, about, judged_by)
+            scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
                 fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
@@ -173,8 +173,8 @@ def _judged(
         return evaluate_run(
             run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
         )
-    told = judgements(source.of(tasks), suite, ablated=ablated, engine=engine)
-    return (decode_row(row_line(completion, one)) for completion, one in told if one is not None)
+    found = judgements(source.of(tasks), suite, ablated=ablated, engine=engine)
+    return (decode_row(row_line(completion, one)) for completion, one in found if one is not None)
 
 
 def import_(

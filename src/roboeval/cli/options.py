@@ -56,7 +56,7 @@ TasksOption = Annotated[
     typer.Option(help="Only these tasks, separated by commas.", autocompletion=listed_task_names),
 ]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Judge only the common-sense requirements.")]
-RulesOption = Annotated[
+HouseRulesOption = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
@@ -85,7 +85,7 @@ WorldsOption = Annotated[
     int | None,
     typer.Option(min=1, max=10_000, help="Draw this many worlds a task, if the suite draws worlds."),
 ]
-SeedOption = Annotated[
+WorldSeedOption = Annotated[
     int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
 ]
 RequestsOption = Annotated[

@@ -9,7 +9,7 @@ import typer
 
 from roboeval.cli.compare import checked
 from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
-from roboeval.cli.options import RulesOption, SuiteOption, WorkersOption, named
+from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, named
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def report(
         bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
     ] = True,
     workers: WorkersOption = None,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
 ) -> None:
     """Write a report: the paper's figures, tables and one page.
 

@@ -11,7 +11,7 @@ from codebotler.core.terminal import print_rich
 from roboeval.cli.output import watched
 
 if TYPE_CHECKING:
-    from roboeval.analysis.summary import Summary
+    from roboeval.analysis.summary import EvaluationSummary
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.completions import Completion, Key
@@ -31,7 +31,7 @@ class Round:
     """
 
     number: int
-    summary: Summary
+    summary: EvaluationSummary
     requests: int
     accepted: int
     tokens: int
@@ -108,7 +108,7 @@ def _round(
     from roboeval.evaluation.requests import add_usage, no_usage
     from roboeval.evaluation.rounds import round_of
     from roboeval.evaluation.runs.rows import key_of
-    from roboeval.evaluation.runs.scope import Scope
+    from roboeval.evaluation.runs.scope import JudgingScope
 
     rows = evaluate_run(run, plan.suite, ablated=False, tasks=plan.tasks, redo=False, engine=engine)
     tally, usage = Tally(), no_usage()
@@ -118,5 +118,5 @@ def _round(
     requested = [one for one in completions.values() if round_of(one) == number]
     for one in requested:
         add_usage(usage, one.more.get("usage"))
-    counted = summary(tally, plan.suite, Scope.of(completions.values(), plan.tasks))
+    counted = summary(tally, plan.suite, JudgingScope.of(completions.values(), plan.tasks))
     return Round(number, counted, len(requested), len(completions) - len(problems), usage.total())

@@ -26,14 +26,14 @@ from roboeval.cli.inputs import (
     open_run,
     unfinished_of,
 )
-from roboeval.cli.options import AblationOption, JsonOption, RulesOption, RunArgument, SuiteOption, named
+from roboeval.cli.options import AblationOption, HouseRulesOption, JsonOption, RunArgument, SuiteOption, named
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:
     from polars import DataFrame
 
     from roboeval.analysis.broken_rules import BrokenRules
-    from roboeval.analysis.summary import Summary
+    from roboeval.analysis.summary import EvaluationSummary
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
     from roboeval.evaluation.runs.results import Results
@@ -49,7 +49,7 @@ def show(
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
     k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
     in_full: Annotated[
         bool, typer.Option("--all", help="Of a completion, show satisfied worlds in full, too.")
@@ -100,7 +100,7 @@ def house_of(run: Run | None, suite: Suite, table: DataFrame, *, ablated: bool) 
 
 
 def print_summary(
-    counted: Summary,
+    counted: EvaluationSummary,
     *,
     title: str,
     as_json: bool,

@@ -101,7 +101,7 @@ def _expect_of_run(
 # --- by what a run is judged
 
 
-WORDS = ("words_for_people", "words_for_yes", "words_for_no")  # rules that are left out where empty
+OPTIONAL_RULES = ("words_for_people", "words_for_yes", "words_for_no")  # rules that are left out where empty
 
 
 def evaluation_metadata(
@@ -118,7 +118,7 @@ def evaluation_metadata(
             "literals": rules.literals,
             "matching": rules.matching,
             "people": rules.people,
-            **{name: list(words) for name in WORDS if (words := getattr(rules, name))},
+            **{name: list(words) for name in OPTIONAL_RULES if (words := getattr(rules, name))},
             **({"events": rules.events} if rules.events != PAPER.events else {}),
             "limits": {name: getattr(rules.limits, name) for name in ("seconds", "calls", "ticks")},
             "skill_seconds": 0,

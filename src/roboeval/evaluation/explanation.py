@@ -35,13 +35,13 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
     """Why a completion fails: the world that decided, and its error or failed check, explained."""
     why = row["failure"]
     verdict = row["verdicts"][why["world"]]
-    told = {key: verdict[key] for key in ("world", "error", "line")}
+    ending = {key: verdict[key] for key in ("world", "error", "line")}
     if why["check"] is None:
         explanation = no_program_sentence(why)
-        return {"passed": False, "failure": why, **told, "explanation": explanation, "step": None}
+        return {"passed": False, "failure": why, **ending, "explanation": explanation, "step": None}
     scenario = _scenario(suite, row, why["world"], ablated=ablated)
     explained = _explained(why["check"], scenario, verdict, trace_of(verdict), Patience())
-    return {"passed": False, "failure": why, **told, **explained}
+    return {"passed": False, "failure": why, **ending, **explained}
 
 
 def completion_data(
@@ -155,7 +155,7 @@ def shown_lines(program: str) -> tuple[str, int]:
     return shown, max(0, len(lines) - MOST_LINES)
 
 
-def cut_told(cut: Mapping[str, Any]) -> str:
+def cut_sentence(cut: Mapping[str, Any]) -> str:
     """How much of a trace was not kept, in a sentence."""
     were = "was" if cut["events"] == 1 else "were"
     return f"{counted(cut['events'], 'more step')} {were} not kept, since the trace is too long"

@@ -98,8 +98,8 @@ def evaluate(
         EngineError: no isolated process can be started.
     """
     chosen = engine or Local(workers, require_isolation=require_isolation)
-    told = judgements(completions, suite, ablated=ablated, engine=chosen)
-    return (json.loads(row_line(completion, one)) for completion, one in told if one is not None)
+    found = judgements(completions, suite, ablated=ablated, engine=chosen)
+    return (json.loads(row_line(completion, one)) for completion, one in found if one is not None)
 
 
 def judgements(
@@ -117,16 +117,18 @@ def judgements(
     with engine as opened:
         running = partial(run_in_worlds, suite, ablated=ablated)
         judging = partial(judged, suite, ablated=ablated)
-        for told in opened.map_distinct(running, works(), judging):
+        for by_prompt in opened.map_distinct(running, works(), judging):
             completion = waiting.popleft()
-            if told is None:
+            if by_prompt is None:
                 LOG.warning(
                     "%s is not judged: that took more than %g seconds of processor time; "
                     "`roboeval tasks --lint` finds slow regexes",
                     name_of(completion.key),
                     BUDGET,
                 )
-            yield completion, None if told is None else with_reply(completion, told[completion.prompt])
+                yield completion, None
+            else:
+                yield completion, with_reply(completion, by_prompt[completion.prompt])
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:

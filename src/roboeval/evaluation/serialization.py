@@ -14,13 +14,13 @@ from roboeval.evaluation.failures import NO_PROGRAM, Verdict, failure
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
 
-MOST = 1_000_000  # bytes of a row
-MOST_OF_WORLD = 20_000  # bytes for each world, where there are so many worlds that they come to more
+ROW_BYTES = 1_000_000  # bytes of a row
+WORLD_BYTES = 20_000  # bytes for each world, where there are so many worlds that they come to more
 ROW_HEADER_BYTES = 2_000  # left for the completion: the task's name is that of a file
-BETWEEN = 2  # bytes between two events
-HASH = "0" * 64
+SEPARATOR_BYTES = 2  # bytes between two events
+HASH_PLACEHOLDER = "0" * 64
 
-FAILED = b'{"passed": false, '  # as `judgement` writes it
+FAILED_PREFIX = b'{"passed": false, '  # as `judgement` writes it
 
 
 def with_reply(completion: Completion, judgement_json: bytes) -> bytes:
@@ -28,7 +28,7 @@ def with_reply(completion: Completion, judgement_json: bytes) -> bytes:
 
     Text that is no program ends in some error, and half a program fails some check: neither is the cause.
     """
-    if not judgement_json.startswith(FAILED) or (kind := completion.no_program) is None:
+    if not judgement_json.startswith(FAILED_PREFIX) or (kind := completion.no_program) is None:
         return judgement_json
     found = json.loads(judgement_json)
     cause = {"class": NO_PROGRAM, "kind": kind, "world": found["failure"]["world"], "check": None}
@@ -92,10 +92,10 @@ def bounded(judgement: Mapping[str, Any]) -> bytes:
     """A judgement as JSON that fits into a row: of a longer one each world has an equal share of it."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]
-    most = max(MOST, MOST_OF_WORLD * len(verdicts)) - ROW_HEADER_BYTES
+    most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES
     if not verdicts or len(whole) < most:
         return whole
-    longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH} for verdict in verdicts)
+    longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH_PLACEHOLDER} for verdict in verdicts)
     bare = [
         {**first_events(verdict, 0), "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)
     ]
@@ -108,7 +108,7 @@ def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
     circumstance_sizes = _circumstance_sizes(verdict)
     size = 0
     for kept, event in enumerate(trace):
-        size += len(_json(event)) + BETWEEN + circumstance_sizes[kept + 1]
+        size += len(_json(event)) + SEPARATOR_BYTES + circumstance_sizes[kept + 1]
         if size > share:
             whole = hashlib.sha256(_json(trace)).hexdigest()
             cut = {"events": len(trace) - kept, "sha256": whole}
@@ -121,7 +121,7 @@ def _circumstance_sizes(verdict: Mapping[str, Any]) -> Counter[int]:
     sizes: Counter[int] = Counter()
     for name in CIRCUMSTANCES:
         for entry in verdict.get(name, ()):
-            sizes[max(1, entry[0] - (name == "places"))] += len(_json(entry)) + BETWEEN
+            sizes[max(1, entry[0] - (name == "places"))] += len(_json(entry)) + SEPARATOR_BYTES
     return sizes
 
 

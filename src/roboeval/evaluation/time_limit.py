@@ -9,7 +9,9 @@ import time
 from collections.abc import Iterator
 from types import FrameType
 
-LOOKS = 100  # times that the clock is looked at within a limit; then other threads have their turn, too
+CLOCK_CHECKS = (
+    100  # times that the clock is looked at within a limit; then other threads have their turn, too
+)
 
 
 class TimeLimitExceeded(Exception):  # noqa: N818 - no mistake of the caller
@@ -32,7 +34,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     before = signal.signal(signal.SIGVTALRM, look)
     try:
         try:
-            signal.setitimer(signal.ITIMER_VIRTUAL, seconds / LOOKS, seconds / LOOKS)
+            signal.setitimer(signal.ITIMER_VIRTUAL, seconds / CLOCK_CHECKS, seconds / CLOCK_CHECKS)
             yield
         finally:
             signal.signal(signal.SIGVTALRM, signal.SIG_IGN)

@@ -16,7 +16,7 @@ from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
     GONE,
     LOWERED,
-    cut_told,
+    cut_sentence,
     error_sentence,
     failing_first,
     instruction_shown,
@@ -149,7 +149,7 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
     if world["steps"] or cut is None:
         parts.append(storyboard(world["steps"], {check["step"] for check in world["failed_checks"]}))
     if cut is not None:
-        parts.append(Padding(Text(cut_told(cut), "yellow"), (0, 0, 0, 2)))
+        parts.append(Padding(Text(cut_sentence(cut), "yellow"), (0, 0, 0, 2)))
     for check in world["failed_checks"]:
         text = Text.assemble(
             ("failed ", "red"),

@@ -38,7 +38,7 @@ class Completion:
         prompt: which phrasing, counted from 0, below a billion.
         index: which sample, counted from 0, below a billion.
         program: the cleaned source; judged exactly as it stands.
-        instruction: what the model was told; None where nobody recorded it.
+        instruction: the sentence that the model was asked for; None where nobody recorded it.
         model: who wrote it.
         more: what else its row says, such as `usage`, `raw_reply` and `finish_reason`.
 

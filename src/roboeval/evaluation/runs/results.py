@@ -18,7 +18,7 @@ from roboeval.evaluation.requests import requested_tasks
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, evaluation_of, load_head, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
-from roboeval.evaluation.runs.scope import Scope
+from roboeval.evaluation.runs.scope import JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
 from roboeval.evaluation.runs.traces import without_trace
 from roboeval.suites.load import ABLATED, Suite, load_suite
@@ -90,9 +90,9 @@ class Results:
         return None if requested is None else selected | requested
 
     @property
-    def scope(self) -> Scope:
+    def scope(self) -> JudgingScope:
         """What there is to judge."""
-        return Scope.of(self.completions.values(), self.tasks, self.about, self.suite)
+        return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
 
     @property
     def is_ablated(self) -> bool:

@@ -179,7 +179,7 @@ def read_lines_of(
 ) -> Iterator[LocatedRow]:
     """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
     seal = seal or Seal()
-    at, is_told = 0, False
+    at, is_reported = 0, False
     for number, line in read_lines(path, limit=LONGEST_LINE):
         seal.add(line)
         try:
@@ -192,9 +192,9 @@ def read_lines_of(
             if not line.endswith(b"\n"):
                 break
             add_or_raise(UserError(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
-            is_told = True
+            is_reported = True
         at += len(line)
-    if seal.is_broken(head) and not is_told:
+    if seal.is_broken(head) and not is_reported:
         add_or_raise(UserError(f"{BROKEN}; --redo starts over", file=path), faults)
 
 
