@@ -67,7 +67,7 @@ def find(
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = groups(failed, results.programs)
     shown = together if json else together[:most]
-    shown_clusters = list(watched(clusters(shown, results), "comparing", len(shown)))
+    described = list(watched(clusters(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if cut := sum(bool(one.cut) for one in every):
         note(f"undecided, since their traces were too long to keep: {how_many(cut)}")
@@ -80,13 +80,11 @@ def find(
             "found": [found_data(one, one.worlds, passed) for one in found],
             "undecided": [found_data(one, one.undecided, passed) for one in undecided],
         }
-        print_json({**data, "groups": list(map(cluster_data, shown_clusters))})
+        print_json({**data, "groups": list(map(cluster_data, described))})
     else:
         counts = found_by_task(found, results.table)
         is_search = formula is not None
-        print_rich(
-            found_view(found, counts, total, shown_clusters, groups=len(together), is_search=is_search)
-        )
+        print_rich(found_view(found, counts, total, described, groups=len(together), is_search=is_search))
 
 
 def expect_question(question: SearchQuery, suite: Suite, *, ablated: bool) -> None:
