@@ -18,7 +18,8 @@ from pathlib import Path
 import polars as pl
 
 from codebotler.core.files import to_line, to_text
-from roboeval.evaluation.judge import evaluate, head
+from roboeval.evaluation.evaluate import evaluation_metadata
+from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import read_results
@@ -64,7 +65,7 @@ def made_up(folder: Path, number: int, suite: Suite) -> Run:
     run.rows("paper").parent.mkdir(parents=True)
     about = {"model": f"model-{number}", "settings": {"temperature": 0.2}, "codebotler": "0.1.0"}
     run.about.write_bytes(to_text(about))
-    run.head("paper").write_bytes(to_text({**head(suite), "ablation": False, "tasks": None}))
+    run.head("paper").write_bytes(to_text(evaluation_metadata(suite)))
     with run.completions.open("wb") as completions, run.rows("paper").open("wb") as judged:
         for (task, prompt), those in by_prompt.items():
             for index in range(COMPLETIONS):

@@ -17,7 +17,7 @@ from roboeval import evaluate, load_results, load_suite, recorded_completions
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import overall
 from roboeval.analysis.summary import failures
-from roboeval.evaluation.judge import head
+from roboeval.evaluation.evaluate import evaluation_metadata
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.rows import Seal
 
@@ -50,7 +50,7 @@ def made_up(folder: Path) -> Run:
     with run.rows("paper").open("rb") as judged:
         for line in judged:
             seal.add(line)
-    run.head("paper").write_bytes(to_text({**head(suite), **seal.data()}))
+    run.head("paper").write_bytes(to_text({**evaluation_metadata(suite), **seal.data()}))
     return run
 
 

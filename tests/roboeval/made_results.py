@@ -16,12 +16,12 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Trace
 from codebotler.core.world import World
 from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluation.judge import row_line
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, without_other_traces
-from roboeval.evaluation.runs.rows import JudgedRow, Row, RowData, judged_row, key_of
+from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.table import TableBuilder, keys_where
+from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 VERDICT = {
@@ -36,9 +36,9 @@ VERDICT = {
 }
 
 
-def judged_rows(rows: Iterable[RowData], programs: Mapping[Key, str] = {}) -> list[JudgedRow]:
+def judged_rows(rows: Iterable[Mapping[str, Any]], programs: Mapping[Key, str] = {}) -> list[Row]:
     """Rows as they are read; what a test leaves out is filled in."""
-    return [judged_row(to_line(_whole(row, programs.get(key_of(row), "")))) for row in rows]
+    return [decode_row(to_line(_whole(row, programs.get(key_of(row), "")))) for row in rows]
 
 
 def row_of(completion: Completion, judgement: bytes) -> Row:
@@ -47,7 +47,7 @@ def row_of(completion: Completion, judgement: bytes) -> Row:
     return row
 
 
-def _whole(row: RowData, program: str) -> dict[str, Any]:
+def _whole(row: Mapping[str, Any], program: str) -> dict[str, Any]:
     failure = row.get("failure")
     least = 1 if failure is None else failure["world"] + 1
     verdicts = [{**VERDICT, **verdict} for verdict in row.get("verdicts", ())]
@@ -69,7 +69,7 @@ def as_driven(world: World, *events: Event) -> Trace:
     return tuple(driven)
 
 
-def table_of(rows: Iterable[RowData]) -> pl.DataFrame:
+def table_of(rows: Iterable[Mapping[str, Any]]) -> pl.DataFrame:
     """The table of some rows."""
     builder = TableBuilder()
     for row in judged_rows(rows):
@@ -78,7 +78,7 @@ def table_of(rows: Iterable[RowData]) -> pl.DataFrame:
 
 
 def results_of(
-    rows: Iterable[RowData],
+    rows: Iterable[Mapping[str, Any]],
     suite: Suite | None = None,
     programs: Mapping[Key, str] = {},
     *,
@@ -104,8 +104,8 @@ def results_of(
     failed = {}
     for row in judged:
         builder.add(row)
-        if row.failure is not None:
-            failed[row.key] = without_other_traces(row, row.failure.world)
+        if (failure := row["failure"]) is not None:
+            failed[key_of(row)] = without_other_traces(row, failure["world"])
     table = builder.table()
     return Results(
         run=Run(Path("nowhere")),
@@ -118,5 +118,5 @@ def results_of(
         passed=keys_where(table, "passed"),
         stale=keys_where(table, "stale"),
         failed=failed,
-        places={row.key: (0, 0) for row in judged},
+        places={key_of(row): (0, 0) for row in judged},
     )

@@ -11,7 +11,7 @@ from roboeval.analysis.metrics import Estimate, by_formula, mean_of
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.rows import RowData
+from roboeval.evaluation.runs.rows import Row, failure_of
 from roboeval.evaluation.runs.traces import has_circumstances, trace_of
 from roboeval.suites.load import Suite
 
@@ -74,12 +74,12 @@ def _number(condition: pl.Expr) -> pl.Expr:
     return pl.when(~of_failed.is_null().any()).then(of_failed.sum())
 
 
-def never_returned(row: RowData) -> bool | None:
+def never_returned(row: Row) -> bool | None:
     """Whether, in the world that decided, the robot left its first room for good.
 
     False if the trace was too long to be kept; None if an earlier version judged it, and kept no places.
     """
-    verdict = row["verdicts"][row["failure"]["world"]]
+    verdict = row["verdicts"][failure_of(row)["world"]]
     if "cut" in verdict:
         return False
     if not has_circumstances(verdict):

@@ -15,8 +15,8 @@ from codebotler.core.program import TASK_FUNCTION, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
 from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import Key, name_of
-from roboeval.evaluation.runs.judged import RunEvaluation
-from roboeval.evaluation.runs.rows import RowData, key_of
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.rows import Row, failure_of, key_of
 
 Lines: TypeAlias = tuple[str, ...]
 Change: TypeAlias = tuple[str, str]  # of a difference: `-`, `+` or a space, and the line
@@ -66,14 +66,14 @@ class Cluster:
         return sorted({prompt for _, prompt, _ in self.members})
 
 
-def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[RowData]]:
+def groups(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]]:
     """Put failing completions together, the largest groups first; of one size, tasks take turns.
 
     Replies without a program are one group for each task and kind, whatever their text.
     """
-    grounds: defaultdict[Ground, list[RowData]] = defaultdict(list)
+    grounds: defaultdict[Ground, list[Row]] = defaultdict(list)
     for row in failed:
-        why = row["failure"]
+        why = failure_of(row)
         grounds[row["task"], why["class"], why["kind"], why["check"]].append(row)
     shape_of = cache(shape)
     found = (group for rows in grounds.values() for group in _grouped(rows, programs, shape_of))
@@ -83,7 +83,7 @@ def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[
     return [rows for _, _, rows in sorted(placed, key=lambda one: one[:2])]
 
 
-def clusters(groups: Iterable[Sequence[RowData]], results: RunEvaluation) -> Iterator[Cluster]:
+def clusters(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[Cluster]:
     """Say of each group why it fails and what would have helped."""
     programs = results.programs
     right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
@@ -96,10 +96,10 @@ def clusters(groups: Iterable[Sequence[RowData]], results: RunEvaluation) -> Ite
         most = max(often.values())
         row = next(row for row in rows if often[programs.get(key_of(row))] == most)
         program = programs.get(key_of(row))
-        has_none = program is None or row["failure"]["class"] == NO_PROGRAM
+        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM
         yield Cluster(
             task=row["task"],
-            failure=row["failure"],
+            failure=failure_of(row),
             members=tuple(sorted(map(key_of, rows))),
             representative=key_of(row),
             program=program,
@@ -108,7 +108,7 @@ def clusters(groups: Iterable[Sequence[RowData]], results: RunEvaluation) -> Ite
         )
 
 
-def nearest_fix(results: RunEvaluation, key: Key) -> Fix | None:
+def nearest_fix(results: Results, key: Key) -> Fix | None:
     """What turns one completion into one that passes; None if its program is gone or no other passes."""
     programs = results.programs
     if key not in programs:
@@ -118,16 +118,16 @@ def nearest_fix(results: RunEvaluation, key: Key) -> Fix | None:
 
 
 def _grouped(
-    rows: Sequence[RowData], programs: Mapping[Key, str], shape_of: Callable[[str], Lines]
-) -> Iterator[list[RowData]]:
+    rows: Sequence[Row], programs: Mapping[Key, str], shape_of: Callable[[str], Lines]
+) -> Iterator[list[Row]]:
     """Rows of one ground, those of similar programs together."""
-    if rows[0]["failure"]["class"] == NO_PROGRAM:
+    if failure_of(rows[0])["class"] == NO_PROGRAM:
         yield sorted(rows, key=key_of)
         return
-    of_shape: defaultdict[Lines, list[RowData]] = defaultdict(list)
+    of_shape: defaultdict[Lines, list[Row]] = defaultdict(list)
     for row in sorted(rows, key=key_of):
         of_shape[shape_of(programs.get(key_of(row), ""))].append(row)
-    leaders: list[tuple[Counter[str], list[RowData]]] = []
+    leaders: list[tuple[Counter[str], list[Row]]] = []
     for lines, those in sorted(of_shape.items(), key=lambda item: (-len(item[1]), key_of(item[1][0]))):
         counts = Counter(lines)
         near = next((group for leader, group in leaders if similarity(leader, counts) >= ALIKE), None)

@@ -135,32 +135,32 @@ def _better(comparison: Comparison, names: tuple[str, str]) -> str:
         return f"{better} is better than {other} by {by} ({p_text(comparison.p_tasks)} over tasks)."
     if comparison.p_prompts <= LEVEL:
         tasks = counted(len(comparison.tasks), "task")
-        told = f"{p_text(comparison.p_prompts)} over prompts"
+        p_value = f"{p_text(comparison.p_prompts)} over prompts"
         return (
-            f"{better} is better than {other} by {by} on prompts like these ({told}); "
+            f"{better} is better than {other} by {by} on prompts like these ({p_value}); "
             f"{tasks} cannot speak for others."
         )
-    told = f"{p_text(comparison.p_tasks)} over tasks"
-    return f"{better} passes more often than {other} by {by}, which may well be chance ({told})."
+    p_value = f"{p_text(comparison.p_tasks)} over tasks"
+    return f"{better} passes more often than {other} by {by}, which may well be chance ({p_value})."
 
 
 def unlike(first: Results, second: Results) -> list[str]:
     """What differs between two runs, other than the model, and may explain a difference."""
     judged_with = ("python", "codebotler")  # of generation, run.json has these as well
     runs = [{**one.about, **{name: one.head.get(name) for name in judged_with}} for one in (first, second)]
-    told = []
+    differences = []
     for name, words in WORDS.items():
         a, b = (run.get(name) for run in runs)
         if a is not None and b is not None and a != b:
-            told.append(f"{words} differ: {_said(a)} and {_said(b)}")
+            differences.append(f"{words} differ: {_said(a)} and {_said(b)}")
     settings = [found if isinstance(found := run.get("settings"), dict) else {} for run in runs]
     if bool(settings[0]) != bool(settings[1]):
-        told.append("the settings of one of them were not recorded")
+        differences.append("the settings of one of them were not recorded")
     for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
         a, b = (one.get(name) for one in settings)
         if a != b:
-            told.append(f"{name.replace('_', '-')} differs: {_said(a)} and {_said(b)}")
-    return told
+            differences.append(f"{name.replace('_', '-')} differs: {_said(a)} and {_said(b)}")
+    return differences
 
 
 WORDS = {

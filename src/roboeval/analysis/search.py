@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
 from typing import Any
 
 import polars as pl
 
 from codebotler.rtl import Formula, Inconclusive, holds, parse
 from roboeval.analysis.counts import completions_of
+from roboeval.evaluation.processes import map_in_processes
 from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import can_judge, trace_of
 
-BATCH = 100  # rows that a process looks through at a time
-SMALL = 20  # batches for which other processes are not worth their start
+ROWS_FOR_PROCESSES = 2_000  # rows for which other processes are worth their start
 
 
 @dataclass(frozen=True)
-class Question:
+class SearchQuery:
     """What is looked for."""
 
     formula: str | None = None  # of RTL; None matches every trace
@@ -46,37 +46,12 @@ class Found:
         return tuple(sorted((*self.cut, *self.earlier)))
 
 
-class Search:
-    """Tries a formula on rows while they are read; where there are many, in `workers` processes."""
-
-    def __init__(self, question: Question, *, workers: int = 1) -> None:
-        self._question, self._workers = question, workers
-        self._lines: list[bytes] = []
-        self._pool: ProcessPoolExecutor | None = None
-        self._waiting: list[Future[list[Found]]] = []
-
-    def see(self, line: bytes) -> None:
-        """Take the next row into account."""
-        self._lines.append(line)
-        if len(self._lines) < BATCH * (SMALL if self._pool is None else 1) or self._workers == 1:
-            return
-        if self._pool is None:
-            # Other processes are started anew: this one may have threads, which a fork would break.
-            self._pool = ProcessPoolExecutor(self._workers, multiprocessing.get_context("spawn"))
-        lines, self._lines = self._lines, []
-        for start in range(0, len(lines), BATCH):
-            batch = lines[start : start + BATCH]
-            self._waiting.append(self._pool.submit(look_through, batch, self._question))
-
-    def found(self) -> Iterator[Found]:
-        """The answers, in the order of the rows; ends the processes."""
-        if self._pool is None:
-            yield from look_through(self._lines, self._question)
-            return
-        with self._pool:
-            self._waiting.append(self._pool.submit(look_through, self._lines, self._question))
-            for future in self._waiting:
-                yield from future.result()
+def search(lines: Sequence[bytes], question: SearchQuery, *, workers: int = 1) -> Iterator[Found]:
+    """Answer for rows, in their order; where there are many, in so many processes."""
+    look = partial(look_through, question=question)
+    if workers == 1 or len(lines) < ROWS_FOR_PROCESSES:
+        return iter(look(lines))
+    return map_in_processes(look, lines, workers=workers, name=lambda line: sha256(line).digest())
 
 
 def looked_at(table: pl.DataFrame, task: str | None) -> int:
@@ -96,13 +71,13 @@ def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
     return counted.agg(found=pl.len(), passed=pl.col("passed").sum())
 
 
-def look_through(lines: Sequence[bytes], question: Question) -> list[Found]:
+def look_through(lines: Sequence[bytes], question: SearchQuery) -> list[Found]:
     """Answer for some rows; the work of one process."""
     formula = None if question.formula is None else parse(question.formula)
     return [answer(json.loads(line), question, formula) for line in lines]
 
 
-def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) -> Found:
+def answer(row: Mapping[str, Any], question: SearchQuery, formula: Formula | None) -> Found:
     """Answer for one row."""
     worlds, cut, earlier = [], [], []
     for number, verdict in _asked(row, question):
@@ -115,7 +90,7 @@ def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) 
     return Found(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
 
 
-def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Mapping[str, Any]]]:
+def _asked(row: Mapping[str, Any], question: SearchQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """The verdicts that a question is about, counted from 1."""
     if question.task not in {None, row["task"]}:
         return

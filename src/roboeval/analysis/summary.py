@@ -21,7 +21,7 @@ from roboeval.analysis.metrics import (
 from roboeval.analysis.tally import Tally
 from roboeval.evaluation.failures import CLASSES, NO_PROGRAM
 from roboeval.evaluation.runs.completions import how_many
-from roboeval.evaluation.runs.scope import Coverage, CutOff, Scope
+from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
 from roboeval.suites.load import Suite
 
 
@@ -36,14 +36,14 @@ class Failures:
 
 
 @dataclass(frozen=True)
-class Summary:
+class EvaluationSummary:
     """An evaluation in numbers."""
 
     k: tuple[int, ...]
     tasks: tuple[TaskScore, ...]  # those that have completions, in the suite's order
     overall: tuple[Estimate, ...]  # pass@k for each k
     failures: tuple[Failures, ...]
-    scope: Scope
+    scope: JudgingScope
     missing: Missing  # tasks of the suite without a score
     ablated: bool = False  # common sense only was required
 
@@ -63,7 +63,7 @@ class Summary:
         return cut_off(self.failures, self.scope)
 
 
-def cut_off(failures: Iterable[Failures], scope: Scope) -> CutOff:
+def cut_off(failures: Iterable[Failures], scope: JudgingScope) -> CutOff:
     """The replies of a run that were cut off, given how its completions fail."""
     kinds = (kind for one in failures if one.name == NO_PROGRAM for kind in one.kinds)
     without = sum(kind.count for kind in kinds if kind.name == "cut-off")
@@ -82,11 +82,11 @@ class Missing:
 def summary(
     tally: Tally,
     suite: Suite,
-    scope: Scope,
+    scope: JudgingScope,
     *,
     k: Sequence[int] = (1,),
     ablated: bool = False,
-) -> Summary:
+) -> EvaluationSummary:
     """Count how completions did; raises UserError where there is none, or k is too large for a prompt."""
     tasks = tally.scores(suite.tasks)
     if not tasks:
@@ -99,10 +99,10 @@ def summary(
     scored = {score.task for score in tasks}
     expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
     missing = _missing([name for name in expected if name not in scored], scope)
-    return Summary(tuple(k), tasks, estimates, failures(tally), scope, missing, ablated)
+    return EvaluationSummary(tuple(k), tasks, estimates, failures(tally), scope, missing, ablated)
 
 
-def _missing(tasks: Sequence[str], scope: Scope) -> Missing:
+def _missing(tasks: Sequence[str], scope: JudgingScope) -> Missing:
     selected = [task for task in tasks if scope.selects(task)]
     return Missing(
         no_completions=tuple(task for task in selected if not scope.completions.get(task)),
@@ -159,7 +159,7 @@ def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
     return [*known, *sorted(there - {*known})]
 
 
-def summary_data(summary: Summary) -> dict[str, Any]:
+def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
     """A summary as plain data."""
     estimates = zip(summary.k, summary.overall, strict=True)
     return {
@@ -180,7 +180,7 @@ def summary_data(summary: Summary) -> dict[str, Any]:
     }
 
 
-def _task_score_data(task: TaskScore, summary: Summary) -> dict[str, Any]:
+def _task_score_data(task: TaskScore, summary: EvaluationSummary) -> dict[str, Any]:
     ks = summary.k
     spreads = {
         f"pass@{k}": {"mean": task.pass_at(k).mean, "lowest": task.lowest(k), "highest": task.highest(k)}

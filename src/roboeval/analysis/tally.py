@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from roboeval.analysis.metrics import PromptScore, TaskScore
 from roboeval.evaluation.runs.completions import Key
-from roboeval.evaluation.runs.rows import JudgedRow
+from roboeval.evaluation.runs.rows import Row, key_of
 
 
 class Tally:
@@ -19,16 +19,16 @@ class Tally:
         self.failed: Counter[tuple[str, str]] = Counter()  # by class and kind of the failure
         self.first_failed: Key | None = None
 
-    def add(self, row: JudgedRow) -> None:
+    def add(self, row: Row) -> None:
         """Count a completion."""
-        prompt = row.task, row.prompt
+        prompt = row["task"], row["prompt"]
         self.judged[prompt] += 1
-        if row.failure is None:
+        if (why := row["failure"]) is None:
             self.passed[prompt] += 1
             return
-        self.failed[row.failure.failure_class, row.failure.kind] += 1
+        self.failed[why["class"], why["kind"]] += 1
         if self.first_failed is None:
-            self.first_failed = row.key
+            self.first_failed = key_of(row)
 
     def scores(self, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
         """How often completions pass, by task and prompt (paper, section IV.C).

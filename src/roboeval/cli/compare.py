@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboeval.cli.engine_choice import engine_named
+from roboeval.cli.inputs import expect_same_suite, open_current
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
+    HouseRulesOption,
     JsonOption,
     ProcessOption,
-    RulesOption,
     RunArgument,
     SuiteOption,
     WorkersOption,
-    engine_named,
-    expect_same_suite,
     named,
-    open_current,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
@@ -102,7 +101,7 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
     found = []
     for path in paths:
         first = open_current(path, names[0], ablated=ablated).results
-        second = open_current(path, names[1], ablated=ablated, beside=first).results
+        second = open_current(path, names[1], ablated=ablated, reuse_from=first).results
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:
@@ -126,7 +125,7 @@ def resample(
     workers: WorkersOption = None,
     engine: EngineOption = "local",
     one_process_per_run: ProcessOption = False,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
     json: JsonOption = False,
 ) -> None:
     """Compute how often programs would pass with rejection sampling.

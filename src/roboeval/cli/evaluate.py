@@ -12,24 +12,23 @@ from codebotler.cli.ending import STOPPED
 from codebotler.cli.options import SkillsOption
 from codebotler.core.errors import installed
 from codebotler.core.words import counted
+from roboeval.cli.engine_choice import engine_named
+from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
+    HouseRulesOption,
     IsolationOption,
     JsonOption,
     KeepOption,
     ProcessOption,
     RedoOption,
-    RulesOption,
-    SeedOption,
     SourceArgument,
     SuiteOption,
     TasksOption,
     WorkersOption,
+    WorldSeedOption,
     WorldsOption,
-    command,
-    engine_named,
-    load,
     named,
 )
 from roboeval.cli.output import fail, metered, note, watched
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.rows import JudgedRow
+    from roboeval.evaluation.runs.rows import Row
     from roboeval.evaluation.runs.source import Source
     from roboeval.evaluation.runs.table import TableBuilder
     from roboeval.suites.load import Suite
@@ -55,11 +54,11 @@ def evaluate(
     redo: RedoOption = False,
     workers: WorkersOption = None,
     worlds: WorldsOption = None,
-    seed: SeedOption = None,
+    seed: WorldSeedOption = None,
     engine: EngineOption = "local",
     require_isolation: IsolationOption = False,
     one_process_per_run: ProcessOption = False,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
     skills: SkillsOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -71,7 +70,7 @@ def evaluate(
         from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
         from roboeval.evaluation.runs.folder import Run, about_of, tasks_to_judge
-        from roboeval.evaluation.runs.scope import Scope
+        from roboeval.evaluation.runs.scope import JudgingScope
 
         judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
@@ -85,7 +84,7 @@ def evaluate(
             opened = opened_source(source, judged_by)
             run = run or opened.run
             about = {} if opened.run is None else about_of(opened.run)
-            scope = Scope.of(opened.completions, wanted, about, judged_by)
+            scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
                 fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
@@ -162,19 +161,20 @@ def _judged(
     ablated: bool,
     redo: bool,
     engine: OpenEngine,
-) -> Iterator[JudgedRow]:
+) -> Iterator[Row]:
     """Judge completions, in a run if there is one to keep the rows."""
     from roboeval.evaluation.evaluate import evaluate_run
-    from roboeval.evaluation.judge import judgements, row_line
-    from roboeval.evaluation.runs.rows import judged_row
+    from roboeval.evaluation.judge import judgements
+    from roboeval.evaluation.runs.rows import decode_row
+    from roboeval.evaluation.serialization import row_line
 
     if run is not None:
         completions = source.completions
         return evaluate_run(
             run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
         )
-    told = judgements(source.of(tasks), suite, ablated=ablated, engine=engine)
-    return (judged_row(row_line(completion, one)) for completion, one in told if one is not None)
+    found = judgements(source.of(tasks), suite, ablated=ablated, engine=engine)
+    return (decode_row(row_line(completion, one)) for completion, one in found if one is not None)
 
 
 def import_(

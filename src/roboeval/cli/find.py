@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from roboeval.cli.inputs import load, open_current
 from roboeval.cli.options import (
     AblationOption,
     InWorldOption,
@@ -14,13 +15,11 @@ from roboeval.cli.options import (
     RunArgument,
     SuiteOption,
     TaskOption,
-    load,
-    open_current,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
-    from roboeval.analysis.search import Found, Question
+    from roboeval.analysis.search import Found, SearchQuery
     from roboeval.evaluation.runs.completions import Key
     from roboeval.suites.load import Suite
 
@@ -50,7 +49,7 @@ def find(
     """
     from codebotler.simulator.pool import cores
     from roboeval.analysis.cluster import cluster_data, clusters, groups
-    from roboeval.analysis.search import Question, Search, found_by_task, looked_at
+    from roboeval.analysis.search import SearchQuery, found_by_task, looked_at, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, as_judged
@@ -59,16 +58,16 @@ def find(
         fail("--not needs a formula; add one, or leave --not out")
     known = as_judged(Run(run), load(suite), ablated=ablation)
     task = None if task is None else known.task(task).name
-    question = Question(formula, negated, task, world)
+    question = SearchQuery(formula, negated, task, world)
     expect_question(question, known, ablated=ablation)
-    searching = Search(question, workers=workers or cores())
-    results = open_current(run, suite, ablated=ablation, see=searching.see).results
-    every = list(watched(searching.found(), "looking", len(results.places)))
+    lines: list[bytes] = []
+    results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
+    every = list(watched(search(lines, question, workers=workers or cores()), "looking", len(lines)))
     found = [one for one in every if one.worlds]
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = groups(failed, results.programs)
     shown = together if json else together[:most]
-    told = list(watched(clusters(shown, results), "comparing", len(shown)))
+    described = list(watched(clusters(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if cut := sum(bool(one.cut) for one in every):
         note(f"undecided, since their traces were too long to keep: {how_many(cut)}")
@@ -81,14 +80,14 @@ def find(
             "found": [found_data(one, one.worlds, passed) for one in found],
             "undecided": [found_data(one, one.undecided, passed) for one in undecided],
         }
-        print_json({**data, "groups": list(map(cluster_data, told))})
+        print_json({**data, "groups": list(map(cluster_data, described))})
     else:
         counts = found_by_task(found, results.table)
         is_search = formula is not None
-        print_rich(found_view(found, counts, total, told, groups=len(together), is_search=is_search))
+        print_rich(found_view(found, counts, total, described, groups=len(together), is_search=is_search))
 
 
-def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
+def expect_question(question: SearchQuery, suite: Suite, *, ablated: bool) -> None:
     """Refuse a wrong formula, and a world that no task has."""
     from codebotler.core.errors import UserError
     from codebotler.rtl import RtlSyntaxError, parse

@@ -19,7 +19,9 @@ from codebotler.cli.options import (
 )
 from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
+from roboeval.cli.engine_choice import engine_named
 from roboeval.cli.evaluate import evaluate
+from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
     BudgetOption,
     ConcurrencyOption,
@@ -35,9 +37,6 @@ from roboeval.cli.options import (
     SuiteOption,
     TasksOption,
     WorkersOption,
-    command,
-    engine_named,
-    load,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
@@ -47,7 +46,7 @@ if TYPE_CHECKING:
     from codebotler.models.base import Model
     from codebotler.models.batch import BatchModel
     from codebotler.models.sampling import SamplingSettings
-    from roboeval.evaluation.generate import Pace, Progress
+    from roboeval.evaluation.generate import GenerationProgress, Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import Run
 
@@ -263,9 +262,9 @@ def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
 class Meter(ExitStack):
     """Shows the progress of a run: its rate, its tokens and the time left."""
 
-    progress: Progress | None = None
+    progress: GenerationProgress | None = None
 
-    def show(self, progress: Progress) -> None:
+    def show(self, progress: GenerationProgress) -> None:
         """Draw the bar; start it first, and note what was done before."""
         if self.progress is None:
             self.progress = progress

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, load, named, task_names
+from roboeval.cli.completion_names import task_names
+from roboeval.cli.inputs import load
+from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, named
 from roboeval.cli.output import note, print_rich, watched
 
 if TYPE_CHECKING:

@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.compare import checked
-from roboeval.cli.options import (
-    RulesOption,
-    SuiteOption,
-    WorkersOption,
-    command,
-    expect_same_suite,
-    named,
-    note_houses,
-    open_current,
-)
+from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
+from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, named
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
@@ -48,7 +40,7 @@ def report(
         bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
     ] = True,
     workers: WorkersOption = None,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
 ) -> None:
     """Write a report: the paper's figures, tables and one page.
 
@@ -110,13 +102,13 @@ def judged_run(
     run = results.run
     ablated = other = house = None
     if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
-        ablated = open_current(run.path, suite, ablated=True, beside=results).results
+        ablated = open_current(run.path, suite, ablated=True, reuse_from=results).results
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
         table = checked(results, engine=engine)
     if beside is not None:
-        other = open_current(run.path, beside, ablated=False, beside=results).results
+        other = open_current(run.path, beside, ablated=False, reuse_from=results).results
     if rules is not None:
-        house = open_current(run.path, suite, ablated=False, rules=rules, beside=results).results
+        house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results).results
     return JudgedRun(results, table, ablated=ablated, beside=other, house=house)

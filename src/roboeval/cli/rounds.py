@@ -88,15 +88,16 @@ def _round(
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.requests import add_usage, no_usage
     from roboeval.evaluation.rounds import round_of
-    from roboeval.evaluation.runs.scope import Scope
+    from roboeval.evaluation.runs.rows import key_of
+    from roboeval.evaluation.runs.scope import JudgingScope
 
     rows = evaluate_run(run, plan.suite, ablated=False, tasks=plan.tasks, redo=False, engine=engine)
     tally, usage = Tally(), no_usage()
     for row in watched(rows, "judging", len(completions)):
-        if row.key in completions:
+        if key_of(row) in completions:
             tally.add(row)
     requested = [one for one in completions.values() if round_of(one) == number]
     for one in requested:
         add_usage(usage, one.more.get("usage"))
-    counted = summary(tally, plan.suite, Scope.of(completions.values(), plan.tasks))
+    counted = summary(tally, plan.suite, JudgingScope.of(completions.values(), plan.tasks))
     return Round(number, counted, len(requested), len(completions) - len(problems), usage.total())

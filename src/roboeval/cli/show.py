@@ -16,33 +16,26 @@ from codebotler.cli.options import (
     PortOption,
     TokenOption,
 )
-from roboeval.cli.options import (
-    AblationOption,
-    JsonOption,
-    RulesOption,
-    RunArgument,
-    SuiteOption,
+from roboeval.cli.completion_names import task_names
+from roboeval.cli.inputs import (
     command,
     complaint_of,
     load,
-    named,
     note_houses,
-    open_completion,
     open_current,
     open_run,
-    task_names,
     unfinished_of,
 )
+from roboeval.cli.options import AblationOption, HouseRulesOption, JsonOption, RunArgument, SuiteOption, named
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:
     from polars import DataFrame
 
     from roboeval.analysis.broken_rules import BrokenRules
-    from roboeval.analysis.summary import Summary
+    from roboeval.analysis.summary import EvaluationSummary
     from roboeval.evaluation.runs.completions import Key
     from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.judged import RunEvaluation
     from roboeval.evaluation.runs.results import Results
     from roboeval.evaluation.runs.selection import Selection
     from roboeval.suites.load import Suite
@@ -56,7 +49,7 @@ def show(
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
-    rules: RulesOption = None,
+    rules: HouseRulesOption = None,
     k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
     in_full: Annotated[
         bool, typer.Option("--all", help="Of a completion, show satisfied worlds in full, too.")
@@ -74,23 +67,20 @@ def show(
     if what and ablation:
         note("ablation: only common sense was required")
     is_one = what is not None and names_completion(what)
-    if what and is_one:
-        judged, again = open_completion(run, what, suite, ablated=ablation, rules=rules)
-        selection = parse_selection(what, judged.known_suite)
-        show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
-    elif in_full or with_reply:
+    if not is_one and (in_full or with_reply):
         option = "--all" if in_full else "--reply"
         fail(f"{option} applies to one completion; name it as TASK/PROMPT/INDEX, or leave out {option}")
+    judged, again = open_run(run, suite, ablated=ablation, rules=rules)
+    selection = parse_selection(what, judged.known_suite)
+    if selection.task is None:
+        show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
+        if rules is None:
+            note_houses([judged.run], suite)
+    elif is_one:
+        show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
     else:
-        judged, again = open_run(run, suite, ablated=ablation, rules=rules)
-        selection = parse_selection(what, judged.known_suite)
-        if selection.task is None:
-            show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
-            if rules is None:
-                note_houses([judged.run], suite)
-        else:
-            selection.expect_judged(judged)
-            show_part(judged, selection.task, selection.prompt, as_json=json)
+        selection.expect_judged(judged)
+        show_part(judged, selection.task, selection.prompt, as_json=json)
     if (complaint := complaint_of(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
     if not is_one and (unfinished := unfinished_of(judged)) is not None:
@@ -110,7 +100,7 @@ def house_of(run: Run | None, suite: Suite, table: DataFrame, *, ablated: bool) 
 
 
 def print_summary(
-    counted: Summary,
+    counted: EvaluationSummary,
     *,
     title: str,
     as_json: bool,
@@ -160,7 +150,7 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 
 
 def show_completion(
-    judged: RunEvaluation,
+    judged: Results,
     selection: Selection,
     suite: str,
     *,

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboeval.cli.options import JsonOption, SuiteOption, command, load, task_names
+from roboeval.cli.completion_names import task_names
+from roboeval.cli.inputs import command, load
+from roboeval.cli.options import JsonOption, SuiteOption
 from roboeval.cli.output import fail, note, print_json, print_rich, print_text, watched
 
 if TYPE_CHECKING:

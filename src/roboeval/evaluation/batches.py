@@ -168,10 +168,14 @@ def import_answers(
     return Imported(len(new), len(expected), failed, [key for key in missing if key not in failed])
 
 
-Line: TypeAlias = tuple[bytes, Mapping[str, Any]]  # a row of completions.jsonl, and the tokens that it took
+BatchLine: TypeAlias = tuple[
+    bytes, Mapping[str, Any]
+]  # a row of completions.jsonl, and the tokens that it took
 
 
-def _add(run: Run, about: dict[str, Any], lines: list[Line], usage: Counter[str], *, is_whole: bool) -> None:
+def _add(
+    run: Run, about: dict[str, Any], lines: list[BatchLine], usage: Counter[str], *, is_whole: bool
+) -> None:
     """Add rows to a run, and to its run.json the tokens."""
     with closing(Appender(run.completions)) as file:
         for line, used in lines:
@@ -190,7 +194,7 @@ class _Replies:
     model: BatchModel
     plan: GenerationPlan
     there: set[Key]  # completions that the run has
-    lines: dict[Key, Line] = field(default_factory=dict)
+    lines: dict[Key, BatchLine] = field(default_factory=dict)
     failed: dict[Key, str] = field(default_factory=dict)
     refused: dict[Key, ModelError] = field(default_factory=dict)
 

@@ -8,15 +8,19 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, to_text, write_whole
+from codebotler.core.skills.files import files_of
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import brief
-from roboeval.evaluation.engines import Local, OpenEngine
-from roboeval.evaluation.judge import head, judgements, row_line
+from codebotler.simulator.settings import PAPER
+from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
+from roboeval.evaluation.judge import judgements
 from roboeval.evaluation.runs.completions import Completion, Key, name_of
-from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
-from roboeval.evaluation.runs.judged import selected_tasks
-from roboeval.evaluation.runs.rows import JudgedRow, Line, Seal, is_sealed, judged_row, read_lines_of
+from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head, selected_tasks
+from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
+from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 
@@ -30,7 +34,7 @@ def evaluate_run(
     workers: int = 1,
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,  # those of the run, if they were read before
-) -> Iterator[JudgedRow]:
+) -> Iterator[Row]:
     """Judge those completions of tasks that an earlier evaluation has not judged; yield all their rows.
 
     Rows of other tasks stay. A completion whose judging takes too long has no row, and is tried again.
@@ -42,7 +46,7 @@ def evaluate_run(
             for path in (run.rows(key), run.head(key)):
                 path.unlink(missing_ok=True)
         was = _expect_same(run, suite, ablated=ablated)
-        about = _head(suite, ablated=ablated, tasks=_selected(tasks, was))
+        about = evaluation_metadata(suite, ablated=ablated, tasks=_selected(tasks, was))
         if was is None:
             write_whole(run.head(key), to_text(about))
         written = {one.key: one for one in (run.read(suite) if completions is None else completions)}
@@ -50,8 +54,8 @@ def evaluate_run(
             seal, left = Seal(), dict(written)
             for line in read_lines_of(rows.path, was or {}, seal=seal):
                 _expect_of_run(line, written, left, rows.path)
-                del left[line.row.key]
-                if _is_in(line.row.task, tasks):
+                del left[key_of(line.row)]
+                if _is_in(line.row["task"], tasks):
                     yield line.row
             left = {key: one for key, one in left.items() if _is_in(one.task, selected_tasks(about))}
             if was is not None and is_sealed(was) and (left or seal.is_broken(was)):
@@ -66,7 +70,7 @@ def evaluate_run(
                 rows.append(row)
                 seal.add(row)
                 del left[completion.key]
-                yield judged_row(row)
+                yield decode_row(row)
             finished = {**about, **seal.data()}
             if not left and finished != was:
                 rows.sync()
@@ -78,16 +82,17 @@ def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
 
 
 def _expect_of_run(
-    line: Line, written: Mapping[Key, Completion], left: Mapping[Key, Completion], file: Path
+    line: LocatedRow, written: Mapping[Key, Completion], left: Mapping[Key, Completion], file: Path
 ) -> None:
     """Raise UserError where a row judges what is not in the run, or judges it again."""
-    row, completion = line.row, written.get(line.row.key)
+    key = key_of(line.row)
+    completion = written.get(key)
     if completion is None:
-        sentence = f"judges {name_of(row.key)}, which is not in the run"
-    elif row.key not in left:
-        sentence = f"judges {name_of(row.key)} again"
-    elif completion.program_sha256 != row.program_sha256:
-        sentence = f"the program of {name_of(row.key)} has changed since it was judged"
+        sentence = f"judges {name_of(key)}, which is not in the run"
+    elif key not in left:
+        sentence = f"judges {name_of(key)} again"
+    elif completion.program_sha256 != line.row["program_sha256"]:
+        sentence = f"the program of {name_of(key)} has changed since it was judged"
     else:
         return
     raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
@@ -96,8 +101,40 @@ def _expect_of_run(
 # --- by what a run is judged
 
 
-def _head(suite: Suite, *, ablated: bool, tasks: frozenset[str] | None) -> dict[str, Any]:
-    return {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
+OPTIONAL_RULES = ("words_for_people", "words_for_yes", "words_for_no")  # rules that are left out where empty
+
+
+def evaluation_metadata(
+    suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
+) -> dict[str, Any]:
+    """The content of KEY.json: by what the rows of some tasks, or of all, are judged."""
+    rules = suite.rules
+    return {
+        "suite": suite.name,
+        "version": suite.version,
+        "digest": suite.digest,
+        **({} if suite.worlds is None else {"worlds": suite.worlds, "seed": suite.seed}),
+        "rules": {
+            "literals": rules.literals,
+            "matching": rules.matching,
+            "people": rules.people,
+            **{name: list(words) for name in OPTIONAL_RULES if (words := getattr(rules, name))},
+            **({"events": rules.events} if rules.events != PAPER.events else {}),
+            "limits": {name: getattr(rules.limits, name) for name in ("seconds", "calls", "ticks")},
+            "skill_seconds": 0,
+            "clock_starts": rules.clock_starts.isoformat(),
+        },
+        **(
+            {}
+            if (house := suite.house) is None
+            else {"house_rules": {house.name or suite.name: house.digest}}
+        ),
+        **({} if suite.skills is SKILLS else {"skills": files_of(suite.skills)}),
+        "codebotler": __version__,
+        "python": PYTHON_VERSION,
+        "ablation": ablated,
+        "tasks": None if tasks is None else sorted(tasks),
+    }
 
 
 def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> frozenset[str] | None:
@@ -122,7 +159,7 @@ def _expect_same(run: Run, suite: Suite, *, ablated: bool) -> dict[str, Any] | N
             )
         return None
     was = load_head(path)
-    for name, now in _head(suite, ablated=ablated, tasks=None).items():
+    for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
             what = f"{CALLED.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
             raise UserError(f"was judged with another {what}; --redo starts over", file=path)

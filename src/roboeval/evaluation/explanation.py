@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from codebotler.checking.storyboard import steps_of
-from codebotler.core.errors import VIOLATION
-from codebotler.core.program import parsed
 from codebotler.core.skills.kinds import ASK, SAY
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event, Trace
@@ -31,8 +26,7 @@ EARLIER = "judged by an earlier version, which kept no places; evaluate again wi
 CUT = "the trace was too long to keep, so this cannot be explained"
 TOO_LONG = "the traces of this program are too long to explain this as well"
 
-LOWERED = "This suite lower-cases strings before running; shown as written."
-MOST_TEXTS = 200  # of a program, whose capitals are shown
+LOWERED = "This suite lower-cases strings before running; they are shown as it judges them."
 MOST_LINES = 1_000  # of a program that is shown
 MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
 EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one
@@ -42,13 +36,13 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
     """Why a completion fails: the world that decided, and its error or failed check, explained."""
     why = row["failure"]
     verdict = row["verdicts"][why["world"]]
-    told = {key: verdict[key] for key in ("world", "error", "line")}
+    ending = {key: verdict[key] for key in ("world", "error", "line")}
     if why["check"] is None:
         explanation = no_program_sentence(why)
-        return {"passed": False, "failure": why, **told, "explanation": explanation, "step": None}
+        return {"passed": False, "failure": why, **ending, "explanation": explanation, "step": None}
     scenario = _scenario(suite, row, why["world"], ablated=ablated)
     explained = _explained(why["check"], scenario, verdict, trace_of(verdict), Patience())
-    return {"passed": False, "failure": why, **told, **explained}
+    return {"passed": False, "failure": why, **ending, **explained}
 
 
 def completion_data(
@@ -155,78 +149,6 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
 
 
-def as_written(worlds: Sequence[Mapping[str, Any]], program: str | None) -> list[dict[str, Any]]:
-    """What is told of worlds whose texts were lowered, with the program's capitals where they are clear."""
-    capitals = _Capitals(_spellings(program or ""))
-    return [capitals.world(world) for world in worlds]
-
-
-class _Capitals:
-    """Puts the capitals of a program into what is told of it, given its texts by how they are lowered."""
-
-    def __init__(self, spellings: Mapping[str, str]) -> None:
-        self._spellings = spellings
-        self._texts = _any_of(spellings)
-        self._names = _any_of(text for text in spellings if not text.isalpha())
-
-    def world(self, world: Mapping[str, Any]) -> dict[str, Any]:
-        """What is told of a world."""
-        error = world["error"]
-        is_rule = error is not None and error["kind"] == VIOLATION  # whose names are not the program's
-        return {
-            **world,
-            "error": error if is_rule else error and {**error, "message": self._sentence(error["message"])},
-            "steps": [self._step(step) for step in world["steps"]],
-            "remarks": [*map(self._sentence, world["remarks"])],
-            "failed_checks": [
-                {**check, "explanation": self._sentence(check["explanation"])}
-                for check in world["failed_checks"]
-            ],
-        }
-
-    def _step(self, step: Mapping[str, Any]) -> dict[str, Any]:
-        texts = ("text", "options", "answer")
-        return {name: self._spelled(value) if name in texts else value for name, value in step.items()}
-
-    def _spelled(self, value: object) -> object:
-        if isinstance(value, list):
-            return [self._spelled(one) for one in value]
-        return self._put(self._texts, value) if isinstance(value, str) else value
-
-    def _sentence(self, sentence: str) -> str:
-        """A sentence of ours, in which single words are from the program only where they are quoted."""
-        parts = sentence.split('"')
-        return '"'.join(self._put(self._texts if at % 2 else self._names, p) for at, p in enumerate(parts))
-
-    def _put(self, pattern: re.Pattern[str], text: str) -> str:
-        return pattern.sub(lambda match: self._spellings[match[0]], text)
-
-
-def _any_of(texts: Iterable[str]) -> re.Pattern[str]:
-    return re.compile("|".join(map(_whole, texts)) or r"(?!)")
-
-
-def _whole(text: str) -> str:
-    start, end = (r"\b" if edge.isalnum() else "" for edge in (text[0], text[-1]))
-    return f"{start}{re.escape(text)}{end}"
-
-
-@lru_cache(maxsize=64)
-def _spellings(program: str) -> dict[str, str]:
-    """The texts in a program that have capitals, by how they are lowered, the longest first."""
-    tree = parsed(program)
-    if not isinstance(tree, ast.Module):
-        return {}
-    written: dict[str, set[str]] = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.strip():
-            text = node.value.strip()
-            written.setdefault(text.lower(), set()).add(text)
-    sure = {low: texts.pop() for low, texts in written.items() if len(texts) == 1}
-    known = sorted((low for low, text in sure.items() if low != text), key=len, reverse=True)
-    return {low: sure[low] for low in known[:MOST_TEXTS]}
-
-
 def shown_lines(program: str) -> tuple[str, int]:
     """A program for people, in short lines without tabs, and how many lines are left out at its end."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
@@ -234,7 +156,7 @@ def shown_lines(program: str) -> tuple[str, int]:
     return shown, max(0, len(lines) - MOST_LINES)
 
 
-def cut_told(cut: Mapping[str, Any]) -> str:
+def cut_sentence(cut: Mapping[str, Any]) -> str:
     """How much of a trace was not kept, in a sentence."""
     were = "was" if cut["events"] == 1 else "were"
     return f"{counted(cut['events'], 'more step')} {were} not kept, since the trace is too long"

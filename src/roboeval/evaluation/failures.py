@@ -133,8 +133,9 @@ def failure(verdicts: Sequence[Verdict]) -> Failure | None:
             error = verdict.outcome.error
             if verdict.failed:
                 first = verdict.failed[0]
-                return Failure(TASK, first.category, index, first.text)
+                return {"class": TASK, "kind": first.category, "world": index, "check": first.text}
             assert error is not None, "a world without error and failed checks is satisfied"
             is_robots = verdict.outcome.status is Status.ROBOT_ERROR
-            return Failure(ROBOT if is_robots else PYTHON, error.kind, index)
+            name = ROBOT if is_robots else PYTHON
+            return {"class": name, "kind": error.kind, "world": index, "check": None}
     return None

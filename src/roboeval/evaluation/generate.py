@@ -49,7 +49,7 @@ class Pace:
 
 
 @dataclass
-class Progress:
+class GenerationProgress:
     """How much of a run is generated."""
 
     total: int
@@ -83,8 +83,8 @@ def generate_run(
     model: Model,
     pace: Pace,
     *,
-    on_progress: Callable[[Progress], None] = lambda _: None,
-) -> Progress:
+    on_progress: Callable[[GenerationProgress], None] = lambda _: None,
+) -> GenerationProgress:
     """Request the completions that a run lacks, each on the disk before it counts; close the model."""
     with run.writing():
         metadata = run_metadata(run, plan, model)
@@ -105,7 +105,7 @@ def generate_run(
             write_whole(run.about, to_text(metadata))
             for completion in given:
                 file.append(to_line(completion.row))
-            progress = Progress(len(keys), len(keys) - len(todo), log.interrupted, usage)
+            progress = GenerationProgress(len(keys), len(keys) - len(todo), log.interrupted, usage)
             with log:
                 on_progress(progress)
                 generation = _Generation(plan, model, pace, file, log, progress, on_progress)
@@ -167,8 +167,8 @@ class _Generation:
     pace: Pace
     file: Appender
     log: RequestLog
-    progress: Progress
-    on_progress: Callable[[Progress], None]
+    progress: GenerationProgress
+    on_progress: Callable[[GenerationProgress], None]
     error: ModelError | None = None
     _failures_in_a_row: int = 0
     _budget: int | None = None  # once it is spent

@@ -1,4 +1,4 @@
-"""The engine that runs and judges programs in several processes of this machine."""
+"""Several processes of this machine: an engine that runs and judges programs in them, and other work."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import map_batches
 from codebotler.simulator.worker import EngineError
 from roboeval.evaluation.engines import BRIEF, Ran, RunPrograms, Value, Work, own_worker
+
+Key = TypeVar("Key")
 
 
 class Processes:
@@ -42,28 +44,45 @@ class Processes:
     ) -> Iterator[Value]:
         """See `Engine`."""
         functions = pickle.dumps((function, then))
-        with self._started() as processes:
+        batch = partial(run_batch, functions, self._isolation)
+        return map_in_processes(batch, works, workers=self._workers, name=lambda work: digest(*work))
 
-            def submit(works: Sequence[Work]) -> Future[Sequence[Value]]:
-                with starting():
-                    return processes.submit(run_batch, functions, self._isolation, works)
 
-            try:
-                yield from map_batches(submit, works, workers=self._workers, name=lambda work: digest(*work))
-            except BrokenExecutor:
-                raise EngineError("a process that judges was lost; perhaps it took too much memory") from None
+def map_in_processes(
+    function: Callable[[Sequence[Key]], Sequence[Value]],
+    keys: Iterable[Key],
+    *,
+    workers: int,
+    name: Callable[[Key], bytes],
+) -> Iterator[Value]:
+    """Call a function with a few keys at a time, in processes; yield the values in the order of the keys.
 
-    @contextmanager
-    def _started(self) -> Iterator[ProcessPoolExecutor]:
-        context = get_context("spawn")
-        with ExitStack() as held:
+    `name` gives each key a short name of its own; equal keys are called once.
+    """
+    with process_pool(workers) as processes:
+
+        def submit(keys: Sequence[Key]) -> Future[Sequence[Value]]:
             with starting():
-                line, ours = context.Pipe(duplex=False)
-                held.enter_context(line)
-                processes = ProcessPoolExecutor(self._workers, context, live_with, (line,))
-            held.callback(processes.shutdown, cancel_futures=True)
-            held.enter_context(ours)  # closed before the pool shuts down, so that workers exit with us
-            yield processes
+                return processes.submit(function, keys)
+
+        try:
+            yield from map_batches(submit, keys, workers=workers, name=name)
+        except BrokenExecutor:
+            raise EngineError("a worker process was lost; perhaps it took too much memory") from None
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that end with the block, or with this process."""
+    context = get_context("spawn")
+    with ExitStack() as held:
+        with starting():
+            pipe, ours = context.Pipe(duplex=False)
+            held.enter_context(pipe)
+            processes = ProcessPoolExecutor(workers, context, exit_with_parent, (pipe,))
+        held.callback(processes.shutdown, cancel_futures=True)
+        held.enter_context(ours)  # closed before the pool shuts down, so that workers exit with us
+        yield processes
 
 
 @contextmanager
@@ -73,17 +92,17 @@ def starting() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise EngineError(f"no process that judges can be started: {error.strerror}") from None
+        raise EngineError(f"no worker process can be started: {error.strerror}") from None
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def live_with(line: Connection) -> None:
-    """Let this process end as soon as the other end of a line is closed."""
+def exit_with_parent(pipe: Connection) -> None:
+    """Let this process end as soon as the other end of a pipe is closed."""
     gc.set_threshold(BRIEF, *gc.get_threshold()[1:])
 
     def end() -> None:
-        line.poll(None)
+        pipe.poll(None)
         os._exit(1)
 
     threading.Thread(target=end, daemon=True).start()

@@ -102,7 +102,7 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
         return
     for solution, judged in zip(solutions(task), verdicts, strict=False):  # an ablation's come afterwards
         failed = _by_some_prompt(judged, len(task.prompts))
-        if (None if failed is None else failed.kind) == solution.fails:
+        if (None if failed is None else failed["kind"]) == solution.fails:
             continue
         said = "pass" if solution.fails is None else f"fail by {solution.fails}"
         where = "" if failed is None else _why(failed, judged)
@@ -116,8 +116,9 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
 
 def _why(failed: Failure, judged: Verdicts) -> str:
     """By which check or error a program fails, and where."""
-    by = failed.kind if failed.check is None else f'{failed.kind}, by "{failed.check}",'
-    return f' by {by} in world {failed.world + 1}, "{judged[failed.world].world}"'
+    kind, check, world = failed["kind"], failed["check"], failed["world"]
+    by = kind if check is None else f'{kind}, by "{check}",'
+    return f' by {by} in world {world + 1}, "{judged[world].world}"'
 
 
 def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:

@@ -8,7 +8,7 @@ from itertools import combinations
 from random import Random
 from typing import TypeAlias
 
-Row: TypeAlias = dict[str, int]  # for each factor the position of its value
+LevelRow: TypeAlias = dict[str, int]  # for each factor the position of its value
 Pair: TypeAlias = tuple[int, int]  # the numbers of two values, the smaller one first
 
 _TRIES = 12  # candidates for each row
@@ -24,21 +24,21 @@ def numbered(sizes: Mapping[str, int]) -> dict[str, range]:
     return numbers
 
 
-def spread(sizes: Mapping[str, int], count: int, random: Random) -> list[Row]:
+def spread(sizes: Mapping[str, int], count: int, random: Random) -> list[LevelRow]:
     """A covering array, filled up to `count` rows with random ones."""
     rows = covering(sizes, random)
     rows += [{name: random.randrange(size) for name, size in sizes.items()} for _ in range(count - len(rows))]
     return rows
 
 
-def covering(sizes: Mapping[str, int], random: Random) -> list[Row]:
+def covering(sizes: Mapping[str, int], random: Random) -> list[LevelRow]:
     """Rows in which every pair of values meets; greedy, so that they are few but not the fewest."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
     numbers = numbered(sizes)
     owner = {number: factor for factor, those in numbers.items() for number in those}
     left = {(a, b) for one, other in combinations(numbers.values(), 2) for a in one for b in other}
-    rows: list[Row] = []
+    rows: list[LevelRow] = []
     while left:
         seeds = random.sample(sorted(left), min(_TRIES, len(left)))
         partners = partners_of(left)
@@ -63,7 +63,9 @@ def partners_of(pairs: Iterable[Pair]) -> Mapping[int, int]:
     return partners
 
 
-def _row(numbers: Mapping[str, range], seed: Row, partners: Mapping[int, int], random: Random) -> Row:
+def _row(
+    numbers: Mapping[str, range], seed: LevelRow, partners: Mapping[int, int], random: Random
+) -> LevelRow:
     row = dict(seed)
     chosen = sum(1 << number for number in row.values())
     factors = [factor for factor in numbers if factor not in row]

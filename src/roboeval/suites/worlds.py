@@ -20,7 +20,7 @@ from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.regex_words import first_choice
 from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
-from roboeval.suites.pairwise import Row, spread
+from roboeval.suites.pairwise import LevelRow, spread
 from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile
 
 Level: TypeAlias = str | int  # a room, an answer, a position among options, a number of looks
@@ -115,7 +115,7 @@ class WorldSampler:
                     yield setting
                     break
 
-    def _drawn(self, row: Row, number: int, random: Random) -> Setting:
+    def _drawn(self, row: LevelRow, number: int, random: Random) -> Setting:
         chosen = {factor: levels[row.get(factor, 0)] for factor, levels in self.factors.items()}
         rooms = random.sample(self.described.rooms, len(self.described.rooms))
         return Setting(f"{number}: {self._about(chosen)}", chosen, tuple(rooms))

@@ -20,8 +20,7 @@ from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.cluster import Fix, nearest_fix
 from roboeval.evaluation.explanation import (
     LOWERED,
-    as_written,
-    cut_told,
+    cut_sentence,
     error_sentence,
     failing_first,
     instruction_shown,
@@ -153,9 +152,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
         if (sentence := _sentence(completion)) is not None:  # no robot did anything
             PlainText("p", sentence, "trouble")
             return
-        if completion["lowered"]:
-            judged = as_written(judged, completion["program"])
-        if judged != completion["worlds"]:
+        if completion["lowered"] and judged:
             PlainText("p", LOWERED, "quiet")
         if not judged:
             PlainText("p", "It has not been judged yet.", "quiet")
@@ -205,7 +202,7 @@ def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> No
         if wrong:
             PlainText("p", RED, "quiet")
     if cut is not None:
-        PlainText("p", f"{cut_told(cut)}.", "quiet")
+        PlainText("p", f"{cut_sentence(cut)}.", "quiet")
     if steps:
         kept = "Every step" if cut is None else "Every step that was kept"
         title = f"{kept}, {len(steps):,} in all"

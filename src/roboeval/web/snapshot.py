@@ -19,7 +19,7 @@ from roboeval.analysis.tasks import prompt_counts
 from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Coverage, CutOff, Scope
+from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
@@ -156,7 +156,7 @@ class Snapshot:
         return passed_count(prompts_of(self.scores))
 
     @cached_property
-    def scope(self) -> Scope:
+    def scope(self) -> JudgingScope:
         """What there is to judge."""
         return self.results.scope
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import polars as pl
 import pytest
@@ -13,6 +13,7 @@ from made_results import VERDICT, as_driven, results_of
 from made_up_runs import SUITE, made_up
 from roboeval.analysis.breakdown import by_ability, coming_back, never_returned, phrasing, spread
 from roboeval.analysis.counts import prompt_scores
+from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.traces import circumstances
 from roboeval.suites.load import Scenario
 
@@ -55,7 +56,7 @@ def row(*drives: str, index: int = 0, kind: str = "SayAtLocation") -> dict[str, 
     ],
 )
 def test_who_never_returned(drives: Sequence[str], *, away: bool) -> None:
-    assert never_returned(row(*drives)) is away
+    assert never_returned(cast("Row", row(*drives))) is away
 
 
 def test_nobody_knows_of_rows_of_an_earlier_version_who_never_returned(

@@ -1,13 +1,14 @@
 """Groups of failures: who is together, in which order, and what is said of them."""
 
 import json
-from typing import Any
+from typing import Any, cast
 
 from codebotler.models.no_program import IN_WORDS
 from made_results import results_of
 from roboeval.analysis.cluster import cluster_data, clusters, groups, nearest_fix
 from roboeval.cli.views.groups import cluster_view
 from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 GOES = """\
@@ -22,8 +23,8 @@ def task_program():
 RIGHT = GOES.format("hall").replace("you", "me")
 
 
-def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits()") -> dict[str, Any]:
-    verdict = {
+def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits()") -> Row:
+    verdict: WorldVerdict = {
         "world": "w",
         "satisfied": False,
         "status": "finished",
@@ -32,9 +33,9 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
         "failed_checks": [check],
         "trace": [["goto", "hall"]],
     }
-    why = {"class": "TaskCompletionError", "kind": "Location", "world": 1, "check": check}
-    first = {**verdict, "satisfied": True, "failed_checks": [], "trace": [["say", "x"]]}
-    return {
+    why: Failure = {"class": "TaskCompletionError", "kind": "Location", "world": 1, "check": check}
+    first: WorldVerdict = {**verdict, "satisfied": True, "failed_checks": [], "trace": [["say", "x"]]}
+    made = {
         "task": task,
         "prompt": prompt,
         "index": index,
@@ -42,6 +43,7 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
         "failure": why,
         "verdicts": [first, verdict],
     }
+    return cast("Row", made)
 
 
 def test_same_task_same_check_similar_program() -> None:
@@ -74,7 +76,7 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     programs: dict[Key, str] = {("Visit", 0, 0): "No.", ("Visit", 0, 1): "I must not do that,\nsince ..."}
     programs |= {("Visit", 0, 2): "", ("Visit", 1, 0): RIGHT}
     results = results_of(rows, SUITE, programs)
-    refused, empty = clusters(groups(rows[:3], programs), results)
+    refused, empty = clusters(groups(cast("list[Row]", rows[:3]), programs), results)
     assert [len(one.members) for one in (refused, empty)] == [2, 1]
     assert (refused.fix, refused.why) == (None, IN_WORDS["refusal"])
     text = printed(cluster_view(refused))

@@ -21,7 +21,7 @@ from roboeval.analysis.compare import (
     unlike,
     verdict,
 )
-from roboeval.cli.options import Opened, expect_same_suite
+from roboeval.cli.inputs import Opened, expect_same_suite
 from roboeval.cli.views.comparison import comparison_view
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results

@@ -14,13 +14,13 @@ import pytest
 from codebotler.core.errors import UserError
 from made_results import table_of
 from roboeval.analysis.counts import tally_of
-from roboeval.analysis.summary import ALL, Summary, kinds_in_order, summary_data
+from roboeval.analysis.summary import ALL, EvaluationSummary, kinds_in_order, summary_data
 from roboeval.analysis.summary import causes as causes_of
 from roboeval.analysis.summary import summary as summary_of
 from roboeval.cli.views.results import summary_view
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.scope import CutOff, Scope
+from roboeval.evaluation.runs.scope import CutOff, JudgingScope
 from roboeval.suites.load import Suite
 from small_run import ROWS, SUITE, TASK, printed, row
 
@@ -30,10 +30,10 @@ def summary(
     suite: Suite,
     *,
     k: Sequence[int] = (1,),
-    scope: Scope | None = None,
+    scope: JudgingScope | None = None,
     ablated: bool = False,
-) -> Summary:
-    scope = scope or Scope(Counter(row["task"] for row in rows))
+) -> EvaluationSummary:
+    scope = scope or JudgingScope(Counter(row["task"] for row in rows))
     return summary_of(tally_of(table_of(rows)), suite, scope, k=k, ablated=ablated)
 
 
@@ -147,7 +147,7 @@ def test_task_names_stay_whole_and_columns_go_where_there_is_little_room(width: 
 
 def test_tasks_without_a_score_are_told_apart() -> None:
     suite = replace(SUITE, tasks={name: replace(TASK, name=name) for name in ("Visit", "A", "B", "C")})
-    scope = Scope({"Visit": 9, "B": 2, "C": 5}, frozenset({"Visit", "A", "B"}))
+    scope = JudgingScope({"Visit": 9, "B": 2, "C": 5}, frozenset({"Visit", "A", "B"}))
     counted = summary(ROWS, suite, scope=scope)
     data = summary_data(counted)
     assert data["missing"] == {"no_completions": ["A"], "not_judged": ["B"], "not_selected": ["C"]}
@@ -161,14 +161,14 @@ def test_tasks_without_a_score_are_told_apart() -> None:
 
 
 def test_rows_whose_completions_are_gone_are_told() -> None:
-    text = printed(summary_view(summary(ROWS, SUITE, scope=Scope({"Visit": 3})), title="x"))
+    text = printed(summary_view(summary(ROWS, SUITE, scope=JudgingScope({"Visit": 3})), title="x"))
     assert re.search(r"\n4 completions, of which only 3 .*\n", text)
 
 
 def test_requested_completions_that_are_missing_are_counted() -> None:
     about = {"batches": [{"tasks": ["Visit"], "num_completions": 3}], "settings": {"max_tokens": 512}}
     there = [completion(n // 2, n % 2, finish_reason="length" if n else "stop") for n in range(4)]
-    counted = summary(ROWS[:3], SUITE, scope=Scope.of(there, frozenset({"Visit"}), about, SUITE))
+    counted = summary(ROWS[:3], SUITE, scope=JudgingScope.of(there, frozenset({"Visit"}), about, SUITE))
     data = summary_data(counted)
     assert (data["judged"], data["to_judge"], data["requested"]) == (3, 4, 6)
     assert (data["cut_off"], data["max_tokens"], data["tasks"][0]["requested"]) == (3, 512, 6)
@@ -200,7 +200,7 @@ def test_one_is_one() -> None:
     one = row(0, 0, ("PythonError", "NameError"))
     assert "1 of 1 completion failed" in printed(summary_view(summary([one], SUITE), title="x"))
     with pytest.raises(UserError, match=r"^0 of 1 completion "):
-        summary([], SUITE, scope=Scope({"Visit": 1}))
+        summary([], SUITE, scope=JudgingScope({"Visit": 1}))
 
 
 def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:

@@ -19,7 +19,7 @@ from roboeval.cli.views.results import summary_view, task_view
 from roboeval.evaluation.explanation import NOT_RECORDED, OF_SUITE
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Scope
+from roboeval.evaluation.runs.scope import JudgingScope
 from small_run import HOSTILE, ROWS, SHOWN, SUITE, printed, row
 
 
@@ -76,7 +76,7 @@ def test_what_a_model_wrote_is_text(*, colour: bool) -> None:
     rows = [row(0, 0, ("PythonError", HOSTILE))]
     completions = [Completion(task="Visit", prompt=0, index=0, program="", instruction=HOSTILE)]
     views = [
-        summary_view(summary(tally_of(table_of(rows)), SUITE, Scope({})), title=HOSTILE),
+        summary_view(summary(tally_of(table_of(rows)), SUITE, JudgingScope({})), title=HOSTILE),
         task_view(task_data(results(*completions, rows=rows), "Visit")),
     ]
     for view in views:

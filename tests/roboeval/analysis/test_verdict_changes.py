@@ -25,7 +25,7 @@ from roboeval.analysis.verdict_changes import (
 )
 from roboeval.cli.views.comparison import changes_view
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.rows import RowData, key_of
+from roboeval.evaluation.runs.rows import key_of
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 STRICT = replace(SUITE, name="strict")
@@ -53,7 +53,7 @@ def judged(passes: Passes, *, strictly: bool = False) -> Results:
     return results_of(rows, STRICT if strictly else SUITE, {key_of(row): PROGRAM for row in rows})
 
 
-def one(task: str, prompt: int, index: int, *, passed: bool) -> RowData:
+def one(task: str, prompt: int, index: int, *, passed: bool) -> dict[str, Any]:
     name, kind = FAILURES[(index + 3 * prompt) % len(FAILURES)]
     check = f"{kind.lower()}()" if name == "TaskCompletionError" else None
     error = None if check else {"kind": kind, "message": f"{kind} it is"}

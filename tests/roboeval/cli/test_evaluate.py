@@ -19,7 +19,7 @@ from forked import Forked
 from roboeval import load_results
 from roboeval.analysis.tally import Tally
 from roboeval.cli.output import watched
-from roboeval.evaluation.runs.rows import JudgedRow
+from roboeval.evaluation.runs.rows import Row
 from seals import unseal
 
 GREETS = 'def task_program():\n    say("good day")\n'
@@ -766,8 +766,8 @@ def test_help_costs_little() -> None:
 def test_ctrl_c_in_the_middle_of_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
 
-    def half_added(self: Tally, row: JudgedRow) -> None:
-        self.judged[row.task, row.prompt] += 1  # as it is left behind there
+    def half_added(self: Tally, row: Row) -> None:
+        self.judged[row["task"], row["prompt"]] += 1  # as it is left behind there
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Tally, "add", half_added)

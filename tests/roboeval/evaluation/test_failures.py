@@ -22,6 +22,10 @@ def ended(status: Status, kind: str, *failed: Requirement) -> Verdict:
     return Verdict("w", Outcome(status, (), RunError(kind, "m")), failed, satisfied=False)
 
 
+def failed(name: str, kind: str, world: int, check: str | None = None) -> Failure:
+    return {"class": name, "kind": kind, "world": world, "check": check}
+
+
 A, B = required("a", "SayAtLocation"), required("b", "Location")
 
 
@@ -29,18 +33,18 @@ A, B = required("a", "SayAtLocation"), required("b", "Location")
     ("verdicts", "expected"),
     [
         ([finished(), finished()], None),
-        ([finished(), finished(A, B)], Failure("TaskCompletionError", "SayAtLocation", 1, "a")),
-        ([finished(B, A), finished(A)], Failure("TaskCompletionError", "Location", 0, "b")),
+        ([finished(), finished(A, B)], failed("TaskCompletionError", "SayAtLocation", 1, "a")),
+        ([finished(B, A), finished(A)], failed("TaskCompletionError", "Location", 0, "b")),
         (
             [ended(Status.ROBOT_ERROR, "AskNoPerson"), finished(A)],
-            Failure("RobotExecutionError", "AskNoPerson", 0),
+            failed("RobotExecutionError", "AskNoPerson", 0),
         ),
-        ([ended(Status.PYTHON_ERROR, "KeyError")], Failure("PythonError", "KeyError", 0)),
-        ([ended(Status.TIMEOUT, "TimeoutError")], Failure("PythonError", "TimeoutError", 0)),
-        ([ended(Status.KILLED, "MemoryError")], Failure("PythonError", "MemoryError", 0)),
+        ([ended(Status.PYTHON_ERROR, "KeyError")], failed("PythonError", "KeyError", 0)),
+        ([ended(Status.TIMEOUT, "TimeoutError")], failed("PythonError", "TimeoutError", 0)),
+        ([ended(Status.KILLED, "MemoryError")], failed("PythonError", "MemoryError", 0)),
         (
             [ended(Status.TIMEOUT, "TimeoutError", B)],  # in a world that may wait for ever
-            Failure("TaskCompletionError", "Location", 0, "b"),
+            failed("TaskCompletionError", "Location", 0, "b"),
         ),
     ],
 )

@@ -21,7 +21,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line
 from codebotler.models.base import ModelError
 from codebotler.models.sampling import SamplingSettings
-from roboeval.evaluation.generate import Pace, Progress, generate_run
+from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
 from roboeval.evaluation.requests import GenerationPlan, RequestLog
 from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.folder import Run
@@ -40,8 +40,8 @@ def generated(
     *,
     count: int = 3,
     pace: Pace | None = None,
-    on_progress: Callable[[Progress], None] = lambda _: None,
-) -> Progress:
+    on_progress: Callable[[GenerationProgress], None] = lambda _: None,
+) -> GenerationProgress:
     plan = GenerationPlan(suite, SMALL, count)
     return generate_run(run, plan, model, pace or Pace(), on_progress=on_progress)
 
@@ -153,7 +153,7 @@ def test_each_completion_is_in_the_file_when_it_counts(tmp_path: Path, paper: Su
     run = Run(tmp_path / "run")
     done: list[int] = []
 
-    def count(progress: Progress) -> None:
+    def count(progress: GenerationProgress) -> None:
         done.append(progress.done)
         assert len(rows(run)) >= progress.done
 
@@ -174,7 +174,7 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
         if file.path == run.completions:
             on_disk[0] = max(on_disk[0], lines)
 
-    def check(progress: Progress) -> None:
+    def check(progress: GenerationProgress) -> None:
         assert on_disk[0] >= progress.done
 
     monkeypatch.setattr(Appender, "sync", noted)
@@ -489,7 +489,7 @@ def test_an_interruption_counts_what_waits_for_the_disk(
     tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = Run(tmp_path / "run")
-    seen: list[Progress] = []
+    seen: list[GenerationProgress] = []
     sync, once = Appender.sync, threading.Lock()
 
     def interrupted(file: Appender) -> None:

@@ -14,7 +14,8 @@ from codebotler.rtl import holds
 from codebotler.rtl.formulas import Formula
 from codebotler.simulator.worker import EVENTS
 from roboeval.evaluation.failures import Verdict, failure
-from roboeval.evaluation.judge import LONGEST_REMEMBERED, ResultCache, evaluate, judge
+from roboeval.evaluation.judge import evaluate, judge
+from roboeval.evaluation.result_cache import LONGEST_REMEMBERED, ResultCache
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -83,11 +84,10 @@ def test_a_program_is_judged_by_what_its_prompt_asks_for(
     assert len(started) == 2 * 2  # each program once in each world
 
 
-def first_failure(suite: Suite, program: str) -> dict[str, Any] | None:
+def first_failure(suite: Suite, program: str) -> Failure | None:
     (row,) = judged(suite, program)
     assert row["passed"] == (row["failure"] is None)
-    why: dict[str, Any] | None = row["failure"]
-    return why
+    return row["failure"]
 
 
 GOOD = "def task_program():\n    go_to('the kitchen')\n    say('hi')\n"
@@ -208,7 +208,7 @@ def test_the_first_unsatisfied_world_decides() -> None:
         return Verdict("w", Outcome(status, (), error), (), satisfied=satisfied)
 
     verdicts = [verdict("A", satisfied=True), verdict("B", satisfied=False), verdict("C", satisfied=False)]
-    assert failure(verdicts) == Failure("PythonError", "B", 1)
+    assert failure(verdicts) == {"class": "PythonError", "kind": "B", "world": 1, "check": None}
     assert failure(verdicts[:1]) is None
 
 
@@ -296,7 +296,7 @@ def test_kind_that_does_not_exist_is_refused() -> None:
 def tested(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
     """The traces on which a formula was tested, of which none is remembered."""
     traces: list[Trace] = []
-    monkeypatch.setattr("roboeval.evaluation.judge.MET", ResultCache())
+    monkeypatch.setattr("roboeval.evaluation.judge.REQUIREMENT_CACHE", ResultCache())
 
     def counted(formula: Formula, trace: Trace) -> bool:
         traces.append(trace)
@@ -323,7 +323,7 @@ def test_what_a_run_has_met_is_found_once_for_what_a_world_requires(
 def test_long_runs_are_not_remembered_and_others_forgotten(
     suite: Suite, tested: list[Trace], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("roboeval.evaluation.judge.MOST_REMEMBERED", 2)
+    monkeypatch.setattr("roboeval.evaluation.result_cache.MOST_REMEMBERED", 2)
     scenario = suite.tasks["T"].scenarios[1]
     long = Outcome(Status.FINISHED, HI * LONGEST_REMEMBERED)
     runs = [Outcome(Status.FINISHED, (*HI, Event("say", text))) for text in "abc"]

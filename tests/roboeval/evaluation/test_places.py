@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from hypothesis import example, given, settings
@@ -25,13 +25,14 @@ from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from made_results import results_of
 from roboeval.analysis.breakdown import never_returned
-from roboeval.analysis.search import Found, Question, answer
+from roboeval.analysis.search import Found, SearchQuery, answer
 from roboeval.analysis.tasks import prompt_data
 from roboeval.evaluation.explanation import CHANGED, completion_data
-from roboeval.evaluation.judge import is_met, judged, row_line, run_in_worlds
+from roboeval.evaluation.judge import is_met, judged, run_in_worlds
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.rows import judged_row
+from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, trace_of
+from roboeval.evaluation.serialization import row_line
 from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 
@@ -62,7 +63,7 @@ def judge(worker: Worker, suite: Suite, program: str) -> tuple[Outcome, dict[str
     told = judged(suite, (name, outcomes), ablated=False)
     assert told is not None
     line = row_line(Completion(task="T", prompt=0, index=0, program=program), told[0])
-    assert judged_row(line, check_kinds=suite.skills is SKILLS).key == ("T", 0, 0)
+    assert key_of(decode_row(line, check_kinds=suite.skills is SKILLS)) == ("T", 0, 0)
     return outcomes[0], json.loads(line)
 
 
@@ -75,7 +76,7 @@ def explained(row: dict[str, Any], suite: Suite) -> list[str]:
 
 
 def find(row: dict[str, Any], formula: str) -> Found:
-    return answer(row, Question(formula), parse(formula))
+    return answer(row, SearchQuery(formula), parse(formula))
 
 
 def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:
@@ -303,7 +304,7 @@ def test_rows_of_earlier_versions_answer_what_needs_no_places(worker: Worker) ->
     assert "never said" in said
     for formula in formulas[:2]:
         for negated in (False, True):
-            found = answer(old, Question(formula, negated), parse(formula))
+            found = answer(old, SearchQuery(formula, negated), parse(formula))
             assert (found.worlds, found.undecided, found.earlier) == ((), ((1, "w"),), ((1, "w"),))
     assert find(old, 'tr.Exists(say("hi"))').worlds == ((1, "w"),)
     assert not find(row, formulas[1]).undecided
@@ -311,5 +312,5 @@ def test_rows_of_earlier_versions_answer_what_needs_no_places(worker: Worker) ->
     assert program["explanation"] == where if program["failure"]["check"] == SAYS_THERE else True
     (world,) = completion_data(old, None, suite)["worlds"]
     assert "place" not in world["steps"][0]
-    assert never_returned(old) is None
-    assert never_returned(row) is True
+    assert never_returned(cast("Row", old)) is None
+    assert never_returned(cast("Row", row)) is True

@@ -19,7 +19,7 @@ import pytest
 from codebotler.simulator.pool import NO_SECCOMP
 from codebotler.simulator.worker import EngineError, Worker
 from command_line import ENVIRONMENT, roboeval
-from roboeval.cli import options
+from roboeval.cli import engine_choice
 from roboeval.evaluation import engines
 from roboeval.evaluation.engines import Local, Work, own_worker
 from roboeval.evaluation.judge import evaluate
@@ -173,7 +173,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
 
 def test_many_programs_are_judged_in_processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("codebotler.simulator.pool.cores", lambda: 3)
-    monkeypatch.setattr(options, "MANY", 80)
+    monkeypatch.setattr(engine_choice, "PROGRAMS_FOR_PROCESSES", 80)
     chosen: list[str] = []
 
     def noted(engine: type[Local | Processes]) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from command_line import refused, roboeval
-from roboeval.evaluation.judge import head
+from roboeval.evaluation.evaluate import evaluation_metadata
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.families.suite import MOST_TASKS, SPLITS, FamilyTasks
 from roboeval.suites.families.tasks import trained_task
@@ -42,8 +42,9 @@ def test_tasks_are_those_of_the_prompts_to_train_on() -> None:
 def test_a_suite_is_the_same_each_time_and_another_for_another_seed() -> None:
     suite, other = load_suite(SMALL), load_suite("families-test-8-2")
     assert suite == pickle.loads(pickle.dumps(suite))
-    assert head(suite)["digest"] == "40f52ef23d358ad486177ab5518169e439a82320c0c61f5368d881cbb7b0f1ec"
-    assert head(other)["digest"] != head(suite)["digest"]
+    digest = evaluation_metadata(suite)["digest"]
+    assert digest == "40f52ef23d358ad486177ab5518169e439a82320c0c61f5368d881cbb7b0f1ec"
+    assert evaluation_metadata(other)["digest"] != digest
 
 
 def test_seeds_and_splits_share_no_task() -> None:

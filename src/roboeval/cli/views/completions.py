@@ -16,8 +16,7 @@ from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
     GONE,
     LOWERED,
-    as_written,
-    cut_told,
+    cut_sentence,
     error_sentence,
     failing_first,
     instruction_shown,
@@ -85,8 +84,6 @@ def completion_view(
         return Group(*parts, Text(), Text(why_none, "red"))
     worlds = data["worlds"]
     if data["lowered"]:
-        worlds = as_written(worlds, data["program"])
-    if worlds != data["worlds"]:
         parts += [Text(), Text(LOWERED, "dim")]
     satisfied = []
     for number, world in failing_first(worlds):
@@ -152,7 +149,7 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
     if world["steps"] or cut is None:
         parts.append(storyboard(world["steps"], {check["step"] for check in world["failed_checks"]}))
     if cut is not None:
-        parts.append(Padding(Text(cut_told(cut), "yellow"), (0, 0, 0, 2)))
+        parts.append(Padding(Text(cut_sentence(cut), "yellow"), (0, 0, 0, 2)))
     for check in world["failed_checks"]:
         text = Text.assemble(
             ("failed ", "red"),

@@ -13,7 +13,7 @@ from roboeval.analysis.metrics import judged_count
 from roboeval.cli.views.results import ruled
 
 if TYPE_CHECKING:
-    from roboeval.analysis.summary import Summary
+    from roboeval.analysis.summary import EvaluationSummary
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Round:
     """
 
     number: int
-    summary: Summary
+    summary: EvaluationSummary
     requests: int
     accepted: int
     tokens: int

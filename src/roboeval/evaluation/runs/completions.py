@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -38,7 +38,7 @@ class Completion:
         prompt: which phrasing, counted from 0, below a billion.
         index: which sample, counted from 0, below a billion.
         program: the cleaned source; judged exactly as it stands.
-        instruction: what the model was told; None where nobody recorded it.
+        instruction: the sentence that the model was asked for; None where nobody recorded it.
         model: who wrote it.
         more: what else its row says, such as `usage`, `raw_reply` and `finish_reason`.
 
@@ -140,7 +140,6 @@ def read_completions(
     growing: bool = False,
     name: Path | str | None = None,
     faults: list[UserError] | None = None,
-    wanted: Callable[[bytes], bool] = bool,
 ) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
 
@@ -150,7 +149,6 @@ def read_completions(
         growing: whether it stands in a run, where a torn last line is passed over.
         name: what sentences call the file; its path by default.
         faults: gets what is wrong with lines, which are then left out, rather than that it is raised.
-        wanted: whether a line counts; others are passed over, whatever is in them.
 
     Raises:
         UserError: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
@@ -161,18 +159,14 @@ def read_completions(
     try:
         for number, line in read_lines(path, name=name):
             try:
-                if (
-                    wanted(line)
-                    and line.strip()
-                    and (completion := _completion(line, suite, growing=growing)) is not None
-                ):
+                if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
                     _expect_new(completion.key, seen, number)
                     yield completion
             except UserError as error:
                 add_or_raise(UserError(error.sentence, file=name, line=number), faults)
     except UserError as error:
         add_or_raise(error, faults)
-    if not seen and faults is None and wanted is bool:
+    if not seen and faults is None:
         raise UserError("there is no completion in it", file=name)
 
 

@@ -7,7 +7,7 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -180,6 +180,12 @@ def load_head(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise UserError("is not a JSON object", file=path)
     return data
+
+
+def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
+    """The tasks that a KEY.json names; None for all."""
+    tasks = head.get("tasks")
+    return None if tasks is None else frozenset(tasks)
 
 
 def about_of(run: Run) -> dict[str, Any]:

@@ -4,27 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, TypedDict
+from typing import Annotated, Any, NotRequired, TypeAlias, TypedDict
 
 import msgspec
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import read_lines, read_rows, to_line
+from codebotler.core.files import read_lines, read_rows
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
-from roboeval.evaluation.runs.traces import CIRCUMSTANCES, first_events
 
-MOST = 1_000_000  # bytes of a row
-MOST_OF_WORLD = 20_000  # bytes for each world, where there are so many worlds that they come to more
 LONGEST_LINE = 1_000_000_000  # bytes of a row that was written before rows were bounded
-NAMES = 2_000  # of a row's bytes are left for its completion: the task's name is that of a file
-BETWEEN = 2  # bytes between two events
-HASH = "0" * 64
 KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is not a row of an evaluation"
 BROKEN = "was damaged or changed after the evaluation was finished"
@@ -32,40 +25,70 @@ BROKEN = "was damaged or changed after the evaluation was finished"
 ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
 
 
-class Judgement(TypedDict):
-    """What is said of a program.
+Failure = TypedDict("Failure", {"class": str, "kind": str, "world": int, "check": str | None})
+"""The one reason for which a completion fails (paper, section V.B).
 
-    Args:
-        passed: whether the program does what is required in all worlds.
-        failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
-        verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
-            `line`, `failed_checks` and `trace`, with the `circumstances` of its events; where the trace is
-            too long for a row, it ends early, and `cut` says how many `events` more there are, and the
-            `sha256` of the JSON of all of it.
+`class` is one of `CLASSES`, `world` is the first unsatisfied one, from 0, `check` is None for an error.
+"""
+
+
+class ErrorOfRun(TypedDict):
+    """The error by which a run ended."""
+
+    kind: str
+    message: str
+
+
+class CutTrace(TypedDict):
+    """How many events of a trace did not fit into its row, and the hash of the JSON of the whole trace."""
+
+    events: int
+    sha256: str
+
+
+Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_length=2, max_length=2)]]
+
+
+class WorldVerdict(TypedDict):
+    """What a row says of one world; the last five entries are about the events of `trace`.
+
+    Rows of earlier versions have no `places`. A trace too long for its row ends early, with a `cut`.
     """
 
-    passed: bool
-    failure: dict[str, Any] | None
-    verdicts: list[dict[str, Any]]
+    world: str
+    satisfied: bool
+    status: str
+    error: ErrorOfRun | None
+    line: int | None
+    failed_checks: list[str]
+    trace: list[list[Any]]
+    places: NotRequired[Numbered]
+    holding: NotRequired[Numbered]
+    to: NotRequired[Numbered]
+    destinations: NotRequired[Numbered]
+    cut: NotRequired[CutTrace]
 
 
-class Row(Judgement):
-    """One row of an evaluation: what is said of a completion's program.
+class Row(TypedDict):
+    """One row of an evaluation: the judgement on a completion's program.
 
     Args:
         task: the task's name.
         prompt: which phrasing, counted from 0.
         index: which sample, counted from 0.
         program_sha256: the hash of the program that was judged.
+        passed: whether the program does what is required in all worlds.
+        failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
+        verdicts: for each world, in order, what happened there.
     """
 
     task: str
     prompt: int
     index: int
     program_sha256: str
-
-
-RowData: TypeAlias = Mapping[str, Any]  # a row of an evaluation, or a part of one, as JSON has it
+    passed: bool
+    failure: Failure | None
+    verdicts: list[WorldVerdict]
 
 
 def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
@@ -75,104 +98,26 @@ def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
     faults.append(fault)
 
 
-def key_of(row: RowData) -> tuple[str, int, int]:
+def key_of(row: Mapping[str, Any]) -> tuple[str, int, int]:
     """The task, prompt and index of a row."""
     return row["task"], row["prompt"], row["index"]
+
+
+def failure_of(row: Row) -> Failure:
+    """The failure of a row whose program did not pass."""
+    assert row["failure"] is not None, "this program passed"
+    return row["failure"]
 
 
 # --- rows as they are read
 
 
-class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A part of a row."""
-
-
-class Failure(_Part, frozen=True):
-    """The one reason for which a completion fails (paper, section V.B)."""
-
-    failure_class: str = msgspec.field(name="class")  # one of CLASSES
-    kind: str
-    world: int  # the first unsatisfied one, from 0
-    check: str | None = None  # None where an error decided
-
-
-class ErrorOfRun(_Part, frozen=True):
-    """The error by which a run ended."""
-
-    kind: str
-    message: str
-
-
-class CutTrace(_Part, frozen=True):
-    """How much of a trace was too long to be kept, and the hash of all of it."""
-
-    events: int
-    sha256: str
-
-
-Numbered: TypeAlias = tuple[tuple[int, str], ...]  # by the numbers of events
-PerhapsNumbered: TypeAlias = tuple[tuple[int, str | None], ...]
-
-
-class WorldVerdict(_Part, frozen=True):
-    """What a row says of one world; `trace` holds one JSON list an event.
-
-    What follows are the circumstances of the events; rows of earlier versions have no `places`.
-    """
-
-    world: str
-    satisfied: bool
-    status: Status
-    error: ErrorOfRun | None
-    line: int | None
-    failed_checks: tuple[str, ...]
-    trace: tuple[msgspec.Raw, ...]
-    places: Numbered | msgspec.UnsetType = msgspec.UNSET
-    holding: Numbered | msgspec.UnsetType = msgspec.UNSET
-    to: PerhapsNumbered | msgspec.UnsetType = msgspec.UNSET
-    destinations: PerhapsNumbered | msgspec.UnsetType = msgspec.UNSET
-    cut: CutTrace | msgspec.UnsetType = msgspec.UNSET
-
-    @property
-    def events(self) -> int:
-        """How many events the trace had when it was judged."""
-        return len(self.trace) + (0 if self.cut is msgspec.UNSET else self.cut.events)
-
-    def without_trace(self) -> WorldVerdict:
-        """The same with no events."""
-        return msgspec.structs.replace(self, trace=(), **dict.fromkeys(CIRCUMSTANCES, msgspec.UNSET))
-
-
-class JudgedRow(_Part, frozen=True):
-    """A row as it is read from the file; see `Row`."""
-
-    task: str
-    prompt: int
-    index: int
-    program_sha256: str
-    passed: bool
-    failure: Failure | None
-    verdicts: tuple[WorldVerdict, ...]
-
-    def __post_init__(self) -> None:
-        if self.passed != (self.failure is None):
-            raise ValueError("a completion that passes has no failure, and any other has one")
-        if self.failure is not None and not 0 <= self.failure.world < len(self.verdicts):
-            raise ValueError("no such world decided")
-
-    @property
-    def key(self) -> tuple[str, int, int]:
-        """Its task, prompt and index."""
-        return self.task, self.prompt, self.index
-
-
-DECODER = msgspec.json.Decoder(JudgedRow)
-
-
-def judged_row(line: bytes, *, check_kinds: bool = False) -> JudgedRow:
-    """Decode a row of an evaluation; with `check_kinds` look into each event, too."""
+def decode_row(line: bytes, *, check_kinds: bool = False) -> Row:
+    """Decode and check a row of an evaluation; with `check_kinds` look into each event, too."""
     try:
-        row = _decoded(line)
+        data = _decoded(line)
+        row = msgspec.convert(data, Row)
+        _expect_consistent(row, data)
         if check_kinds:
             _expect_known_kinds(row)
     except (msgspec.DecodeError, UnicodeDecodeError, ValueError, TypeError, LookupError) as error:
@@ -180,32 +125,48 @@ def judged_row(line: bytes, *, check_kinds: bool = False) -> JudgedRow:
     return row
 
 
-def _decoded(line: bytes) -> JudgedRow:
+def _decoded(line: bytes) -> object:
     try:
-        return DECODER.decode(line)
-    except msgspec.ValidationError:
-        raise
+        return msgspec.json.decode(line)
     except msgspec.DecodeError:
         # UTF-8 cannot hold half of a surrogate pair: it is kept as the text of its escape.
-        return DECODER.decode(ESCAPES.sub(lambda found: (b"\\" if found[1] else b"") + found[0], line))
+        return msgspec.json.decode(ESCAPES.sub(lambda found: (b"\\" if found[1] else b"") + found[0], line))
 
 
-def _expect_known_kinds(row: JudgedRow) -> None:
-    for verdict in row.verdicts:
-        for event in verdict.trace:
-            kind = msgspec.json.decode(event)[0]
-            if kind not in KINDS and by_event(kind) is None:
-                raise ValueError(f'"{kind}" is not a kind of event; name the file of its skill with --skills')
+def _expect_consistent(row: Row, data: object) -> None:
+    if row != data:
+        raise ValueError("it has unknown entries")
+    failure = row["failure"]
+    if row["passed"] != (failure is None):
+        raise ValueError("a completion that passes has no failure, and any other has one")
+    if failure is not None and not 0 <= failure["world"] < len(row["verdicts"]):
+        raise ValueError("no such world decided")
+    for verdict in row["verdicts"]:
+        Status(verdict["status"])
+
+
+def _expect_known_kinds(row: Row) -> None:
+    for verdict in row["verdicts"]:
+        for event in verdict["trace"]:
+            if event[0] not in KINDS and by_event(event[0]) is None:
+                raise ValueError(
+                    f'"{event[0]}" is not a kind of event; name the file of its skill with --skills'
+                )
+
+
+def event_count(verdict: WorldVerdict) -> int:
+    """How many events a trace had when it was judged."""
+    return len(verdict["trace"]) + (verdict["cut"]["events"] if "cut" in verdict else 0)
 
 
 @dataclass(frozen=True)
-class Line:
+class LocatedRow:
     """A row with its place in the file."""
 
     number: int  # from 1
     at: int  # first byte in the file
     size: int
-    row: JudgedRow
+    row: Row
 
 
 def read_lines_of(
@@ -213,31 +174,27 @@ def read_lines_of(
     head: Mapping[str, Any],
     *,
     seal: Seal | None = None,
-    see: Callable[[bytes], None] | None = None,
+    on_line: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
-    wanted: Callable[[bytes], bool] = bool,
-) -> Iterator[Line]:
-    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised.
-
-    Lines that are not `wanted` are passed over, whatever is in them.
-    """
+) -> Iterator[LocatedRow]:
+    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
     seal = seal or Seal()
-    at, is_told = 0, False
+    at, is_reported = 0, False
     for number, line in read_lines(path, limit=LONGEST_LINE):
         seal.add(line)
         try:
-            if line.strip() and wanted(line):
-                row = judged_row(line, check_kinds=not is_sealed(head))
-                if see is not None:
-                    see(line)
-                yield Line(number, at, len(line), row)
+            if line.strip():
+                row = decode_row(line, check_kinds=not is_sealed(head))
+                if on_line is not None:
+                    on_line(line)
+                yield LocatedRow(number, at, len(line), row)
         except UserError as error:
             if not line.endswith(b"\n"):
                 break
             add_or_raise(UserError(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
-            is_told = True
+            is_reported = True
         at += len(line)
-    if seal.is_broken(head) and not is_told:
+    if seal.is_broken(head) and not is_reported:
         add_or_raise(UserError(f"{BROKEN}; --redo starts over", file=path), faults)
 
 
@@ -277,47 +234,3 @@ class Seal:
 def is_sealed(head: Mapping[str, Any]) -> bool:
     """Whether a KEY.json is that of a finished evaluation; that of an earlier version never is."""
     return "rows" in head or "sha256" in head
-
-
-# --- how large a row may be
-
-
-def bounded(judgement: Judgement) -> bytes:
-    """A judgement as JSON that fits into a row: of a longer one each world has an equal share of it."""
-    whole = _json(judgement)
-    verdicts = judgement["verdicts"]
-    most = max(MOST, MOST_OF_WORLD * len(verdicts)) - NAMES
-    if not verdicts or len(whole) < most:
-        return whole
-    longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH} for verdict in verdicts)
-    bare = [
-        {**first_events(verdict, 0), "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)
-    ]
-    share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
-    return _json({**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]})
-
-
-def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
-    trace = verdict["trace"]
-    beside = _sizes_beside(verdict)
-    size = 0
-    for kept, event in enumerate(trace):
-        size += len(_json(event)) + BETWEEN + beside[kept + 1]
-        if size > share:
-            whole = hashlib.sha256(_json(trace)).hexdigest()
-            cut = {"events": len(trace) - kept, "sha256": whole}
-            return {**first_events(verdict, kept), "cut": cut}
-    return verdict
-
-
-def _sizes_beside(verdict: Mapping[str, Any]) -> Counter[int]:
-    """How many bytes the circumstances of each event take, with the place where it led."""
-    sizes: Counter[int] = Counter()
-    for name in CIRCUMSTANCES:
-        for entry in verdict.get(name, ()):
-            sizes[max(1, entry[0] - (name == "places"))] += len(_json(entry)) + BETWEEN
-    return sizes
-
-
-def _json(data: object) -> bytes:
-    return to_line(data).removesuffix(b"\n")

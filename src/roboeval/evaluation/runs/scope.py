@@ -40,7 +40,7 @@ class Coverage:
 
 
 @dataclass(frozen=True)
-class Scope:
+class JudgingScope:
     """What there is to judge."""
 
     completions: Mapping[str, int]  # by task, also of tasks that were not selected
@@ -57,7 +57,7 @@ class Scope:
         tasks: frozenset[str] | None,
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
-    ) -> Scope:
+    ) -> JudgingScope:
         """Count completions, in one pass.
 
         Args:

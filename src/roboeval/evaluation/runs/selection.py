@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from roboeval.evaluation.runs.completions import Key
-from roboeval.evaluation.runs.judged import RunEvaluation
 from roboeval.suites.load import Suite
+
+if TYPE_CHECKING:
+    from roboeval.evaluation.runs.results import Results
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class Selection:
         assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - one thing
         return self.task, self.prompt, self.index
 
-    def expect_judged(self, judged: RunEvaluation) -> None:
+    def expect_judged(self, judged: Results) -> None:
         """Raise UserError if nothing of this part was judged."""
         wanted = self.task, self.prompt, self.index
         if not any(all(w in {None, h} for w, h in zip(wanted, key, strict=True)) for key in judged.places):

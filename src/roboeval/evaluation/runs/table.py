@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.evaluation.runs.completions import KEY, NO_PROGRAM, Completion, Key
 from roboeval.evaluation.runs.replies import TOKENS, number_or_none
-from roboeval.evaluation.runs.rows import JudgedRow
+from roboeval.evaluation.runs.rows import Row, event_count, key_of
 
 Tokens = TypeVar("Tokens", float, pl.Expr)
 MILLION = 1_000_000
@@ -121,47 +121,45 @@ class TableBuilder:
         self._worlds: list[tuple[Any, ...]] = []
         self._counts: list[int] = []
 
-    def add(self, row: JudgedRow) -> None:
+    def add(self, row: Row) -> None:
         """Add a completion with its verdicts."""
         if len(self._worlds) >= CHUNK:
             self._store()
-        written = self._completions.get(row.key)
-        is_stale = written is None or written.program_sha256 != row.program_sha256
-        failure = row.failure
+        written = self._completions.get(key_of(row))
+        is_stale = written is None or written.program_sha256 != row["program_sha256"]
+        failure = row["failure"]
         why: tuple[str | int | None, ...] = (None,) * 4
         if failure is not None:
-            why = failure.failure_class, failure.kind, failure.world, failure.check
+            why = failure["class"], failure["kind"], failure["world"], failure["check"]
         self._rows.append(
             (
-                row.task,
-                row.prompt,
-                row.index,
+                *key_of(row),
                 None if written is None or written.model is None else storable(written.model),
-                row.program_sha256,
-                row.passed,
+                row["program_sha256"],
+                row["passed"],
                 *why,
                 is_stale,
                 *((None,) * 5 if written is None or is_stale else _texts(written)),
                 *_usage(written),
                 None,
-                self._accepted.get((row.task, row.program_sha256)),
+                self._accepted.get((row["task"], row["program_sha256"])),
             )
         )
-        self._counts.append(len(row.verdicts))
-        for number, verdict in enumerate(row.verdicts):
-            checks, error = verdict.failed_checks, verdict.error
+        self._counts.append(len(row["verdicts"]))
+        for number, verdict in enumerate(row["verdicts"]):
+            checks, error = verdict["failed_checks"], verdict["error"]
             self._worlds.append(
                 (
                     number,
-                    verdict.world,
-                    verdict.satisfied,
-                    verdict.status.value,
-                    None if error is None else error.kind,
-                    None if error is None else error.message,
-                    verdict.line,
+                    verdict["world"],
+                    verdict["satisfied"],
+                    verdict["status"],
+                    None if error is None else error["kind"],
+                    None if error is None else error["message"],
+                    verdict["line"],
                     "; ".join(checks) or None,
-                    self._categories.get((row.task, checks[0])) if checks else None,
-                    verdict.events,
+                    self._categories.get((row["task"], checks[0])) if checks else None,
+                    event_count(verdict),
                 )
             )
 

@@ -67,6 +67,11 @@ def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
     return {**verdict, "trace": verdict["trace"][:count], **kept}
 
 
+def without_trace(verdict: Mapping[str, Any]) -> dict[str, Any]:
+    """The data of a verdict with no events."""
+    return {name: value for name, value in verdict.items() if name not in CIRCUMSTANCES} | {"trace": []}
+
+
 def trace_of(verdict: Mapping[str, Any]) -> Trace:
     """The trace of a verdict as a row has it, with all that formulas compare, if the row keeps that."""
     trace = trace_from(verdict["trace"])

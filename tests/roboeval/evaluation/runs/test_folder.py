@@ -19,11 +19,11 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.judge import TimeLimitExceeded, time_limit
 from roboeval.evaluation.runs.completions import Completion, read_completions
 from roboeval.evaluation.runs.folder import Run, tasks_to_judge
-from roboeval.evaluation.runs.rows import JudgedRow
+from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import open_source, recorded_completions
+from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Suite, load_suite
 from seals import unseal
 
@@ -42,7 +42,7 @@ def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> Run:
     return run
 
 
-def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[JudgedRow]:
+def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
 
 
@@ -205,7 +205,7 @@ def test_completions_that_come_later_are_judged_later(tmp_path: Path, paper: Sui
     judged(run, paper)
     with run.completions.open("ab") as file:
         file.write(to_line({"task": "SayGoodDay", "prompt": 1, "index": 0, "program": GREETS}))
-    assert [row.prompt for row in judged(run, paper)] == [0, 1]
+    assert [row["prompt"] for row in judged(run, paper)] == [0, 1]
 
 
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
@@ -288,7 +288,7 @@ def test_further_tasks_are_judged_beside_those_that_were(tmp_path: Path, paper: 
 
     def judged_tasks(*tasks: str) -> list[str]:
         rows = evaluate_run(run, paper, ablated=False, tasks=frozenset(tasks) or None, redo=False)
-        return [row.task for row in rows]
+        return [row["task"] for row in rows]
 
     assert judged_tasks("SayGoodDay") == ["SayGoodDay"] * 2
     before = run.rows("paper").read_bytes()
@@ -415,7 +415,7 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
     run = a_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
 
     monkeypatch.setattr("roboeval.evaluation.judge.BUDGET", 0.001)
-    assert [row.index for row in judged(run, suite)] == [1, 3]
+    assert [row["index"] for row in judged(run, suite)] == [1, 3]
     assert [
         record.getMessage().split()[0]
         for record in caplog.records
@@ -425,8 +425,8 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
     assert result.exit_code == 1
 
     monkeypatch.undo()
-    assert [row.index for row in judged(run, suite)] == [1, 3, 0, 2]
-    assert [row.index for row in judged(run, suite)] == [1, 3, 0, 2]
+    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
+    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
 
 
 def test_other_threads_know_no_limit() -> None:

@@ -12,11 +12,10 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
-from roboeval.analysis.search import Question, Search
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
-from roboeval.evaluation.runs.rows import JudgedRow
+from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite
 from seals import unseal
 
@@ -32,7 +31,7 @@ def completions(run: Run, count: int) -> None:
     run.completions.write_bytes(b"".join(map(to_line, rows)))
 
 
-def judged(run: Run, suite: Suite) -> list[JudgedRow]:
+def judged(run: Run, suite: Suite) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=False))
 
 
@@ -73,7 +72,7 @@ def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
     content = path.read_bytes()
     readers: dict[str, Callable[[], object]] = {
         "results": lambda: read(run),
-        "find": lambda: read(run, see=Search(Question('tr.Exists(say("x"))')).see),
+        "find": lambda: read(run, on_line=len),
         "evaluate": lambda: judged(run, paper),
     }
     for number in range(PLACES):
@@ -130,7 +129,7 @@ def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: Run,
 def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: Run, paper: Suite) -> None:
     completions(run, 5)
     rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False)
-    assert [next(rows).index for _ in range(4)] == [0, 1, 2, 3]
+    assert [next(rows)["index"] for _ in range(4)] == [0, 1, 2, 3]
     rows.close()  # type: ignore[attr-defined]  # of a generator
     assert not {"rows", "sha256"} & head(run).keys()
     assert len(read(run).places) == 4

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -14,14 +15,14 @@ from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.core.world import Room, World
 from codebotler.rtl import parse
 from made_results import row_of, table_of
-from roboeval.analysis.search import Question, answer
+from roboeval.analysis.search import SearchQuery, answer
 from roboeval.cli.views.completions import completion_view
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judgement
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.rows import MOST, MOST_OF_WORLD, Row
+from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, trace_of
+from roboeval.evaluation.serialization import ROW_BYTES, WORLD_BYTES, judgement
 from roboeval.suites.load import Suite, load_suite
 
 WORLD = World(rooms=(Room("start"),), robot="start", about="nobody is in")
@@ -36,7 +37,7 @@ def row(traces: list[Trace], message: str = "no", completion: Completion = WORDY
     return row_of(completion, judgement(verdicts))
 
 
-@pytest.mark.parametrize(("worlds", "most"), [(1, MOST), (50, MOST), (80, 80 * MOST_OF_WORLD)])
+@pytest.mark.parametrize(("worlds", "most"), [(1, ROW_BYTES), (50, ROW_BYTES), (80, 80 * WORLD_BYTES)])
 def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
     one = row([LOUD[:20]] * worlds, "\x00" * 1_000)
     line = to_line(one)
@@ -48,6 +49,7 @@ def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
             "sha256": hashlib.sha256(whole).hexdigest(),
         }
         assert verdict["trace"][0] == ["goto", "start"]
+        assert verdict["error"] is not None
         assert (verdict["error"]["message"], verdict["line"]) == ("\x00" * 1_000, 1)
     assert to_line(row([LOUD[:20]] * worlds, "\x00" * 1_000)) == line
 
@@ -59,7 +61,7 @@ def test_circumstances_are_bounded_with_their_events() -> None:
         for n, (here, there) in enumerate(pairwise(rooms))
     ]
     one = row([tuple(drives), LOUD])
-    assert 0.5 * MOST < len(to_line(one)) <= MOST
+    assert 0.5 * ROW_BYTES < len(to_line(one)) <= ROW_BYTES
     first, second = one["verdicts"]
     kept = trace_of(first)
     assert 0 < len(kept) < len(drives)
@@ -67,14 +69,15 @@ def test_circumstances_are_bounded_with_their_events() -> None:
     assert [(e.place, e.holding, e.to, e.destination) for e in kept] == [
         (e.place, e.holding, e.to, e.destination) for e in drives[: len(kept)]
     ]
-    assert max(number for name in CIRCUMSTANCES[1:] for number, _ in first.get(name, [(0, "")])) <= len(kept)
+    entries: dict[str, Any] = {**first}
+    assert max(n for name in CIRCUMSTANCES[1:] for n, _ in entries.get(name, [(0, "")])) <= len(kept)
     assert trace_of(second)[1].place == ""
 
 
 def test_what_fits_stays_whole() -> None:
     short = (Event("say", "x" * 2_000),) * 8
     one = row([short] * 50)
-    assert len(to_line(one)) > 0.8 * MOST
+    assert len(to_line(one)) > 0.8 * ROW_BYTES
     assert not any("cut" in verdict for verdict in one["verdicts"])
     mixed = row([LOUD, short])["verdicts"]
     assert "cut" in mixed[0]
@@ -126,7 +129,7 @@ def test_a_table_counts_the_events_that_were_not_kept(suite: Suite) -> None:
 @pytest.mark.parametrize("negated", [False, True])
 def test_a_formula_is_undecided_where_the_trace_was_cut(suite: Suite, *, negated: bool) -> None:
     formula = 'tr.Exists(say("bye"))'
-    found = answer(cut_row(suite), Question(formula, negated), parse(formula))
+    found = answer(cut_row(suite), SearchQuery(formula, negated), parse(formula))
     assert found.undecided == ((1, "World 0"),)
     assert found.worlds == (((2, "World 1"),) if negated else ())
-    assert len(answer(cut_row(suite), Question(), None).worlds) == 2
+    assert len(answer(cut_row(suite), SearchQuery(), None).worlds) == 2

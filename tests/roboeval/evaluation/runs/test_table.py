@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ import pytest
 from codebotler.core.errors import UserError
 from made_results import results_of
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.rows import RowData
 from roboeval.evaluation.runs.table import COMPLETION_COLUMNS, WORLD_COLUMNS, kind_of, write_table
 
 PROGRAM = "def task_program():\n    go_to('x')\n"
@@ -25,7 +24,7 @@ COMPLETION = Completion(task="Visit", prompt=1, index=2, program=PROGRAM, model=
 COLUMNS = {**COMPLETION_COLUMNS, **WORLD_COLUMNS}
 
 
-def table(rows: Iterable[RowData], completions: Sequence[Completion]) -> pl.DataFrame:
+def table(rows: Iterable[Mapping[str, Any]], completions: Sequence[Completion]) -> pl.DataFrame:
     return results_of(rows, completions=completions).table
 
 

@@ -1,0 +1,44 @@
+"""Names that a shell completes in command lines."""
+
+from __future__ import annotations
+
+import typer
+
+
+def suite_names(incomplete: str) -> list[str]:
+    """The suites that ship with RoboEval or are installed; the shell itself completes folders."""
+    from roboeval.suites.installed import installed_suites
+    from roboeval.suites.load import shipped_suites
+
+    names = {*shipped_suites(), *(suite.name for suite in installed_suites())}
+    return sorted(name for name in names if name.startswith(incomplete))
+
+
+def task_names(context: typer.Context, incomplete: str) -> list[str]:
+    """The tasks of the suite that the line names, or of the paper's."""
+    from codebotler.core.errors import UserError
+    from roboeval.suites.load import suite_folder, task_files
+
+    try:
+        files = task_files(suite_folder(context.params.get("suite") or "paper"))
+    except UserError:
+        return []
+    return [file.stem for file in files if file.stem.startswith(incomplete)]
+
+
+def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
+    """The tasks for the last of several names, which commas separate."""
+    *whole, last = incomplete.split(",")
+    return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
+
+
+def split_names(incomplete: str) -> list[str]:
+    """The splits of families."""
+    from roboeval.suites.families.suite import SPLITS
+
+    return [name for name in SPLITS if name.startswith(incomplete)]
+
+
+def engine_names(incomplete: str) -> list[str]:
+    """The engines."""
+    return [name for name in ("local", "ray") if name.startswith(incomplete)]

@@ -1,0 +1,129 @@
+"""Verdicts as the JSON of rows, which are bounded in size."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from codebotler.core.files import to_line
+from codebotler.core.trace import outcome_data
+from roboeval.evaluation.failures import NO_PROGRAM, Verdict, failure
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
+
+ROW_BYTES = 1_000_000  # bytes of a row
+WORLD_BYTES = 20_000  # bytes for each world, where there are so many worlds that they come to more
+ROW_HEADER_BYTES = 2_000  # left for the completion: the task's name is that of a file
+SEPARATOR_BYTES = 2  # bytes between two events
+HASH_PLACEHOLDER = "0" * 64
+
+FAILED_PREFIX = b'{"passed": false, '  # as `judgement` writes it
+
+
+def with_reply(completion: Completion, judgement_json: bytes) -> bytes:
+    """The judgement on a program, given as JSON, with what is wrong with its reply if that held no program.
+
+    Text that is no program ends in some error, and half a program fails some check: neither is the cause.
+    """
+    if not judgement_json.startswith(FAILED_PREFIX) or (kind := completion.no_program) is None:
+        return judgement_json
+    found = json.loads(judgement_json)
+    cause = {"class": NO_PROGRAM, "kind": kind, "world": found["failure"]["world"], "check": None}
+    return to_line({**found, "failure": cause}).removesuffix(b"\n")
+
+
+def row_line(completion: Completion, judgement_json: bytes) -> bytes:
+    """The row of an evaluation for a completion whose judgement is given as JSON, as a line."""
+    of_whom = {
+        "task": completion.task,
+        "prompt": completion.prompt,
+        "index": completion.index,
+        "program_sha256": completion.program_sha256,
+    }
+    return b"%b, %b\n" % (to_line(of_whom).removesuffix(b"}\n"), judgement_json.removeprefix(b"{"))
+
+
+def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
+    """The judgements on a program as one written for each prompt; where they are alike, the same object."""
+    known_judgements: list[tuple[list[Verdict], bytes]] = []
+    chosen = []
+    for prompt in range(prompts):
+        asked = [verdict.on(prompt) for verdict in verdicts]
+        known = next((data for others, data in known_judgements if others == asked), None)
+        if known is None:
+            known = judgement(asked)
+            known_judgements.append((asked, known))
+        chosen.append(known)
+    return tuple(chosen)
+
+
+def judgement(verdicts: list[Verdict]) -> bytes:
+    """The judgement on a program, as JSON that fits into a row."""
+    why = failure(verdicts)
+    return bounded(
+        {
+            "passed": why is None,
+            "failure": why,
+            "verdicts": [verdict_data(verdict) for verdict in verdicts],
+        }
+    )
+
+
+def verdict_data(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as a row writes it."""
+    outcome = outcome_data(verdict.outcome)
+    return {
+        "world": verdict.world,
+        "satisfied": verdict.satisfied,
+        **{name: value for name, value in outcome.items() if name != "trace"},
+        "failed_checks": [requirement.text for requirement in verdict.failed],
+        "trace": outcome["trace"],
+        **circumstances(verdict.outcome.trace),
+    }
+
+
+# --- how large a row may be
+
+
+def bounded(judgement: Mapping[str, Any]) -> bytes:
+    """A judgement as JSON that fits into a row: of a longer one each world has an equal share of it."""
+    whole = _json(judgement)
+    verdicts = judgement["verdicts"]
+    most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES
+    if not verdicts or len(whole) < most:
+        return whole
+    longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH_PLACEHOLDER} for verdict in verdicts)
+    bare = [
+        {**first_events(verdict, 0), "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)
+    ]
+    share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
+    return _json({**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]})
+
+
+def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
+    trace = verdict["trace"]
+    circumstance_sizes = _circumstance_sizes(verdict)
+    size = 0
+    for kept, event in enumerate(trace):
+        size += len(_json(event)) + SEPARATOR_BYTES + circumstance_sizes[kept + 1]
+        if size > share:
+            whole = hashlib.sha256(_json(trace)).hexdigest()
+            cut = {"events": len(trace) - kept, "sha256": whole}
+            return {**first_events(verdict, kept), "cut": cut}
+    return verdict
+
+
+def _circumstance_sizes(verdict: Mapping[str, Any]) -> Counter[int]:
+    """How many bytes the circumstances of each event take, with the place where it led."""
+    sizes: Counter[int] = Counter()
+    for name in CIRCUMSTANCES:
+        for entry in verdict.get(name, ()):
+            sizes[max(1, entry[0] - (name == "places"))] += len(_json(entry)) + SEPARATOR_BYTES
+    return sizes
+
+
+def _json(data: object) -> bytes:
+    return to_line(data).removesuffix(b"\n")
