@@ -24,7 +24,7 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
     """Look for mistakes in a task, given the verdicts on its solutions."""
     worlds = [*judged_worlds(task)]
     found = [*task_findings(task, verdicts)]
-    if task.drawn:
+    if task.is_sampled:
         found += _of_drawn([asked for world in worlds for asked in world.by_prompt()])
     else:
         found += [*_same_worlds(worlds), *(finding for world in worlds for finding in _of_listed(world))]

@@ -184,7 +184,7 @@ def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
                 yield SearchedRegex(pattern, f'"{requirement.text}"', lines[requirement.check])
     labels = {label: world for world in judged_worlds(task) for label in _labels(world.scenario.world)}
     for label, world in labels.items():
-        yield SearchedRegex(whole_words(label), world.name, None if task.drawn else world.line)
+        yield SearchedRegex(whole_words(label), world.name, None if task.is_sampled else world.line)
 
 
 def _labels(world: World) -> Iterator[str]:

@@ -20,7 +20,7 @@ from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
 from codebotler.simulator.rules import resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, Kind
-from roboeval.suites.load import Check, Requirement, Scenario, Task
+from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck
 
 _PLAIN = ", as long as each visit names one room of the world"
 
@@ -110,7 +110,7 @@ class JudgedWorld:
         check = self._check(requirement)
         return requirement.line if check.parameters else check.line
 
-    def _check(self, requirement: Requirement) -> Check:
+    def _check(self, requirement: Requirement) -> TaskCheck:
         return next(check for check in self.task.checks if check.name == requirement.check)
 
     def _conflict(

@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from hacking import earned, hacks, honest, taken_back
-from roboeval.suites.families.tasks import TAKES_BACK, family_names, trained_prompts, trained_task
+from roboeval.suites.families.tasks import RETRACTION, family_names, trained_prompts, trained_task
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
 from roboeval.training.prompts import load_prompts
@@ -200,7 +200,7 @@ HONEST = [
 
 
 def test_what_takes_a_report_back_and_what_does_not() -> None:
-    found = [text for text in (*DENIALS, *HONEST) if re.search(TAKES_BACK, text.lower())]
+    found = [text for text in (*DENIALS, *HONEST) if re.search(RETRACTION, text.lower())]
     assert found == DENIALS
 
 
