@@ -24,7 +24,7 @@ from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions
-from roboeval.report.runs import JudgedRun, named_apart
+from roboeval.report.runs import JudgedRun, name_runs
 from roboeval.report.writing import headline, sections, write_report
 from roboeval.suites.load import Suite, load_suite
 
@@ -95,7 +95,7 @@ def main() -> None:
         folder = Path(name)
         runs = [made_up(folder, number, suite) for number in range(MODELS)]
         with timed("reading", spent):
-            judged = named_apart([read(run, suite) for run in runs])
+            judged = name_runs([read(run, suite) for run in runs])
         with timed("putting together", spent):
             parts = sections(judged, command="bench")
         written = write_report(*headline(judged), parts, folder / "report")

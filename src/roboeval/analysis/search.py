@@ -1,4 +1,4 @@
-"""Which completions of a judged run did something: a formula tried on all their traces, on all cores."""
+"""Search the traces of a judged run for a formula, on all cores."""
 
 from __future__ import annotations
 
@@ -17,75 +17,75 @@ from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import can_judge, trace_of
 
-BATCH = 100  # rows that a process looks through at a time
-SMALL = 20  # batches for which other processes are not worth their start
+BATCH = 100  # rows per call of a worker process
+SMALL = 20  # batches; fewer do not justify starting processes
 
 
 @dataclass(frozen=True)
-class Question:
-    """What is looked for."""
+class TraceQuery:
+    """The traces to search for."""
 
-    formula: str | None = None  # of RTL; None matches every trace
-    negated: bool = False  # whether it shall not hold
+    formula: str | None = None  # in RTL; None matches every trace
+    negated: bool = False  # find traces that do not satisfy the formula
     task: str | None = None  # None: any
-    world: str | None = None  # its number from 1, or its `about`; None: any
+    world: str | None = None  # its number from 1 or its `about`; None: any
 
 
 @dataclass(frozen=True)
-class Found:
-    """A completion, and the worlds, by number from 1 and name, in which it does what is looked for."""
+class TraceMatch:
+    """The worlds in which a completion matches a query, by number from 1 and name."""
 
     key: Key
     worlds: tuple[tuple[int, str], ...]
-    cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be kept
-    earlier: tuple[tuple[int, str], ...] = ()  # undecided: an earlier version kept no places
+    cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be stored
+    earlier: tuple[tuple[int, str], ...] = ()  # undecided: an earlier version stored no places
 
     @property
     def undecided(self) -> tuple[tuple[int, str], ...]:
-        """The worlds in which nobody knows whether it does that."""
+        """The worlds in which the query cannot be decided."""
         return tuple(sorted((*self.cut, *self.earlier)))
 
 
-class Search:
-    """Tries a formula on rows while they are read; where there are many, in `workers` processes."""
+class TraceSearch:
+    """Matches rows against a query while they are read; uses `workers` processes for many rows."""
 
-    def __init__(self, question: Question, *, workers: int = 1) -> None:
-        self._question, self._workers = question, workers
+    def __init__(self, query: TraceQuery, *, workers: int = 1) -> None:
+        self._query, self._workers = query, workers
         self._lines: list[bytes] = []
         self._pool: ProcessPoolExecutor | None = None
-        self._waiting: list[Future[list[Found]]] = []
+        self._waiting: list[Future[list[TraceMatch]]] = []
 
-    def see(self, line: bytes) -> None:
-        """Take the next row into account."""
+    def add(self, line: bytes) -> None:
+        """Add the next row."""
         self._lines.append(line)
         if len(self._lines) < BATCH * (SMALL if self._pool is None else 1) or self._workers == 1:
             return
         if self._pool is None:
-            # Other processes are started anew: this one may have threads, which a fork would break.
+            # Spawn, because forking a process with threads may deadlock.
             self._pool = ProcessPoolExecutor(self._workers, multiprocessing.get_context("spawn"))
         lines, self._lines = self._lines, []
         for start in range(0, len(lines), BATCH):
             batch = lines[start : start + BATCH]
-            self._waiting.append(self._pool.submit(look_through, batch, self._question))
+            self._waiting.append(self._pool.submit(match_rows, batch, self._query))
 
-    def found(self) -> Iterator[Found]:
-        """The answers, in the order of the rows; ends the processes."""
+    def matches(self) -> Iterator[TraceMatch]:
+        """Yield the matches in the order of the rows, then stop the processes."""
         if self._pool is None:
-            yield from look_through(self._lines, self._question)
+            yield from match_rows(self._lines, self._query)
             return
         with self._pool:
-            self._waiting.append(self._pool.submit(look_through, self._lines, self._question))
+            self._waiting.append(self._pool.submit(match_rows, self._lines, self._query))
             for future in self._waiting:
                 yield from future.result()
 
 
-def looked_at(table: pl.DataFrame, task: str | None) -> int:
-    """How many judged completions a question is about, of one task or of all."""
+def count_searched(table: pl.DataFrame, task: str | None) -> int:
+    """The number of judged completions, of one task or of all."""
     return completions_of(table if task is None else table.filter(task=task)).height
 
 
-def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
-    """How many completions of each `task` were `found`, and how many of these `passed`."""
+def matches_by_task(found: Sequence[TraceMatch], table: pl.DataFrame) -> pl.DataFrame:
+    """Count the completions of each `task` that were `found`, and how many of these `passed`."""
     keys = pl.DataFrame(
         [one.key for one in found], schema={name: table.schema[name] for name in KEY}, orient="row"
     )
@@ -96,31 +96,31 @@ def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
     return counted.agg(found=pl.len(), passed=pl.col("passed").sum())
 
 
-def look_through(lines: Sequence[bytes], question: Question) -> list[Found]:
-    """Answer for some rows; the work of one process."""
-    formula = None if question.formula is None else parse(question.formula)
-    return [answer(json.loads(line), question, formula) for line in lines]
+def match_rows(lines: Sequence[bytes], query: TraceQuery) -> list[TraceMatch]:
+    """Match a batch of rows; runs in a worker process."""
+    formula = None if query.formula is None else parse(query.formula)
+    return [match_row(json.loads(line), query, formula) for line in lines]
 
 
-def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) -> Found:
-    """Answer for one row."""
+def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:
+    """Match one row."""
     worlds, cut, earlier = [], [], []
-    for number, verdict in _asked(row, question):
+    for number, verdict in _verdicts_in_scope(row, query):
         if formula is not None and "cut" in verdict:
             cut.append((number, verdict["world"]))
         elif formula is not None and not can_judge(formula, verdict):
             earlier.append((number, verdict["world"]))
-        elif formula is None or _holds(formula, verdict) != question.negated:
+        elif formula is None or _holds(formula, verdict) != query.negated:
             worlds.append((number, verdict["world"]))
-    return Found(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
+    return TraceMatch(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
 
 
-def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    """The verdicts that a question is about, counted from 1."""
-    if question.task not in {None, row["task"]}:
+def _verdicts_in_scope(row: Mapping[str, Any], query: TraceQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    """The verdicts in the worlds of a query, numbered from 1."""
+    if query.task not in {None, row["task"]}:
         return
     for number, verdict in enumerate(row["verdicts"], 1):
-        if question.world in {None, str(number)} or verdict["world"].lower() == str(question.world).lower():
+        if query.world in {None, str(number)} or verdict["world"].lower() == str(query.world).lower():
             yield number, verdict
 
 

@@ -11,7 +11,7 @@ from codebotler.core.terminal import print_rich
 from roboeval.cli.output import watched
 
 if TYPE_CHECKING:
-    from roboeval.analysis.summary import Summary
+    from roboeval.analysis.summary import EvaluationSummary
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.completions import Completion, Key
@@ -31,7 +31,7 @@ class Round:
     """
 
     number: int
-    summary: Summary
+    summary: EvaluationSummary
     requests: int
     accepted: int
     tokens: int
@@ -102,7 +102,7 @@ def _round(
     number: int,
     engine: OpenEngine,
 ) -> Round:
-    from roboeval.analysis.summary import summary
+    from roboeval.analysis.summary import summarise
     from roboeval.analysis.tally import Tally
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.requests import add_usage, no_usage
@@ -117,5 +117,5 @@ def _round(
     requested = [one for one in completions.values() if round_of(one) == number]
     for one in requested:
         add_usage(usage, one.more.get("usage"))
-    counted = summary(tally, plan.suite, Scope.of(completions.values(), plan.tasks))
+    counted = summarise(tally, plan.suite, Scope.of(completions.values(), plan.tasks))
     return Round(number, counted, len(requested), len(completions) - len(problems), usage.total())

@@ -12,7 +12,7 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.analysis.compare import compared, pairs_to_compare, verdict
+from roboeval.analysis.compare import compare_scores, pairs_to_compare, verdict
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
 from roboeval.evaluation.runs.completions import KEY, Key, name_of
 from roboeval.web.heat_map import address
@@ -86,7 +86,7 @@ def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
 def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Difference:
     names = shortened(first.name, MOST_NAME), shortened(second.name, MOST_NAME)
     try:
-        found = compared(pass_at_1(first.scores), pass_at_1(second.scores))
+        found = compare_scores(pass_at_1(first.scores), pass_at_1(second.scores))
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
     told = verdict(found, names)

@@ -14,7 +14,7 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.models.no_program import IN_WORDS
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
-from roboeval.analysis.summary import Failures, cut_off, failures
+from roboeval.analysis.summary import Failures, cut_off_replies, failures
 from roboeval.analysis.tasks import prompt_counts
 from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import KEY, Key
@@ -168,7 +168,7 @@ class Snapshot:
     @property
     def cut_off(self) -> CutOff:
         """The replies that were cut off."""
-        return cut_off(self.failures, self.scope)
+        return cut_off_replies(self.failures, self.scope)
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:

@@ -9,7 +9,7 @@ import pytest
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
 from roboeval.analysis import search as searching
-from roboeval.analysis.search import Found, Question, Search
+from roboeval.analysis.search import TraceMatch, TraceQuery, TraceSearch
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES
 
 
@@ -31,49 +31,49 @@ ROWS = [
 ]
 
 
-def found(question: Question, rows: list[dict[str, Any]] | None = None) -> list[Found]:
-    return [one for one in search(ROWS if rows is None else rows, question) if one.worlds]
+def found(query: TraceQuery, rows: list[dict[str, Any]] | None = None) -> list[TraceMatch]:
+    return [one for one in search(ROWS if rows is None else rows, query) if one.worlds]
 
 
-def search(rows: list[dict[str, Any]], question: Question, *, workers: int = 1) -> list[Found]:
-    searching = Search(question, workers=workers)
+def search(rows: list[dict[str, Any]], query: TraceQuery, *, workers: int = 1) -> list[TraceMatch]:
+    searching = TraceSearch(query, workers=workers)
     for one in rows:
-        searching.see(to_line(one))
-    return [*searching.found()]
+        searching.add(to_line(one))
+    return [*searching.matches()]
 
 
 HALL = 'tr.Exists(goto("hall"))'
 
 
 def test_a_formula_is_tried_in_every_world() -> None:
-    assert [(one.key[2], [n for n, _ in one.worlds]) for one in found(Question(HALL))] == [
+    assert [(one.key[2], [n for n, _ in one.worlds]) for one in found(TraceQuery(HALL))] == [
         (0, [1]),
         (1, [2]),
         (3, [1, 2]),
     ]
-    negated = found(Question(HALL, negated=True))
+    negated = found(TraceQuery(HALL, negated=True))
     assert [(one.key[2], [n for n, _ in one.worlds]) for one in negated] == [(0, [2]), (1, [1]), (2, [1, 2])]
 
 
 def test_narrowed_to_a_task_or_a_world() -> None:
-    assert [one.key[2] for one in found(Question(HALL, task="Wait"))] == [3]
-    assert [one.key[2] for one in found(Question(HALL, world="2"))] == [1, 3]
-    assert [one.key[2] for one in found(Question(HALL, world="world 1"))] == [0, 3]
-    assert len(found(Question())) == 4
+    assert [one.key[2] for one in found(TraceQuery(HALL, task="Wait"))] == [3]
+    assert [one.key[2] for one in found(TraceQuery(HALL, world="2"))] == [1, 3]
+    assert [one.key[2] for one in found(TraceQuery(HALL, world="world 1"))] == [0, 3]
+    assert len(found(TraceQuery())) == 4
 
 
 def test_what_cannot_be_judged_does_not_match() -> None:
     asks = row(0, [["ask", "tea?", [{"no text": "1"}], None]])
     formula = 'tr.Exists(ask("tea", "yes"))'
-    assert found(Question(formula), [asks]) == []
-    assert len(found(Question(formula, negated=True), [asks])) == 1
+    assert found(TraceQuery(formula), [asks]) == []
+    assert len(found(TraceQuery(formula, negated=True), [asks])) == 1
 
 
 def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "BATCH", 3)
     monkeypatch.setattr(searching, "SMALL", 2)
     rows = [{**ROWS[n % 4], "index": n} for n in range(50)]
-    assert search(rows, Question(HALL), workers=2) == search(rows, Question(HALL))
+    assert search(rows, TraceQuery(HALL), workers=2) == search(rows, TraceQuery(HALL))
 
 
 def test_places_are_those_of_the_row_and_not_of_requests() -> None:
@@ -81,9 +81,9 @@ def test_places_are_those_of_the_row_and_not_of_requests() -> None:
     old = row(0, [["goto", "hall"], ["say", "x"]])
     new = {**old, "verdicts": [{**old["verdicts"][0], "places": [[1, "hall"], [2, "the hall"], [3, "lab"]]}]}
     other = {**old, "verdicts": [{**old["verdicts"][0], "places": [[1, "hall"], [2, "lab"]]}]}
-    (unknown,) = search([old], Question(formula))
+    (unknown,) = search([old], TraceQuery(formula))
     assert (unknown.worlds, unknown.cut, unknown.earlier) == ((), (), ((1, "World 1"),))
-    assert [len(one.worlds) for one in search([new, other], Question(formula))] == [1, 0]
+    assert [len(one.worlds) for one in search([new, other], TraceQuery(formula))] == [1, 0]
 
 
 # --- the command

@@ -16,7 +16,7 @@ from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.metrics import judged_count
-from roboeval.analysis.summary import Failures, Missing, Summary
+from roboeval.analysis.summary import EvaluationSummary, Failures, Missing
 from roboeval.cli.views.completions import kind_view, prompt_lines
 from roboeval.evaluation.failures import plural_of, shown_classes
 from roboeval.evaluation.runs.completions import by_hand, how_many
@@ -35,7 +35,7 @@ def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
     return table
 
 
-def summary_view(summary: Summary, *, title: str) -> RenderableType:
+def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     """The tables of an evaluation."""
     head = Text(visible(title) + by_hand(summary.scope.models), style="bold")
     if summary.ablated:
@@ -86,7 +86,7 @@ def _missed(missing: Missing) -> Iterator[Text]:
 class _TaskTable:
     """The scores of tasks, with fewer columns where names of tasks would be broken otherwise."""
 
-    summary: Summary
+    summary: EvaluationSummary
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Table]:
         boundless = options.update(max_width=10_000)
@@ -117,7 +117,7 @@ class _TaskTable:
         return table
 
 
-def _overall(summary: Summary) -> list[Text]:
+def _overall(summary: EvaluationSummary) -> list[Text]:
     lines = []
     for k, estimate in zip(summary.k, summary.overall, strict=True):
         line = Text.assemble(f"pass@{k} over all prompts: ", (f"{estimate.mean:.3f}", "bold"))

@@ -12,7 +12,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
-from roboeval.analysis.search import Question, Search
+from roboeval.analysis.search import TraceQuery, TraceSearch
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
@@ -73,7 +73,7 @@ def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
     content = path.read_bytes()
     readers: dict[str, Callable[[], object]] = {
         "results": lambda: read(run),
-        "find": lambda: read(run, see=Search(Question('tr.Exists(say("x"))')).see),
+        "find": lambda: read(run, see=TraceSearch(TraceQuery('tr.Exists(say("x"))')).add),
         "evaluate": lambda: judged(run, paper),
     }
     for number in range(PLACES):
