@@ -14,7 +14,7 @@ from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import tried
+from roboeval.linting.trials import judge_solutions
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task
 from roboeval.suites.solutions import solutions
@@ -75,7 +75,7 @@ def linted(tmp_path: Path) -> Lint:
         (suite / "tasks" / "Hello.yaml").write_text(text)
         loaded = load_suite(str(suite))
         task = loaded.task("Hello")
-        findings = lint(task, tried(task, loaded) if untripped else [])
+        findings = lint(task, judge_solutions(task, loaded) if untripped else [])
         wanted = {"untripped": untripped, "unworded": unworded}
         return [one for one in findings if wanted.get(one.kind, True)]
 
@@ -549,7 +549,7 @@ def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path:
     new_task(tmp_path, "MakeTea")
     suite = load_suite(str(tmp_path))
     task = suite.task("MakeTea")
-    assert lint(task, tried(task, suite)) == []
+    assert lint(task, judge_solutions(task, suite)) == []
     rows = [
         Completion(task="MakeTea", prompt=0, index=i, program=one.program)
         for i, one in enumerate(solutions(task))

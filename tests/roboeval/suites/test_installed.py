@@ -113,8 +113,8 @@ def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) 
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
-        ({"whole": False}, r'"garden" is garden_suite, .*suite\.yaml in .*garden_suite'),
-        ({"place": "gone"}, r'"garden" is gone, .*no package "gone"'),
+        ({"whole": False}, r'"garden" at garden_suite, .*suite\.yaml in .*garden_suite'),
+        ({"place": "gone"}, r'"garden" at gone, .*no package "gone"'),
         ({"place": "garden_suite:SUITE"}, r'no package "garden_suite:SUITE"'),
         ({"point": "roses", "name": "garden"}, r'line 1: .*"garden", .*"roses"'),
     ],
