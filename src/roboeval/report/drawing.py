@@ -8,17 +8,13 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any
 
 import matplotlib as mpl
 from fontTools import subset
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import GraphicsContextBase, RendererBase
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
-from matplotlib.transforms import Affine2D, Bbox
-from PIL import Image
 
 from codebotler.core.terminal import visible
 
@@ -98,72 +94,17 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def render(figure: Figure) -> dict[str, bytes]:
-    """Return a figure as png, pdf and svg, without dates and versions; lay it out and draw it only once."""
-    canvas = FigureCanvasAgg(figure)
+    """Return a figure as png, pdf and svg, without dates and versions; lay it out only once."""
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)
-    replay = ReplayFigure(figure)
-    renderer = canvas.get_renderer()  # type: ignore[no-untyped-call]  # matplotlib lacks the annotation
-    figure.draw(RecordingRenderer(renderer, replay.calls))  # type: ignore[arg-type]  # delegates everything
-    found = {"png": io.BytesIO(), "pdf": io.BytesIO(), "svg": io.BytesIO()}
-    picture = Image.frombuffer("RGBA", canvas.get_width_height(), renderer.buffer_rgba()).convert("RGB")
-    picture.save(found["png"], format="png", dpi=(DPI, DPI), compress_level=3)
-    for kind, names in (("pdf", ("Creator", "Producer", "CreationDate")), ("svg", ("Creator", "Date"))):
-        replay.savefig(found[kind], format=kind, metadata=dict.fromkeys(names))
-    written = {kind: content.getvalue() for kind, content in found.items()}
-    return {**written, "svg": _slim(written["svg"])}
-
-
-class RecordingRenderer:
-    """Forwards drawing calls to a renderer and records each with its graphics context."""
-
-    def __init__(self, renderer: RendererBase, calls: list[Any]) -> None:
-        self._renderer, self._calls = renderer, calls
-
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of a renderer
-        found = getattr(self._renderer, name)
-        if not name.startswith("draw_"):
-            return found
-
-        def record(pen: GraphicsContextBase, *args: Any, **more: Any) -> None:  # noqa: ANN401 - any signature
-            kept = GraphicsContextBase()
-            kept.copy_properties(pen)
-            self._calls.append((name, kept, args, more))
-            found(pen, *args, **more)
-
-        return record
-
-
-class ReplayFigure(Figure):
-    """Repeats recorded drawing calls for other formats, at 72 dots per inch."""
-
-    TRANSFORMS: ClassVar = {  # positions of the arguments that are transforms to dots
-        "draw_path": (1,),
-        "draw_markers": (1, 3),
-        "draw_path_collection": (0, 4),
-        "draw_quad_mesh": (0, 5),
-    }
-
-    def __init__(self, figure: Figure) -> None:
-        super().__init__(figsize=tuple(figure.get_size_inches()), dpi=POINTS)
-        self.calls: list[Any] = []
-
-    def draw(self, renderer: RendererBase) -> None:
-        """Repeat all recorded calls."""
-        smaller = Affine2D().scale(POINTS / DPI)
-        for name, kept, recorded, more in self.calls:
-            pen, args = renderer.new_gc(), list(recorded)
-            pen.copy_properties(kept)
-            if (clip := kept.get_clip_rectangle()) is not None:
-                pen.set_clip_rectangle(Bbox(smaller.transform(clip)))
-            if name == "draw_text":
-                x, y = smaller.transform(args[:2])
-                args[:2] = x, y if renderer.flipy() else self.bbox.height - y
-            for at in self.TRANSFORMS.get(name, ()):
-                args[at] = args[at] + smaller
-            getattr(renderer, name)(pen, *args, **more)
-            pen.restore()
+    files = {kind: io.BytesIO() for kind in ("png", "pdf", "svg")}
+    figure.savefig(files["png"], format="png", metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+    figure.savefig(
+        files["pdf"], format="pdf", metadata=dict.fromkeys(("Creator", "Producer", "CreationDate"))
+    )
+    figure.savefig(files["svg"], format="svg", metadata=dict.fromkeys(("Creator", "Date")))
+    return {kind: file.getvalue() for kind, file in files.items()} | {"svg": _slim(files["svg"].getvalue())}
 
 
 def _slim(svg: bytes) -> bytes:

@@ -58,9 +58,7 @@ class RunStore:
         try:
             size = path.stat().st_size
             if size > MOST_REPORT:
-                raise UserError(
-                    f"is too large to show ({size:,} bytes); open the file itself", file=path.name
-                )
+                raise UserError(f"is too large to show ({size:,} bytes); open the file", file=path.name)
             return path.read_bytes()
         except OSError:
             return None
@@ -96,9 +94,7 @@ class RunStore:
     def _reader(self, name: str, key: str | None) -> _Reader:
         path = self._folders().get(name)  # compared with entries, so a name cannot lead to another folder
         if path is None or not _is_run(path):
-            raise MissingError(
-                f'there is no run "{shortened(name)}" in this folder; it may have been deleted'
-            )
+            raise MissingError(f'this folder has no run "{shortened(name)}"; it may have been deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):
             raise UserError(f'"{shortened(name)}" {OUTSIDE}')
         run = Run(path)

@@ -113,9 +113,7 @@ def notes(run: Snapshot) -> list[str]:
     if (warning := run.cut_off.warning) is not None:
         found.append(f"{warning}.")
     if stale:
-        found.append(
-            f"{how_many(stale)} changed since the verdict; judge again with `roboeval evaluate --redo`."
-        )
+        found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
         name = shortened(str(results.head.get("suite")), MOST_NAME)
         found.append(

@@ -204,7 +204,7 @@ def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> N
 
 def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
     assert worlds_of(suite, task, None, 1) == task.scenarios
-    with pytest.raises(UserError, match=r'"mine".* written out'):
+    with pytest.raises(UserError, match=r'"mine".* --worlds'):
         worlds_of(suite, task, 200, 1)
 
 

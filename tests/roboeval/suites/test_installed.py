@@ -58,7 +58,7 @@ def test_a_suite_is_found_by_its_name_without_running_its_package(install: Insta
     assert load_suite("garden").folder == folder
     assert [(one.name, one.package) for one in installed_suites()] == [("garden", "garden-suite 1.0")]
     ended = roboeval("tasks", "--lint", "--suite", "garden", environment=ENVIRONMENT | dict(os.environ))
-    assert (ended.status, ended.out) == (0, "nothing was found\n"), ended
+    assert (ended.status, ended.out) == (0, "no findings\n"), ended
     listed = roboeval("tasks", environment=ENVIRONMENT | dict(os.environ))
     assert "garden (garden-suite 1.0)" in listed.err
 

@@ -220,5 +220,5 @@ def test_seeds_are_whole_numbers_from_0(seed: int) -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(UserError, match='there is no family "Fly"; .*AnnounceInOrder'):
+    with pytest.raises(UserError, match=r'there is no family "Fly"; .*AnnounceInOrder'):
         trained_task("Fly", 1)

@@ -96,7 +96,7 @@ def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.M
 
 
 def test_a_prompt_that_is_not_there_is_refused() -> None:
-    with pytest.raises(UserError, match="BringThing-1 has no prompt 4; .*0 to 3"):
+    with pytest.raises(UserError, match=r"BringThing-1 has no prompt 4; .*0 to 3"):
         judge([Rollout(FAMILY, 1, 4, "")])
 
 
