@@ -35,7 +35,7 @@ SECONDS, MEGABYTES, PAGE = 60, 1024, 5_000_000
 
 @contextmanager
 def timed(what: str, spent: dict[str, float]) -> Iterator[None]:
-    """Note how long a step takes."""
+    """Record the duration of a step."""
     start = time.perf_counter()
     yield
     spent[what] = spent.get(what, 0.0) + time.perf_counter() - start
@@ -55,7 +55,7 @@ def recorded() -> list[Completion]:
 
 
 def made_up(folder: Path, number: int, suite: Suite) -> Run:
-    """A run whose completions nobody wrote, judged like the recorded ones that they repeat."""
+    """A run with synthetic completions, judged like the recorded ones that they copy."""
     run = Run(folder / f"model-{number}")
     rows = verdicts()
     by_prompt: dict[tuple[str, int], list[int]] = {}
@@ -81,7 +81,7 @@ def made_up(folder: Path, number: int, suite: Suite) -> Run:
 
 
 def read(run: Run, suite: Suite) -> JudgedRun:
-    """A run as the command reads it, with a check that rejects what ends in an error."""
+    """Read a run like the command, with a check that rejects programs that end in an error."""
     results = read_results(run, "paper", suite)
     accepted = pl.col("failure_check").is_not_null() | pl.col("passed")
     return JudgedRun(results, results.table.with_columns(accepted=accepted))
