@@ -189,11 +189,7 @@ class ComparedRun:
     @property
     def data(self) -> dict[str, Any]:
         """The run as plain data, without its name."""
-        return {
-            **asdict(self.coverage),
-            "cut_off": self.cut_off.replies,
-            "failures": dict(self.classes),
-        }
+        return {**asdict(self.coverage), "cut_off": self.cut_off.replies, "failures": dict(self.classes)}
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:

@@ -17,17 +17,11 @@ from codebotler.simulator.rule_guard import Rule
 
 @dataclass(frozen=True)
 class HouseRules:
-    """The house rules of a file.
+    """The house rules of a file."""
 
-    Args:
-        name: the file's name without its ending, part of an evaluation's name; empty for rules of a suite.
-        rules: the rules in the order of the file.
-        digest: the SHA-256 of the file, in hexadecimal.
-    """
-
-    name: str
-    rules: tuple[Rule, ...]
-    digest: str
+    name: str  # the file's name without its ending, part of an evaluation's name; empty for rules of a suite
+    rules: tuple[Rule, ...]  # the rules in the order of the file
+    digest: str  # the SHA-256 of the file, in hexadecimal
 
     def __post_init__(self) -> None:
         for rule in self.rules:

@@ -54,33 +54,22 @@ class Suite:
     """Tasks with the settings by which they are judged.
 
     Args:
-        name: the name in evaluations.
-        version: increases when a verdict may change.
-        about: a description in a sentence.
-        rules: how worlds are simulated.
-        tasks: the tasks by name, sorted.
-        digest: a hash of everything that verdicts and prompts depend on.
-        folder: the folder of its files.
         worlds: the least number of worlds per task, if they are sampled; None if written by hand.
-        seed: the random seed of sampled worlds.
-        skills: the skills that formulas may use.
-        house: rules that stop a program.
-        families: the tasks of families that it consists of, if any.
         recorded: the programs of the recorded models, if they are not in files.
     """
 
-    name: str
-    version: int
-    about: str
-    rules: Rules
-    tasks: Mapping[str, Task]
-    digest: str
-    folder: Path | None = None
+    name: str  # the name in evaluations
+    version: int  # increases when a verdict may change
+    about: str  # a description in a sentence
+    rules: Rules  # how worlds are simulated
+    tasks: Mapping[str, Task]  # the tasks by name, sorted
+    digest: str  # a hash of everything that verdicts and prompts depend on
+    folder: Path | None = None  # the folder of its files
     worlds: int | None = None
-    seed: int | None = None
-    skills: SkillTable = SKILLS
-    house: HouseRules | None = None
-    families: FamilyTasks | None = None
+    seed: int | None = None  # the random seed of sampled worlds
+    skills: SkillTable = SKILLS  # the skills that formulas may use
+    house: HouseRules | None = None  # rules that stop a program
+    families: FamilyTasks | None = None  # the tasks of families that it consists of, if any
     recorded: tuple[InstructionSolutions, ...] = field(default=(), repr=False)
 
     def __hash__(self) -> int:

@@ -48,15 +48,12 @@ class CheckFile(_Form):
     """A check in a task file.
 
     Args:
-        category: the kind of failure.
-        commonsense: whether it tests something that no prompt mentions.
-        rtl: the formula.
         means: descriptions of its texts for explanations, by kind of event; a single one is for `say`.
     """
 
-    category: Category
-    commonsense: bool = False
-    rtl: Text
+    category: Category  # the kind of failure
+    commonsense: bool = False  # whether it tests something that no prompt mentions
+    rtl: Text  # the formula
     means: Annotated[dict[str, Name], BeforeValidator(_default_to_say)] = {}
 
 
@@ -64,25 +61,22 @@ class TaskFact(_Form):
     """A fact that the requirements of a task depend on.
 
     Args:
-        fact: the fact in a sentence.
         words: regexes; every prompt matches at least one, or none if it is common sense.
-        commonsense: whether the model must know it although no prompt mentions it.
     """
 
-    fact: Text
+    fact: Text  # the fact in a sentence
     words: Annotated[tuple[Annotated[Text, AfterValidator(check_regex)], ...], Field(min_length=1)]
-    commonsense: bool = False
+    commonsense: bool = False  # whether the model must know it although no prompt mentions it
 
 
 class RequirementFile(_Form):
     """A requirement in a task file: a string, or a mapping if only some prompts ask for it.
 
     Args:
-        check: the check, optionally with `not`, and for sampled worlds with `for` or `if`.
         prompts: the words that ask for it, by the number of the prompt, from 0.
     """
 
-    check: Text
+    check: Text  # the check, optionally with `not`, and for sampled worlds with `for` or `if`
     prompts: Annotated[dict[Annotated[int, Field(ge=0, lt=10_000)], Name], Field(min_length=1)] | None = None
 
     @model_validator(mode="before")

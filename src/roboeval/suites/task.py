@@ -23,19 +23,14 @@ class Requirement:
     """A formula that the trace of a program must satisfy in a world (paper, section IV.B).
 
     Args:
-        text: the text in the task file, such as `not greets("amy")`.
-        check: the name of the check that it applies.
-        formula: the formula, negated if the text starts with `not`.
-        category: the kind of failure if it does not hold.
-        line: the line in the task file.
         words: the number of each prompt that asks for it, and its words; empty if all prompts do.
     """
 
-    text: str
-    check: str
-    formula: Formula = field(repr=False)
-    category: Category
-    line: int | None = None
+    text: str  # the text in the task file, such as `not greets("amy")`
+    check: str  # the name of the check that it applies
+    formula: Formula = field(repr=False)  # the formula, negated if the text starts with `not`
+    category: Category  # the kind of failure if it does not hold
+    line: int | None = None  # the line in the task file
     words: tuple[tuple[int, str], ...] = field(default=(), repr=False)
 
     def is_asked_by(self, prompt: int) -> bool:
@@ -63,21 +58,15 @@ class TaskCheck:
     """A named formula of a task that requirements apply.
 
     Args:
-        name: the name in requirements.
-        parameters: the names of its parameters.
-        category: the kind of failure if it does not hold.
-        rtl: the formula, with `{parameter}` in place of arguments.
-        commonsense: whether it tests something that no prompt mentions.
-        line: the line in the task file.
         means: descriptions of its texts for explanations, by kind of event, with `{parameter}` as in `rtl`.
     """
 
-    name: str
-    parameters: tuple[str, ...]
-    category: Category
-    rtl: str
-    commonsense: bool
-    line: int | None = None
+    name: str  # the name in requirements
+    parameters: tuple[str, ...]  # the names of its parameters
+    category: Category  # the kind of failure if it does not hold
+    rtl: str  # the formula, with `{parameter}` in place of arguments
+    commonsense: bool  # whether it tests something that no prompt mentions
+    line: int | None = None  # the line in the task file
     means: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -86,34 +75,24 @@ class Task:
     """One task of a suite: prompts, worlds, requirements (paper, section IV).
 
     Args:
-        name: the name in rows of completions.
-        summary: a description in a sentence.
-        abilities: the abilities that a robot needs.
-        prompts: phrasings of the same instruction.
-        facts: the facts that requirements depend on.
         covered_by: the checks that cover each fact, or the reason why none does.
-        checks: the named formulas.
         scenarios: the worlds with all requirements, including those that only some prompts ask for.
         ablation: the worlds with common-sense requirements only; None if the task has none.
-        accepted: intended findings of the linter.
-        path: the task file.
-        borrows: whether its instruction comes from a task of another suite.
-        is_sampled: whether its worlds are sampled from a description.
         phrases: regexes for equivalent phrasings, by their name in checks.
     """
 
-    name: str
-    summary: str
-    abilities: tuple[Ability, ...]
-    prompts: tuple[str, ...]
-    facts: tuple[TaskFact, ...]
-    checks: tuple[TaskCheck, ...]
+    name: str  # the name in rows of completions
+    summary: str  # a description in a sentence
+    abilities: tuple[Ability, ...]  # the abilities that a robot needs
+    prompts: tuple[str, ...]  # phrasings of the same instruction
+    facts: tuple[TaskFact, ...]  # the facts that requirements depend on
+    checks: tuple[TaskCheck, ...]  # the named formulas
     scenarios: tuple[Scenario, ...]
     ablation: tuple[Scenario, ...] | None
-    accepted: tuple[AcceptedFinding, ...]
-    path: Path
-    borrows: bool = False
-    is_sampled: bool = False
+    accepted: tuple[AcceptedFinding, ...]  # intended findings of the linter
+    path: Path  # the task file
+    borrows: bool = False  # whether its instruction comes from a task of another suite
+    is_sampled: bool = False  # whether its worlds are sampled from a description
     phrases: tuple[tuple[str, tuple[str, ...]], ...] = ()
     covered_by: tuple[tuple[str, tuple[str, ...] | str], ...] = ()
 

@@ -26,19 +26,12 @@ TOGETHER = 16  # programs per batch, all for the same task
 
 @dataclass(frozen=True)
 class Rollout:
-    """A program that a policy wrote for a prompt of `load_prompts`.
+    """A program that a policy wrote for a prompt of `load_prompts`."""
 
-    Args:
-        family: the family of the task.
-        seed: the seed of the task.
-        prompt_index: the phrasing, from 0.
-        program: the source, which need not parse.
-    """
-
-    family: str
-    seed: int
-    prompt_index: int
-    program: str
+    family: str  # the family of the task
+    seed: int  # the seed of the task
+    prompt_index: int  # the phrasing, from 0
+    program: str  # the source, which need not parse
 
 
 @dataclass(frozen=True)

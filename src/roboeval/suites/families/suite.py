@@ -27,16 +27,9 @@ NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
 
 
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
-    """The first of `count` seeds of a split; a different `seed` selects entirely different ones.
+    """The first of `count` seeds of a split; a different `seed`, from 0, selects entirely different ones.
 
-    Args:
-        split: one of `SPLITS`.
-        seed: an integer from 0.
-        count: at least 1.
-        what: the things that are counted, for messages.
-
-    Raises:
-        UserError: the split does not exist, or a number is out of range.
+    Raises UserError if the split does not exist or a number is out of range; `what` names the counted things.
     """
     if split not in SPLITS:
         raise UserError(f'there is no split "{split}"; use {listed(list(SPLITS))}')

@@ -84,19 +84,12 @@ class FamilyFile(_Form):
 
 @dataclass(frozen=True)
 class TrainedTask:
-    """A task of a family.
+    """A task of a family."""
 
-    Args:
-        suite: a suite with this task only.
-        name: the family and the seed, such as `BringThing-17`.
-        solution: a right program.
-        wrong: wrong programs.
-    """
-
-    suite: Suite
-    name: str
-    solution: str
-    wrong: tuple[WrongProgram, ...]
+    suite: Suite  # a suite with this task only
+    name: str  # the family and the seed, such as `BringThing-17`
+    solution: str  # a right program
+    wrong: tuple[WrongProgram, ...]  # wrong programs
 
     @property
     def prompts(self) -> tuple[str, ...]:
