@@ -27,12 +27,7 @@ def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Scores by task and prompt (paper, section IV.C).
-
-    Args:
-        table: from `load_results`.
-        order: the order of tasks; others follow in the order of the table.
-    """
+    """Scores by task and prompt (paper, section IV.C); tasks not in `order` come last."""
     return tally_of(table).scores(order)
 
 
