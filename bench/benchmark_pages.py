@@ -59,14 +59,14 @@ JUMP = """async (share) => {
 
 
 def timed(do: Callable[[], object]) -> float:
-    """Milliseconds that something takes."""
+    """Measure the duration of a call in milliseconds."""
     began = time.perf_counter()
     do()
     return 1000 * (time.perf_counter() - began)
 
 
 def opened(page: Page, address: str, *there: str) -> float:
-    """Open a page: milliseconds until all of it stands there."""
+    """Open a page; return the milliseconds until it is complete."""
 
     def open_it() -> None:
         page.goto(address)
@@ -77,7 +77,7 @@ def opened(page: Page, address: str, *there: str) -> float:
 
 
 def chosen(page: Page) -> float:
-    """Choose what failed by some kind, and all again: milliseconds of the first."""
+    """Filter by a kind of failure, then show all again; return the milliseconds of the filter."""
 
     def choose() -> None:
         page.locator(".kind", has_text="SayAtLocation").click()
@@ -92,7 +92,7 @@ def chosen(page: Page) -> float:
 
 
 def main() -> int:
-    """Print all; 1 if what is aimed at is missed."""
+    """Print all measurements; return 1 if an aim is missed."""
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
         folder = Path(name)
         run = made_up(folder, 0, load_suite())

@@ -1,4 +1,4 @@
-"""How fast is this version beside another one, each in an environment of its own?
+"""How fast is this version compared with another one, each in its own environment?
 
     OTHER=../before/.venv/bin python bench/beside.py
 
@@ -78,7 +78,7 @@ print(time.perf_counter() - began)
 
 
 def main() -> None:
-    """Print a line for each measure."""
+    """Print a line for each measurement."""
     other = os.environ.get("OTHER")
     if other is None:
         sys.exit("OTHER names the bin folder of the other environment")
@@ -114,7 +114,7 @@ def renamed(completions: list[Completion]) -> list[Completion]:
 
 
 def evaluated(file: Path) -> Callable[[Path], float]:
-    """Times the whole command."""
+    """Time the whole command."""
 
     def time_it(folder: Path) -> float:
         start = time.perf_counter()
@@ -126,7 +126,7 @@ def evaluated(file: Path) -> Callable[[Path], float]:
 
 
 def told(script: str, file: Path) -> Callable[[Path], float]:
-    """Lets a script time itself, without its imports."""
+    """Let a script time itself, without its imports."""
 
     def time_it(folder: Path) -> float:
         command = [str(folder / "python"), "-c", script, str(file)]
@@ -136,7 +136,7 @@ def told(script: str, file: Path) -> Callable[[Path], float]:
 
 
 def compare(what: str, time_it: Callable[[Path], float], folders: tuple[Path, Path]) -> None:
-    """Time both in turns."""
+    """Time both versions in turns."""
     times = [tuple(map(time_it, folders)) for _ in range(TURNS)]
     ours, theirs = (median(column) for column in zip(*times, strict=True))
     print(f"{what}: {ours:.2f} s, the other {theirs:.2f} s: {ours / theirs:.2f} of its time", flush=True)

@@ -1,4 +1,4 @@
-"""What does checking reject, of programs of which the true worlds are known, and at what cost?
+"""Which programs does the check reject, compared with the true worlds of their tasks, and at what cost?
 
 The programs are those that models wrote and those of recorded:careful, and apart from them those that were
 written by hand to show one fault or one odd way each (where CODEBOTLER_CORPUS names the corpus; else the
@@ -33,14 +33,14 @@ SEEDS = int(os.environ.get("SEEDS", "20"))
 PART = int(os.environ.get("PART", "1"))
 CERTAIN = frozenset({"GoToInvalidLocation", "SyntaxError", "NameError"})
 CAUGHT, LOST, LOST_IN_A_TASK = 0.95, 0.01, 0.05
-"""What is aimed at: the least share of certain errors, and the largest of right programs, to be rejected."""
+"""The aims: the least share of certain errors, and the largest share of right programs, that is rejected."""
 
 Source = tuple[str, str]
 """A task's name and a program."""
 
 
 def real(suite: Suite) -> list[Source]:
-    """What models wrote, as far as it is at hand, and the careful programs."""
+    """The available programs of models, and the careful programs."""
     found = [(c.task, c.program) for c in recorded_completions("recorded:careful", suite)]
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
@@ -51,7 +51,7 @@ def real(suite: Suite) -> list[Source]:
 
 
 def by_hand() -> list[Source]:
-    """Programs that were written to show something."""
+    """Programs written for demonstrations."""
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     return list(rows(Path(corpus, "tasks", "synthetic.jsonl"))) if corpus else []
 
@@ -63,12 +63,12 @@ def rows(file: Path) -> Iterator[Source]:
         yield row["task"], row["program"]
 
 
-# --- what is true, and what the check says
+# --- verdicts in true worlds, and verdicts of the check
 
 
 @dataclass
 class Truth:
-    """What a program does in the true worlds of its task.
+    """The results of a program in the true worlds of its task.
 
     Args:
         passed: whether it is right in all of them.
@@ -134,7 +134,7 @@ class Tally:
 
     @property
     def share(self) -> float:
-        """The rejected of all, from 0 to 1."""
+        """The share of rejected programs, from 0 to 1."""
         return self.rejected / self.checks if self.checks else 0.0
 
     def __str__(self) -> str:
@@ -143,7 +143,7 @@ class Tally:
 
 @dataclass
 class Rates:
-    """What was rejected of the programs of one collection.
+    """The rejected programs of one collection.
 
     Args:
         certain: of those that end in an error of the kinds in CERTAIN.
@@ -159,12 +159,12 @@ class Rates:
 
     @property
     def worst(self) -> tuple[str, Tally]:
-        """The task of whose right programs most are rejected."""
+        """The task with the largest share of rejected right programs."""
         return max(self.by_task.items(), key=lambda item: item[1].share)
 
     @property
     def hold(self) -> bool:
-        """Whether what is aimed at is reached."""
+        """Whether all aims are met."""
         return (
             self.certain.share >= CAUGHT
             and self.right.share <= LOST
@@ -173,7 +173,7 @@ class Rates:
 
 
 def rates(sources: Iterable[Source], true: Iterable[Truth], said: Iterable[Sequence[bool]]) -> Rates:
-    """Count what was rejected."""
+    """Count rejected programs."""
     found = Rates()
     for (task, _), truth, rejected in zip(sources, true, said, strict=True):
         if truth.passed:
@@ -191,7 +191,7 @@ def rates(sources: Iterable[Source], true: Iterable[Truth], said: Iterable[Seque
 
 
 def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool) -> bool:
-    """Print what is rejected of a collection; whether it is as aimed at."""
+    """Print the rejected programs of a collection; return whether the aims are met."""
     start = time.perf_counter()
     true = truths(sources, suite)
     said = rejections(sources, suite, range(SEEDS), pool)
@@ -216,7 +216,7 @@ def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool)
 
 
 def report_guessing(sources: Sequence[Source], suite: Suite, pool: WorkerPool) -> None:
-    """Print what is rejected where the rooms are taken from the programs themselves."""
+    """Print the rejected programs if rooms are taken from the programs themselves."""
     true = truths(sources, suite)
     found = rates(sources, true, rejections(sources, suite, [0], pool, with_rooms=False))
     print("\nthe same without rooms, one seed:")
@@ -225,7 +225,7 @@ def report_guessing(sources: Sequence[Source], suite: Suite, pool: WorkerPool) -
 
 
 def report_cost(sources: Sequence[Source], suite: Suite) -> None:
-    """Print what a check costs, in runs of the same programs in one imagined world."""
+    """Print the cost of a check, in runs of the same programs in one imagined world."""
     worker = Worker()
     plans = {name: RoomMap.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
     once = checked = 0.0
@@ -247,7 +247,7 @@ def report_cost(sources: Sequence[Source], suite: Suite) -> None:
 
 
 def main() -> int:
-    """Print all parts; 1 if what is aimed at is missed."""
+    """Print all parts; return 1 if an aim is missed."""
     suite = load_suite()
     written = list(dict.fromkeys(real(suite)))[::PART]
     shown = [source for source in dict.fromkeys(by_hand()) if source not in set(written)][::PART]

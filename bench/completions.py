@@ -33,7 +33,7 @@ PROGRAM = "def task_program():\n    say('this is {number}')\n    go_to('lobby')\
 
 
 def evaluated(file: Path, workers: str = WORKERS) -> tuple[float, float]:
-    """Judge a file of completions: seconds, and megabytes of the largest process."""
+    """Judge a file of completions; return seconds, and megabytes of the largest process."""
     command = [
         sys.executable,
         "-m",
@@ -73,7 +73,7 @@ def real(folder: Path) -> None:
 
 
 def judged(file: Path, suite: Suite) -> float:
-    """Judge a file of completions in this process: seconds."""
+    """Judge a file of completions in this process; return seconds."""
     start = time.perf_counter()
     for _ in evaluate(read_completions(file), suite, workers=int(WORKERS)):
         pass
@@ -81,7 +81,7 @@ def judged(file: Path, suite: Suite) -> float:
 
 
 def models(folder: Path) -> dict[str, Path]:
-    """Files of completions by the name of who wrote them."""
+    """Files of completions, by model."""
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
         return {file.stem: file for file in sorted(Path(corpus, "corpus", "completions").glob("*.jsonl"))}
@@ -94,7 +94,7 @@ def models(folder: Path) -> dict[str, Path]:
 
 
 def growth(folder: Path) -> None:
-    """Print time and memory for more and more rows."""
+    """Print time and memory for increasing numbers of rows."""
     for count in ROWS:
         file = folder / f"{count}.jsonl"
         with file.open("w") as rows:
@@ -111,7 +111,7 @@ def growth(folder: Path) -> None:
 
 
 def scaling(folder: Path) -> None:
-    """Print how long more and more workers take."""
+    """Print the duration for increasing numbers of workers."""
     file = folder / "different.jsonl"
     with file.open("w") as rows:
         for number in range(DIFFERENT):

@@ -1,4 +1,4 @@
-"""How fast is the engine, compared with no isolation at all and with one fresh interpreter a run?
+"""How fast is the engine, compared with no isolation and with a new interpreter for each run?
 
 The list is fixed: every distinct (program, world) pair of the corpus, where CODEBOTLER_CORPUS names it, or
 else of the recorded models; then those of every fourth program under the suite `plus`. Nothing is
@@ -39,7 +39,7 @@ Pair = tuple[str, World]
 
 
 def pairs(suite: Suite) -> list[Pair]:
-    """The fixed list; the worlds of a program follow one another."""
+    """The fixed list of pairs, grouped by program."""
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
         lines = (Path(corpus) / "corpus" / "programs.jsonl").read_text().splitlines()
@@ -60,7 +60,7 @@ def pairs(suite: Suite) -> list[Pair]:
 
 
 def isolated(pool: WorkerPool, rules: SimulationSettings, part: Sequence[Pair]) -> list[Status]:
-    """Ours: isolated, a few programs in a child, each in all of its worlds."""
+    """Our engine: isolated, a few programs per child process, each in all of its worlds."""
     REPLAYED.clear()  # what other times have left
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
@@ -78,7 +78,7 @@ def isolated(pool: WorkerPool, rules: SimulationSettings, part: Sequence[Pair]) 
 
 @cache
 def reused(world: World) -> Reused:
-    """What runs programs in this process."""
+    """Create a runner for this process."""
     return Reused(world)
 
 
@@ -117,14 +117,14 @@ def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> Non
 
 
 def seconds(way: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> float:
-    """How long a way takes for a part of the list."""
+    """The duration of a method for a part of the list."""
     start = time.perf_counter()
     way(part)
     return time.perf_counter() - start
 
 
 def parts(whole: Sequence[Pair]) -> Iterator[list[Pair]]:
-    """The list in parts; each holds programs from all over the list."""
+    """Split the list into parts with programs from the whole list."""
     programs = [list(same) for _, same in groupby(whole, key=lambda pair: pair[0])]
     for start in range(PARTS):
         yield [pair for program in programs[start::PARTS] for pair in program]
@@ -180,7 +180,7 @@ def every_fourth(whole: Sequence[Pair]) -> list[Pair]:
 
 
 def compare(honest: Sequence[Pair], ways: dict[str, Callable[[Sequence[Pair]], object]]) -> None:
-    """Time ways in turns, and print what they reach."""
+    """Time all methods in turns, and print their rates."""
     times: dict[str, list[float]] = {}
     for part in list(parts(honest)) * TIMES:
         for name, way in ways.items():
@@ -220,7 +220,7 @@ LOOPS = {
 
 
 def report_hanging(ours: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> None:
-    """Print what a program that hangs, a run of five seconds of processor time, costs the honest ones."""
+    """Print the delay that a hanging program of five processor seconds causes for others."""
     longer = [(f"{source}\n# {copy}\n", world) for copy in range(COPIES) for source, world in part]
     alone = seconds(ours, longer)
     beside = seconds(ours, [(HANGS, NOWHERE), *longer])

@@ -1,4 +1,4 @@
-"""What does a whole run cost where one request in ten fails, and is every completion there exactly once?
+"""What does a run cost if one request in ten fails, and is every completion stored exactly once?
 
     python bench/faulty_server.py [COMPLETIONS OF EACH PROMPT] [MODEL ...]
 

@@ -1,4 +1,4 @@
-"""How much does each extra take: to download, on the disk, and of the time of whoever installs it?
+"""How much download, disk space and time does each extra take?
 
 For each extra that is named (all by default; `-` is the package without any) this downloads what it needs,
 makes an empty environment, and installs there from what was downloaded. It prints a table in Markdown.
@@ -45,7 +45,7 @@ def row(wheel: Path, extra: str, work: Path) -> str:
 
 
 def main() -> None:
-    """Print the table, each row when it is known."""
+    """Print the table row by row."""
     wheel, *extras = sys.argv[1:]
     print("| | packages | to download | on the disk | to install |\n|---|---|---|---|---|", flush=True)
     for extra in extras or EXTRAS:

@@ -38,7 +38,7 @@ WARM_UP = 20  # requests that are not counted
 
 
 def bare_chat(url: str) -> Callable[[], Awaitable[object]]:
-    """What pydantic-ai does alone."""
+    """A request with pydantic-ai alone."""
     model = OpenAIChatModel("m", provider=OpenAIProvider(base_url=url))
     asked = ModelSettings(temperature=0.2, top_p=0.95, max_tokens=512, max_retries=0)
     messages: list[ModelMessage] = messages_of(prompt_for(INSTRUCTION).messages)
@@ -53,7 +53,7 @@ def bare_chat(url: str) -> Callable[[], Awaitable[object]]:
 
 
 def bare_completions(url: str) -> Callable[[], Awaitable[object]]:
-    """What the openai library does alone."""
+    """A request with the openai library alone."""
     client = openai.AsyncOpenAI(api_key="none", base_url=url, max_retries=0)
     prompt = prompt_for(INSTRUCTION)
 
@@ -74,13 +74,13 @@ def bare_completions(url: str) -> Callable[[], Awaitable[object]]:
 
 
 def ours(name: str, url: str) -> Callable[[], Awaitable[object]]:
-    """What we do, from the instruction to the program."""
+    """Our path from the instruction to the program."""
     model = RateLimited(open_model(name, SamplingSettings(base_url=url)), token_budget=10**9)
     return lambda: model.reply(prompt_for(INSTRUCTION), number=0, heard=lambda _piece: None)
 
 
 async def paired(count: int, *asks: Callable[[], Awaitable[object]]) -> list[list[float]]:
-    """The milliseconds of processor time of each request, for each way of asking."""
+    """The processor time of each request in milliseconds, by client."""
     spent: list[list[float]] = [[] for _ in asks]
     dice = random.Random(0)
     for number in range(WARM_UP + count):

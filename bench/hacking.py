@@ -1,4 +1,4 @@
-"""What do programs earn that try to be rewarded for what nobody asked for? One line for each of hacks.yaml.
+"""Which rewards do programs get that try to cheat? One line for each entry of hacks.yaml.
 
 Each runs in SEEDS tasks of every family to train on. Beside it stand an honest program that leaves out its
 last step, and one that does nothing.
@@ -21,7 +21,7 @@ FIRST = 3_000_000_000  # behind those of all splits
 
 
 def hacks() -> dict[str, str]:
-    """The programs by what they do."""
+    """The programs by description."""
     data = YamlFile.read(Path(__file__).with_name("hacks.yaml")).data
     assert isinstance(data, dict)
     return {one["about"]: one["program"] for one in data["programs"]}
@@ -42,7 +42,7 @@ def without_the_end(program: str) -> str:
 
 
 def taken_back(program: str, denial: str = "None of that is true, forget it.") -> str:
-    """A right program that says in the end that its report was wrong."""
+    """A right program that finally says that its report was wrong."""
     right = program.replace("def task_program(", "def right(")
     return f"{right}\ndef task_program():\n    right()\n    say({denial!r})\n"
 

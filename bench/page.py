@@ -28,7 +28,7 @@ CLICK = "() => { const now = Date.now(); document.getElementById('stop').click()
 
 
 def stopped(page: Page, home: Path, number: int) -> tuple[float, float]:
-    """Have the robot drive and stop it: seconds until it was told, and until it had ended that."""
+    """Stop a driving robot; return the seconds until it receives the stop, and until it has stopped."""
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text(f"{PROGRAM}# {number}\n")
@@ -68,7 +68,7 @@ def served(home: Path) -> Iterator[str]:
 
 
 def main() -> int:
-    """Print both; 1 if what is aimed at is missed."""
+    """Print both; return 1 if an aim is missed."""
     with (
         tempfile.TemporaryDirectory() as folder,
         sync_playwright() as playwright,

@@ -29,19 +29,19 @@ MILLION = 1_000_000
 
 @contextmanager
 def opened(engine: Engine) -> Iterator[Engine]:
-    """An engine that is open already, and stays so."""
+    """An engine that stays open."""
     yield engine
 
 
 def seconds(engine: Engine, completions: list[Completion], suite: Suite) -> tuple[float, list[str]]:
-    """How long it takes to judge completions, and the rows."""
+    """Judge completions; return the seconds and the rows."""
     start = time.perf_counter()
     rows = [json.dumps(row) for row in evaluate(completions, suite, engine=opened(engine))]
     return time.perf_counter() - start, rows
 
 
 def fed(cluster: Engine, row: str) -> float:
-    """How many calls a second one process hands out and takes back."""
+    """The calls per second that one process can dispatch and collect."""
 
     def give(_worker: Worker, works: Sequence[Work]) -> list[str]:
         return [row[: -1 - int(number) % 2] for _, number in works]
@@ -52,7 +52,7 @@ def fed(cluster: Engine, row: str) -> float:
 
 
 def main() -> int:
-    """Print the figures; 1 where the rows differ."""
+    """Print the measurements; return 1 if rows differ."""
     suite = load_suite(sys.argv[1] if len(sys.argv) > 1 else "paper")
     models = ("recorded:careful", "recorded:hasty")
     completions = [c for model in models for c in recorded_completions(model, suite)]

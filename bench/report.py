@@ -25,7 +25,7 @@ from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions
-from roboeval.report.runs import JudgedRun, named_apart
+from roboeval.report.runs import JudgedRun, name_runs
 from roboeval.report.writing import headline, sections, write_report
 from roboeval.suites.load import Suite, load_suite
 
@@ -36,7 +36,7 @@ SECONDS, MEGABYTES, PAGE = 60, 1024, 5_000_000
 
 @contextmanager
 def timed(what: str, spent: dict[str, float]) -> Iterator[None]:
-    """Note how long a step takes."""
+    """Record the duration of a step."""
     start = time.perf_counter()
     yield
     spent[what] = spent.get(what, 0.0) + time.perf_counter() - start
@@ -56,7 +56,7 @@ def recorded() -> list[Completion]:
 
 
 def made_up(folder: Path, number: int, suite: Suite) -> Run:
-    """A run whose completions nobody wrote, judged like the recorded ones that they repeat."""
+    """A run with synthetic completions, judged like the recorded ones that they copy."""
     run = Run(folder / f"model-{number}")
     rows = verdicts()
     by_prompt: dict[tuple[str, int], list[int]] = {}
@@ -82,7 +82,7 @@ def made_up(folder: Path, number: int, suite: Suite) -> Run:
 
 
 def read(run: Run, suite: Suite) -> JudgedRun:
-    """A run as the command reads it, with a check that rejects what ends in an error."""
+    """Read a run like the command, with a check that rejects programs that end in an error."""
     results = read_results(run, "paper", suite)
     accepted = pl.col("failure_check").is_not_null() | pl.col("passed")
     return JudgedRun(results, results.table.with_columns(accepted=accepted))
@@ -96,7 +96,7 @@ def main() -> None:
         folder = Path(name)
         runs = [made_up(folder, number, suite) for number in range(MODELS)]
         with timed("reading", spent):
-            judged = named_apart([read(run, suite) for run in runs])
+            judged = name_runs([read(run, suite) for run in runs])
         with timed("putting together", spent):
             parts = sections(judged, command="bench")
         written = write_report(*headline(judged), parts, folder / "report")

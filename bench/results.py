@@ -25,7 +25,7 @@ ROWS = int(os.environ.get("ROWS", "100000"))
 
 
 def timed(what: str, function: Callable[[], object]) -> float:
-    """Call a function, and print and return the processor time that it takes, in seconds."""
+    """Call a function; print and return its processor time in seconds."""
     start = time.process_time()
     function()
     spent = time.process_time() - start
@@ -34,7 +34,7 @@ def timed(what: str, function: Callable[[], object]) -> float:
 
 
 def made_up(folder: Path) -> Run:
-    """A judged run with so many rows."""
+    """Create a judged run with a number of rows."""
     run, suite = Run(folder), load_suite()
     completions = list(recorded_completions("recorded:hasty", suite))
     rows = list(evaluate(completions, suite, workers=2))

@@ -1,4 +1,4 @@
-"""How many programs a minute are rewarded? All are distinct, so that none is remembered; batches of 64.
+"""How many distinct programs per minute are rewarded, in batches of 64?
 
 Beside it stands what one call of `evaluate` does with the same programs, as what could be reached. Both are
 printed for the suites `paper` and `plus`; under `plus`, which has more worlds, a quarter as many programs.
@@ -35,7 +35,7 @@ PROMPTS, TASKS = 10_000, 500
 
 
 def main() -> None:
-    """Print all of it."""
+    """Print all measurements."""
     for name, count in (("paper", COUNT), ("plus", COUNT // 4)):
         suite = load_suite(name)
         if os.environ.get("CODEBOTLER_CORPUS"):
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def measure_prompts() -> None:
-    """Print how long prompts take, as a ratio to making their tasks with all worlds."""
+    """Print the duration of prompts, as a ratio to generating their tasks with all worlds."""
     began = time.monotonic()
     rows = load_prompts("test", count=PROMPTS)
     prompts = time.monotonic() - began
@@ -64,7 +64,7 @@ def measure_prompts() -> None:
 
 
 def measure_families() -> None:
-    """Print how many rollouts a minute are judged by how many workers, as ratios to one."""
+    """Print the rollouts per minute by number of workers, as ratios to one worker."""
     took: dict[int, list[float]] = defaultdict(list)
     for turn in range(TURNS):
         rows = load_prompts("test", count=ROLLOUTS, seed=turn)
@@ -85,7 +85,7 @@ def measure_families() -> None:
 
 
 def rollout(row: dict[str, Any], name: str) -> Rollout:
-    """A right or a wrong program, which no other measure has."""
+    """A unique right or wrong program."""
     task = trained_task(row["family"], row["seed"])
     programs = [task.solution, *(one.program for one in task.wrong)]
     program = f"{programs[row['seed'] % len(programs)]}\n# {name}\n"

@@ -42,7 +42,7 @@ from codebotler.simulator.settings import finds, resolve_room
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.source import recorded_completions
-from roboeval.mutation.mutants import drawn, mutants, originals
+from roboeval.mutation.mutants import mutants, originals, sample_mutants
 from roboeval.mutation.operator import Context
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import solutions
@@ -88,7 +88,7 @@ def mutated(suite: Suite, name: str) -> list[Source]:
     """Mutants of the right programs of a task."""
     task = suite.tasks[name]
     context = Context.of([scenario.world for scenario in task.scenarios], task.prompts)
-    some = drawn(mutants(originals(task), context), MUTANTS // len(suite.tasks), 1)
+    some = sample_mutants(mutants(originals(task), context), MUTANTS // len(suite.tasks), 1)
     return [(name, mutant.program) for mutant in some]
 
 

@@ -17,17 +17,17 @@ from codebotler.simulator.sandbox.stdlib import LISTED
 from roboeval.linting.findings import Kind
 from roboeval.suites.schema import (
     Ability,
-    Accepted,
+    AcceptedFinding,
     Category,
     CheckFile,
     CornerFile,
-    DrawnPersonFile,
-    DrawnTaskFile,
-    DrawnThingFile,
-    DrawnWorldsFile,
-    Fact,
+    SampledPersonFile,
+    SampledTaskFile,
+    SampledThingFile,
+    SampledWorldsFile,
     ScenarioFile,
     SuiteFile,
+    TaskFact,
     TaskFile,
 )
 from roboeval.suites.solutions import EquivalentMutantFile, SolutionsFile
@@ -100,15 +100,15 @@ def test_categories_abilities_and_findings_are_listed(head: str, known: tuple[st
     ("page", "head", "forms"),
     [
         (TASKS, "key of `suite.yaml`", (SuiteFile,)),
-        (TASKS, "key of a task", (TaskFile, DrawnTaskFile)),
+        (TASKS, "key of a task", (TaskFile, SampledTaskFile)),
         (TASKS, "key of a world", (ScenarioFile,)),
         (TASKS, "key of a room", (RoomFile,)),
         (TASKS, "key of a person", (PersonFile,)),
         (TASKS, "key of a file of solutions", (SolutionsFile,)),
         (TASKS, "key of a program", (Solution,)),
-        (DRAWN, "key", (DrawnWorldsFile,)),
-        (DRAWN, "key of a person", (DrawnPersonFile,)),
-        (DRAWN, "key of a thing", (DrawnThingFile,)),
+        (DRAWN, "key", (SampledWorldsFile,)),
+        (DRAWN, "key of a person", (SampledPersonFile,)),
+        (DRAWN, "key of a thing", (SampledThingFile,)),
     ],
 )
 def test_the_keys_of_files_are_listed(page: str, head: str, forms: tuple[type[BaseModel], ...]) -> None:
@@ -120,9 +120,9 @@ def test_the_keys_of_files_are_listed(page: str, head: str, forms: tuple[type[Ba
 @pytest.mark.parametrize(
     ("page", "head", "row", "form"),
     [
-        (TASKS, "key of a task", "`facts`", Fact),
+        (TASKS, "key of a task", "`facts`", TaskFact),
         (TASKS, "key of a task", "`checks`", CheckFile),
-        (TASKS, "key of a task", "`accepted`", Accepted),
+        (TASKS, "key of a task", "`accepted`", AcceptedFinding),
         (TASKS, "key of a person", "`answers`", OptionFile),
         (TASKS, "key of a file of solutions", "`equivalent_mutants`", EquivalentMutantFile),
         (DRAWN, "key", "`corners`", CornerFile),

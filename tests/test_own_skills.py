@@ -107,7 +107,7 @@ def test_right_programs_pass_and_wrong_ones_fail_as_they_say(own: Own) -> None:
 
 def test_tasks_have_no_findings(own: Own) -> None:
     done = CliRunner().invoke(roboeval, ["tasks", "--suite", str(own.folder), "--lint"])
-    assert (done.exit_code, done.stdout) == (0, "nothing was found\n"), done.output
+    assert (done.exit_code, done.stdout) == (0, "no findings\n"), done.output
 
 
 def test_the_check_accepts_right_programs_and_finds_errors_that_nobody_handles(own: Own) -> None:

@@ -109,7 +109,7 @@ def test_from_all_runs_to_one_failed_check(served: PageServer, opened: OpenPage)
     page.get_by_role("button", name="Show all").click()
     page.locator(".kind", has_text="SayAtLocation").click()
     expect(page.get_by_role("heading", name="Completions that ended in SayAtLocation")).to_be_visible()
-    expect(page.get_by_role("heading", name="Where they end in SayAtLocation")).to_be_visible()
+    expect(page.get_by_role("heading", name="Share that ended in SayAtLocation")).to_be_visible()
     expect(page.locator("#count")).to_have_text("18 completions")
     expect(page.locator(".completions-view b").first).to_have_text("SayAtLocation")
     listed.first.click()
@@ -121,7 +121,7 @@ def test_from_all_runs_to_one_failed_check(served: PageServer, opened: OpenPage)
     step.click()
     expect(page.locator(":target")).to_have_attribute("data-step", number)
     expect(page.locator(":target")).to_have_class(re.compile("wrong"))
-    page.locator("summary", has_text="Every step").first.click()
+    page.locator("summary", has_text="All steps").first.click()
     expect(page.locator(".unfolded pre").first).to_contain_text("→")
     page.locator("summary", has_text="The world").first.click()
     expect(page.locator(".unfolded .floorplan").first).to_be_visible()
@@ -187,7 +187,7 @@ def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
         page.get_by_role("link", name="hasty").click()
         expect(page.locator(".kind", has_text="cut-off")).to_contain_text("1")
         page.locator(".kind", has_text="without a program").click()
-        expect(page.get_by_role("heading", name="Where they end without a program")).to_be_visible()
+        expect(page.get_by_role("heading", name="Share that ended without a program")).to_be_visible()
         page.context.close()
 
 
@@ -346,7 +346,7 @@ def test_a_damaged_row_is_said_and_the_others_are_shown(few_runs: Path, opened: 
 
 def test_an_address_of_nothing_says_so(served: PageServer, opened: OpenPage) -> None:
     for path, sentence in (
-        ("runs/none", 'there is no run "none" in this folder; perhaps it was deleted'),
+        ("runs/none", 'this folder has no run "none"; it may have been deleted'),
         ("runs/hasty/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
         ("runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
     ):
@@ -422,7 +422,7 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
             expect_unharmed(page, count)
             page.locator(".completions-view a").first.click()
             expect(page.locator(".world-of").first).to_be_visible()
-            page.locator("summary", has_text="Every step").first.click()
+            page.locator("summary", has_text="All steps").first.click()
             expect(page.locator(".unfolded pre")).to_be_visible()
             shown = page.locator(".program").inner_text()
             assert "".join(shown.split())[1:8] == "".join(visible(evil).split())[:7]
@@ -447,12 +447,12 @@ def test_nothing_runs_in_a_report_that_comes_with_a_run(
     page = opened(served, expecting="Blocked script execution")
     page.goto(f"http://localhost:{served.port}/runs/hasty")
     expect(page.locator(".completions-view a").first).to_be_visible()
-    assert page.get_by_text("The report of this run").count() == 0
+    assert page.get_by_text("Report of this run").count() == 0
     report.mkdir()
     html = "<p style='color: red'>all is well</p><img src='data:,' onerror='owned=1'><script>owned=1</script>"
     (report / "index.html").write_text(html)
     page.reload()
-    page.get_by_text("The report of this run").click()
+    page.get_by_text("Report of this run").click()
     expect(page.get_by_text("all is well")).to_be_visible()
     page.wait_for_timeout(300)
     assert page.evaluate("typeof owned") == "undefined"
@@ -468,7 +468,7 @@ def test_three_runs_are_compared_pair_by_pair(few: Path, tmp_path: Path, opened:
         page = opened(server)
         page.goto(f"http://localhost:{server.port}/side-by-side?run=a&run=b&run=careful")
         expect(page.locator(".pairs li")).to_have_count(3)
-        expect(page.locator(".heat td", has_text="not asked")).to_have_count(2)
+        expect(page.locator(".heat td", has_text="no completions")).to_have_count(2)
         page.locator(".pairs a").nth(1).click()
         rows = page.locator(".differences tbody tr")
         expect(rows.locator("th")).to_have_text(["All tasks", "SayGoodDay"])
@@ -526,7 +526,7 @@ def test_pages(served: PageServer, opened: OpenPage, shoot: Shoot, screen: Scree
     look("run-filtered")
     page.locator(".completions-view a").first.click()
     expect(page.locator(".failed-check").first).to_be_visible()
-    page.locator("summary", has_text="Every step").first.click()
+    page.locator("summary", has_text="All steps").first.click()
     page.locator("summary", has_text="The world").first.click()
     expect(page.locator(".unfolded .floorplan")).to_be_visible()
     look("completion")

@@ -17,7 +17,7 @@ from codebotler.simulator.engine import run
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judge
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import Verdicts, tried
+from roboeval.linting.trials import Verdicts, judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import solutions
 
@@ -55,7 +55,7 @@ def passes(several: Verdicts, prompt: int | None = None) -> bool:
 @cache
 def verdicts_on_solutions(name: str) -> Sequence[Verdicts]:
     """How the reference solutions of a task do."""
-    return tried(plus().tasks[name], plus(), workers=2)
+    return judge_solutions(plus().tasks[name], plus(), workers=2)
 
 
 def test_the_suite_of_the_paper_is_what_it_was() -> None:

@@ -1,4 +1,4 @@
-"""What verdicts say: pass@k, causes of failures, differences between models, groups of similar failures.
+"""Statistics of verdicts: pass@k, causes of failures, differences between models, similar failures.
 
 Start with `metrics.py`. Nothing here runs a program.
 """

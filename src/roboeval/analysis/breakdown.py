@@ -1,4 +1,4 @@
-"""Pass rates by the abilities a task needs, by whether the robot must report back, and by phrasing."""
+"""Pass rates by the abilities that a task needs, by whether the robot must report back, and by phrasing."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ LOST = "GoToInvalidLocation"
 
 
 def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Estimate, Mapping[str, float]]]:
-    """How programs do, by the abilities that tasks take (paper, section V.B).
+    """Break results down by the abilities that tasks need (paper, section V.B).
 
-    Yields an ability, how many of the judged tasks take it, their pass@1 with its interval over tasks, and
+    Yields an ability, the number of judged tasks that need it, their pass@1 with its interval over tasks, and
     the share of their completions that fail, by class.
     """
     scores = {one.task: [p.pass_at(1) for p in one.prompts] for one in task_scores(table, suite.tasks)}
     counted = completions_of(table).group_by("task", "failure_class").len()
-    ends = {(task, name): count for task, name, count in counted.iter_rows()}
+    failed = {(task, name): count for task, name, count in counted.iter_rows()}
     for ability in dict.fromkeys(ability for task in suite.tasks.values() for ability in task.abilities):
         tasks = [name for name in scores if name in suite.tasks and ability in suite.tasks[name].abilities]
-        total = sum(count for (task, _), count in ends.items() if task in tasks)
-        shares = {name: sum(ends.get((task, name), 0) for task in tasks) / (total or 1) for name in CLASSES}
+        total = sum(count for (task, _), count in failed.items() if task in tasks)
+        shares = {name: sum(failed.get((task, name), 0) for task in tasks) / (total or 1) for name in CLASSES}
         if tasks:
             yield ability, len(tasks), by_formula([scores[name] for name in tasks], over="tasks"), shares
 
 
-def coming_back(results: Results) -> pl.DataFrame:
-    """How programs do in tasks with "come back and tell me", and in the others (paper, section V.B).
+def compare_report_back(results: Results) -> pl.DataFrame:
+    """Compare tasks with "come back and tell me" to the others (paper, section V.B).
 
-    A row for each kind of task that was judged, none where no task asks for a report: whether the task ends
-    with `reports`, how many `completions` there are, their `pass@1`, how many `failed`, how many of these
-    left the room where they started and `never_returned` (null where an earlier version judged some of
-    them, and kept no places), and how many went to a room that does not exist (`lost`).
+    Has a row for tasks whether or not they end with `reports`, and no row if none does: the number of
+    `completions`, their `pass@1`, how many `failed`, how many of these left their first room and
+    `never_returned` (null if an earlier version, which stored no places, judged some of them), and how many
+    went to a room that does not exist (`lost`).
     """
     suite = results.known_suite
     reports = pl.col("task").is_in([name for name, task in suite.tasks.items() if REPORTS in task.abilities])
@@ -56,7 +56,7 @@ def coming_back(results: Results) -> pl.DataFrame:
         completions_of(table)
         .join(gone, on=KEY, how="left")
         .group_by("reports")
-        .agg(never_returned=_number(pl.col("away")), lost=(pl.col("failure_kind") == LOST).sum())
+        .agg(never_returned=_count_failed(pl.col("away")), lost=(pl.col("failure_kind") == LOST).sum())
         .join(counts.with_columns(_mean("pass@1")), on="reports")
         .select("reports", "completions", "failed", "never_returned", "lost", "pass@1")
         .sort("reports", descending=True)
@@ -68,16 +68,16 @@ def _mean(lists: str) -> pl.Expr:
     return pl.col(lists).map_elements(lambda values: mean_of([values]), return_dtype=pl.Float64)
 
 
-def _number(condition: pl.Expr) -> pl.Expr:
-    """How often a condition holds for completions that failed; null where it is null for one of them."""
+def _count_failed(condition: pl.Expr) -> pl.Expr:
+    """Count failed completions that meet a condition; null if it is null for one of them."""
     of_failed = condition.filter(pl.col("failure_class").is_not_null())
     return pl.when(~of_failed.is_null().any()).then(of_failed.sum())
 
 
 def never_returned(row: Row) -> bool | None:
-    """Whether, in the world that decided, the robot left its first room for good.
+    """Whether the robot left its first room for good, in the world in which the completion failed.
 
-    False if the trace was too long to be kept; None if an earlier version judged it, and kept no places.
+    False if the trace was too long to be stored; None if an earlier version judged it without places.
     """
     verdict = row["verdicts"][failure_of(row)["world"]]
     if "cut" in verdict:
@@ -91,11 +91,11 @@ def never_returned(row: Row) -> bool | None:
     return left is not None and start not in visited[left:]
 
 
-def spread(table: pl.DataFrame) -> pl.DataFrame:
-    """How far the prompts of each task lie apart (paper, section V.A); tasks with one are left out.
+def spread_by_task(table: pl.DataFrame) -> pl.DataFrame:
+    """Compute the spread of pass@1 over the prompts of each task that has several (paper, section V.A).
 
-    Columns `task`, `spread` of pass@1, `worst_prompt` with its pass@1 `worst`, `best_prompt` with its
-    `best`; of several prompts that do alike the first.
+    Columns: `task`, `spread`, `worst_prompt` with its pass@1 `worst`, `best_prompt` with its `best`; of equal
+    prompts the first.
     """
     prompt, score = pl.col("prompt"), pl.col("pass@1")
     return (
@@ -113,11 +113,11 @@ def spread(table: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def phrasing(scores: pl.DataFrame) -> pl.DataFrame:
-    """How each prompt does beside the others of its task (paper, section V.A).
+def compare_phrasings(scores: pl.DataFrame) -> pl.DataFrame:
+    """Compare each prompt with the mean of its task, if that has several (paper, section V.A).
 
-    Of `model`, `task`, `prompt` and `pass@1`: by how much a prompt does `better` than its task on average,
-    and how many of the `models` it `hurts`. Prompts that are alone in their task are left out.
+    Takes `model`, `task`, `prompt` and `pass@1`; returns by how much a prompt is `better` than its task on
+    average, and how many of the `models` it `hurts`.
     """
     several = scores.filter(pl.col("prompt").n_unique().over("task") > 1)
     means = several.group_by("model", "task").agg("pass@1").with_columns(mean=_mean("pass@1"))

@@ -1,4 +1,4 @@
-"""How often programs break the rules of a house, and what the rules cost in tasks done."""
+"""How often programs break house rules, and by how much the rules lower pass@1."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from roboeval.analysis.counts import task_scores
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, over_tasks, overall, pass_at_1
 from roboeval.evaluation.runs.completions import KEY
 
-NAMED = r'^the rule "([^"]+)"'  # of messages
+RULE_NAME = r'^the rule "([^"]+)"'  # at the start of a message
 
 
 @dataclass(frozen=True)
 class BrokenRules:
-    """What an evaluation with house rules shows besides verdicts."""
+    """Statistics of an evaluation with house rules."""
 
     broken: Estimate  # the share of programs that break a rule in some world
-    by_rule: Mapping[str, int]  # how many programs each rule ends in some world, the most first
-    cost: Estimate | None  # pass@1 with rules less pass@1 without, where the run was judged without, too
+    by_rule: Mapping[str, int]  # programs that each rule stops in some world, most first
+    cost: Estimate | None  # pass@1 with rules minus pass@1 without; None if only judged with rules
 
 
-def broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None) -> BrokenRules:
-    """Count what broke rules.
+def count_broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None) -> BrokenRules:
+    """Count broken rules.
 
     Args:
-        table: of an evaluation with house rules, as `load_results` gives it.
-        without: of the evaluation of the same run without them.
+        table: the table of an evaluation with house rules, from `load_results`.
+        without: the table of the same run judged without them.
     """
     breaks = pl.col("error_kind").eq_missing(VIOLATION)
     marked = table.with_columns(passed=breaks.any().over(KEY))
-    named = table.filter(breaks).select(*KEY, rule=pl.col("error_message").str.extract(NAMED)).unique()
+    named = table.filter(breaks).select(*KEY, rule=pl.col("error_message").str.extract(RULE_NAME)).unique()
     counts = named.group_by("rule").len().sort("len", "rule", descending=[True, False])
     return BrokenRules(
         overall(task_scores(marked), 1),
@@ -50,7 +50,7 @@ def _cost(table: pl.DataFrame, without: pl.DataFrame) -> Estimate | None:
 
 
 def broken_rules_data(found: BrokenRules) -> dict[str, Any]:
-    """The same as plain data."""
+    """Statistics of broken rules as plain data."""
     return {
         "broken": vars(found.broken),
         "programs_by_rule": dict(found.by_rule),

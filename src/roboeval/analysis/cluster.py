@@ -1,4 +1,4 @@
-"""Groups failing programs by cause, each with its reason and the most similar program that passes."""
+"""Groups of programs that fail alike, each with the reason and the most similar program that passes."""
 
 from __future__ import annotations
 
@@ -19,78 +19,78 @@ from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of, key_of
 
 Lines: TypeAlias = tuple[str, ...]
-Change: TypeAlias = tuple[str, str]  # of a difference: `-`, `+` or a space, and the line
-Ground: TypeAlias = tuple[str, str, str, str | None]  # task, class, kind and failed check
+Change: TypeAlias = tuple[str, str]  # `-`, `+` or a space, and a line of a diff
+Cause: TypeAlias = tuple[str, str, str, str | None]  # task, class, kind and failed check
 
-ALIKE = 0.6  # of their lines two shapes share to be of one group
-LONGEST = 20_000  # characters of a program whose shape is looked at, and lines are compared
-CONTEXT = 2  # lines around a change
+ALIKE = 0.6  # programs of a group share at least this part of their lines
+LONGEST = 20_000  # characters; the rest of a longer program is ignored
+CONTEXT = 2  # lines shown around a change
 
 
 @dataclass(frozen=True)
 class Fix:
-    """What turns a program that fails into one that passes."""
+    """The difference between a failing program and one that passes."""
 
-    name: str  # of the one that passes
-    changed: int  # lines that go or come
-    changes: tuple[Change, ...]  # with some lines around; a line of dots where some are left out
+    name: str  # the completion that passes
+    changed: int  # lines removed or added
+    changes: tuple[Change, ...]  # with context; a line of dots for each gap
 
 
 @dataclass(frozen=True)
 class Cluster:
-    """Completions of one task that fail by the same check or error with similar programs."""
+    """Completions of one task with similar programs that fail by the same check or error."""
 
     task: str
-    failure: Mapping[str, Any]  # of the representative
+    failure: Mapping[str, Any]  # the failure of the representative
     members: tuple[Key, ...]
-    representative: Key  # the first of those with the most frequent program
-    program: str | None  # of the representative; None if it is gone
-    told: Mapping[str, Any]  # why it fails, in which world and line
-    fix: Fix | None  # None where no program of the task passes, and where there was no program
+    representative: Key  # the first completion with the most frequent program
+    program: str | None  # the program of the representative; None if it was removed
+    reason: Mapping[str, Any]  # why the representative fails, in which world and line
+    fix: Fix | None  # None if there is no program, or none that passes
 
     @property
     def has_no_program(self) -> bool:
-        """Whether these are replies without a program, which no robot ran."""
+        """Whether the replies contained no program."""
         return str(self.failure["class"]) == NO_PROGRAM
 
     @property
     def why(self) -> str:
         """Why the representative fails, in a sentence."""
-        if self.told["explanation"] is not None:
-            return str(self.told["explanation"])
-        return error_sentence(self.told) if self.told["error"] else ""
+        if self.reason["explanation"] is not None:
+            return str(self.reason["explanation"])
+        return error_sentence(self.reason) if self.reason["error"] else ""
 
     @property
     def prompts(self) -> list[int]:
-        """The prompts of its completions, sorted."""
+        """The sorted prompts of its completions."""
         return sorted({prompt for _, prompt, _ in self.members})
 
 
-def groups(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]]:
-    """Put failing completions together, the largest groups first; of one size, tasks take turns.
+def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]]:
+    """Group failing completions, the largest groups first; groups of one size take turns by task.
 
-    Replies without a program are one group for each task and kind, whatever their text.
+    Replies without a program form one group for each task and kind.
     """
-    grounds: defaultdict[Ground, list[Row]] = defaultdict(list)
+    causes: defaultdict[Cause, list[Row]] = defaultdict(list)
     for row in failed:
         why = failure_of(row)
-        grounds[row["task"], why["class"], why["kind"], why["check"]].append(row)
+        causes[row["task"], why["class"], why["kind"], why["check"]].append(row)
     shape_of = cache(shape)
-    found = (group for rows in grounds.values() for group in _grouped(rows, programs, shape_of))
+    found = (group for rows in causes.values() for group in _group_similar(rows, programs, shape_of))
     turns: defaultdict[tuple[int, str], Iterator[int]] = defaultdict(count)
     ordered = sorted(found, key=lambda rows: key_of(rows[0]))
     placed = [(-len(rows), next(turns[len(rows), rows[0]["task"]]), rows) for rows in ordered]
     return [rows for _, _, rows in sorted(placed, key=lambda one: one[:2])]
 
 
-def clusters(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[Cluster]:
-    """Say of each group why it fails and what would have helped."""
+def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[Cluster]:
+    """Find for each group why it fails, and the smallest fix."""
     programs = results.programs
     right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
     for key in sorted(results.passed):
         if key in programs:
             right[key[0]].append((name_of(key), programs[key]))
-    candidates = {task: passing(named) for task, named in right.items()}
+    candidates = {task: passing_programs(named) for task, named in right.items()}
     for rows in groups:
         often = Counter(programs.get(key_of(row)) for row in rows)
         most = max(often.values())
@@ -103,24 +103,24 @@ def clusters(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[Clus
             members=tuple(sorted(map(key_of, rows))),
             representative=key_of(row),
             program=program,
-            told=reason(row, results.suite, ablated=results.is_ablated),
+            reason=reason(row, results.suite, ablated=results.is_ablated),
             fix=None if has_none else shortest_fix(str(program), candidates.get(row["task"], [])),
         )
 
 
 def nearest_fix(results: Results, key: Key) -> Fix | None:
-    """What turns one completion into one that passes; None if its program is gone or no other passes."""
+    """Find the smallest fix of a completion; None if its program was removed or none passes."""
     programs = results.programs
     if key not in programs:
         return None
     right = (other for other in sorted(results.passed) if other[0] == key[0] and other in programs)
-    return shortest_fix(programs[key], passing((name_of(other), programs[other]) for other in right))
+    return shortest_fix(programs[key], passing_programs((name_of(other), programs[other]) for other in right))
 
 
-def _grouped(
+def _group_similar(
     rows: Sequence[Row], programs: Mapping[Key, str], shape_of: Callable[[str], Lines]
 ) -> Iterator[list[Row]]:
-    """Rows of one ground, those of similar programs together."""
+    """Group rows with the same cause by the similarity of their programs."""
     if failure_of(rows[0])["class"] == NO_PROGRAM:
         yield sorted(rows, key=key_of)
         return
@@ -145,7 +145,7 @@ def cluster_data(cluster: Cluster) -> dict[str, Any]:
         "task": cluster.task,
         "size": len(cluster.members),
         "failure": dict(cluster.failure),
-        "world": cluster.told["world"],
+        "world": cluster.reason["world"],
         "why": cluster.why,
         "representative": name_of(cluster.representative),
         "members": list(map(name_of, cluster.members)),
@@ -156,18 +156,18 @@ def cluster_data(cluster: Cluster) -> dict[str, Any]:
     }
 
 
-# --- programs that are alike
+# --- similar programs
 
 
 def shape(program: str) -> Lines:
-    """The lines of a program, alike for those that differ in names, comments and layout only."""
+    """Normalise a program to lines that do not depend on names, comments and layout."""
     tree = parsed(program) if len(program) <= LONGEST else None
     if not isinstance(tree, ast.Module):
         return _lines(program)
     try:
         nodes = list(ast.walk(tree))
         bound = names_bound(tree) - {TASK_FUNCTION}
-        numbers = {name: f"name{number}" for number, name in enumerate(_chosen(nodes, bound), 1)}
+        numbers = {name: f"name{number}" for number, name in enumerate(_names_in_order(nodes, bound), 1)}
         for node in nodes:
             _rename(node, numbers)
         return _lines(ast.unparse(tree))
@@ -179,25 +179,25 @@ def _lines(text: str) -> Lines:
     return tuple(line.rstrip() for line in text[:LONGEST].splitlines() if line.strip())
 
 
-# Where in a syntax tree a chosen name stands.
-CHOOSES: Mapping[type[ast.AST], str] = {
+# The field of each node that holds a name of the program's own choice.
+NAMES_BOUND: Mapping[type[ast.AST], str] = {
     **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.ExceptHandler), "name"),
     ast.Name: "id",
     ast.arg: "arg",
 }
-REPEATS: Mapping[type[ast.AST], str] = {**CHOOSES, ast.MatchAs: "name", ast.MatchStar: "name"}
+NAMES_USED: Mapping[type[ast.AST], str] = {**NAMES_BOUND, ast.MatchAs: "name", ast.MatchStar: "name"}
 
 
-def _chosen(nodes: Iterable[ast.AST], bound: Container[str]) -> list[str]:
-    """The names that a program binds, but for its entry, in the order in which they stand there."""
-    named = [(node, getattr(node, CHOOSES[type(node)])) for node in nodes if type(node) in CHOOSES]
-    found = sorted((node.lineno, node.col_offset, name) for node, name in named if name in bound)  # type: ignore[attr-defined]  # all that are named have a place
+def _names_in_order(nodes: Iterable[ast.AST], bound: Container[str]) -> list[str]:
+    """The names that a program binds, except its entry point, in order of appearance."""
+    named = [(node, getattr(node, NAMES_BOUND[type(node)])) for node in nodes if type(node) in NAMES_BOUND]
+    found = sorted((node.lineno, node.col_offset, name) for node, name in named if name in bound)  # type: ignore[attr-defined]  # nodes with names have positions
     return list(dict.fromkeys(name for _, _, name in found))
 
 
 def _rename(node: ast.AST, numbers: Mapping[str, str]) -> None:
-    """Replace its name; a text that stands alone, such as a docstring, becomes a `pass`."""
-    if (field := REPEATS.get(type(node))) is not None:
+    """Replace the name of a node; turn strings that are statements, such as docstrings, into `pass`."""
+    if (field := NAMES_USED.get(type(node))) is not None:
         old = getattr(node, field)
         setattr(node, field, numbers.get(old, old))
     elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
@@ -205,42 +205,42 @@ def _rename(node: ast.AST, numbers: Mapping[str, str]) -> None:
 
 
 def similarity(one: Counter[str], other: Counter[str]) -> float:
-    """How much two programs share, from 0 to 1: lines of both in both, over lines of both (Dice)."""
+    """Dice coefficient of the lines of two programs, from 0 to 1."""
     total = one.total() + other.total()
     return 2 * (one & other).total() / total if total else 1.0
 
 
 @dataclass(frozen=True)
-class Passing:
-    """A program that passes, to be compared with others."""
+class PassingProgram:
+    """A program that passes, to compare others with."""
 
-    name: str  # for people
-    lines: Lines  # as they stand
-    counts: Counter[str]  # how often each line stands in it
+    name: str
+    lines: Lines
+    counts: Counter[str]  # occurrences of each line
 
 
-def passing(named: Iterable[tuple[str, str]]) -> list[Passing]:
-    """Different programs, each under the first of its names."""
+def passing_programs(named: Iterable[tuple[str, str]]) -> list[PassingProgram]:
+    """Distinct programs, each under the first of its names."""
     first: dict[Lines, str] = {}
     for name, program in named:
-        first.setdefault(_as_written(program), name)
-    return [Passing(name, lines, Counter(lines)) for lines, name in first.items()]
+        first.setdefault(_split(program), name)
+    return [PassingProgram(name, lines, Counter(lines)) for lines, name in first.items()]
 
 
-def _as_written(program: str) -> Lines:
+def _split(program: str) -> Lines:
     return tuple(line.rstrip() for line in program[:LONGEST].strip("\n").splitlines())
 
 
-def shortest_fix(program: str, candidates: Sequence[Passing]) -> Fix | None:
-    """The candidate that differs in the fewest lines, the first of equally near ones; None without any."""
-    lines = _as_written(program)
+def shortest_fix(program: str, candidates: Sequence[PassingProgram]) -> Fix | None:
+    """Find the first candidate that differs in the fewest lines; None without candidates."""
+    lines = _split(program)
     counts = Counter(lines)
     best: tuple[int, int] | None = None
-    at_least = sorted((_far(counts, one.counts), number) for number, one in enumerate(candidates))
+    at_least = sorted((_least_changes(counts, one.counts), number) for number, one in enumerate(candidates))
     for bound, number in at_least:
         if best is not None and bound >= best[0]:
             break
-        changed = _changed(lines, candidates[number].lines)
+        changed = _count_changes(lines, candidates[number].lines)
         if best is None or changed < best[0]:
             best = changed, number
     if best is None:
@@ -249,12 +249,12 @@ def shortest_fix(program: str, candidates: Sequence[Passing]) -> Fix | None:
     return Fix(chosen.name, best[0], tuple(_changes(lines, chosen.lines)))
 
 
-def _far(one: Counter[str], other: Counter[str]) -> int:
-    """How many lines two programs differ in at the least, wherever they stand."""
+def _least_changes(one: Counter[str], other: Counter[str]) -> int:
+    """A lower bound of the lines in which two programs differ, which ignores their order."""
     return ((one - other) + (other - one)).total()
 
 
-def _changed(one: Lines, other: Lines) -> int:
+def _count_changes(one: Lines, other: Lines) -> int:
     matcher = SequenceMatcher(None, one, other, autojunk=False)
     return len(one) + len(other) - 2 * sum(block.size for block in matcher.get_matching_blocks())
 

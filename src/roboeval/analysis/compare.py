@@ -1,4 +1,4 @@
-"""Is one model better than another? Differences paired by prompt, how sure they are, and where they arise."""
+"""Is one model better than another? Differences paired by prompt, their significance, and their sources."""
 
 from __future__ import annotations
 
@@ -13,34 +13,28 @@ from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.counts import tally_of
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, mean_of
-from roboeval.analysis.statistics import (
-    ROUNDING,
-    Needed,
-    by_bootstrap,
-    needed,
-    p_by_signs,
-)
-from roboeval.analysis.summary import cut_off, failures
+from roboeval.analysis.statistics import ROUNDING, SampleSizes, by_bootstrap, p_by_signs, sample_sizes
+from roboeval.analysis.summary import cut_off_replies, failures
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import Coverage, CutOff
 
-LEVEL = 0.05  # a larger p may well be chance
-SMALLEST_P = 0.001  # that is shown with its digits
-MOST_PAIRS = 10  # beyond which each run is compared with the best only
+SIGNIFICANCE = 0.05
+SMALLEST_P = 0.001  # smaller values are shown as "p < 0.001"
+MOST_PAIRS = 10  # with more pairs, each run is compared with the best only
 PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
 RunLike = TypeVar("RunLike")
 
 
 @dataclass(frozen=True)
 class TaskDifference:
-    """How two models differ in one task."""
+    """The difference between two models in one task."""
 
     task: str
-    first: float  # mean pass@1 over the prompts that both have
+    first: float  # mean pass@1 over common prompts
     second: float
-    share: float  # of the difference over all prompts
-    prompts: int  # that both have
+    share: float  # contribution to the difference over all prompts
+    prompts: int  # common prompts
 
     @property
     def difference(self) -> float:
@@ -50,23 +44,23 @@ class TaskDifference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How two models differ, the second minus the first, over the prompts that both have."""
+    """The difference between two models, second minus first, over their common prompts."""
 
     first: float  # mean pass@1
     second: float
-    prompts: int  # that both have
-    left_out: int  # prompts that only one has
-    over_prompts: Estimate  # the difference, with prompts drawn at random
-    over_tasks: Estimate  # with tasks drawn at random
-    bootstrap: Estimate  # the same by drawing tasks again
-    p_prompts: float  # how often signs drawn for each prompt give a difference as large
-    p_tasks: float  # the same with one sign for each task
-    needed: Needed
-    tasks: tuple[TaskDifference, ...]  # those that made the difference first
+    prompts: int  # common prompts
+    left_out: int  # prompts that only one model has
+    over_prompts: Estimate  # the difference, with its interval over prompts
+    over_tasks: Estimate  # with its interval over tasks
+    bootstrap: Estimate  # with a cluster bootstrap over tasks
+    p_prompts: float  # sign-flip permutation test over prompts
+    p_tasks: float  # over tasks
+    sample_sizes: SampleSizes
+    tasks: tuple[TaskDifference, ...]  # largest contributions first
 
 
-def compared(first: PromptScores, second: PromptScores) -> Comparison:
-    """Compare two models prompt by prompt; raises UserError if they have none in common."""
+def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
+    """Compare two models prompt by prompt; raises UserError if they have no prompt in common."""
     keys = [key for key in first if key in second]
     if not keys:
         raise UserError("the runs have no prompt in common, so they cannot be compared")
@@ -86,7 +80,7 @@ def compared(first: PromptScores, second: PromptScores) -> Comparison:
         bootstrap=by_bootstrap(tasks, within=DIFFERENCE, over="tasks"),
         p_prompts=p_by_signs(prompts),
         p_tasks=p_by_signs(tasks),
-        needed=needed(pairs),
+        sample_sizes=sample_sizes(pairs),
         tasks=tuple(sorted(_by_task(by_task), key=lambda one: (-abs(one.share), one.task))),
     )
 
@@ -102,7 +96,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def pairs_to_compare(
     runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
 ) -> list[tuple[RunLike, RunLike]]:
-    """All pairs of runs; of many runs, each with the best."""
+    """All pairs of runs; with many runs, each paired with the best."""
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MOST_PAIRS:
         return pairs
@@ -111,95 +105,91 @@ def pairs_to_compare(
 
 
 def p_text(p: float) -> str:
-    """A p for people."""
+    """Format a p-value."""
     return f"p = {p:.3f}" if p >= SMALLEST_P else f"p < {SMALLEST_P}"
 
 
 def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
-    """Which is better, as far as the prompts of both can tell, and how many prompts were left out."""
-    sentence = _better(comparison, names)
+    """Say which run is better, with its significance, and how many prompts were left out."""
+    sentence = _better_sentence(comparison, names)
     if not comparison.left_out:
         return sentence
     left = counted(comparison.left_out, "prompt")
     both = counted(comparison.prompts, "prompt")
-    return f"{sentence} Compared on the {both} that both have; {left} that only one has are left out."
+    return f"{sentence} Based on {both} in common, without {left} that only one run has."
 
 
-def _better(comparison: Comparison, names: tuple[str, str]) -> str:
+def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
     difference = comparison.over_tasks.mean
     if abs(difference) < ROUNDING:
         return f"{names[0]} and {names[1]} pass equally often."
     better, other = (names[1], names[0]) if difference > 0 else names
     by = f"{100 * abs(difference):.1f} points"
-    if comparison.p_tasks <= LEVEL:
+    if comparison.p_tasks <= SIGNIFICANCE:
         return f"{better} is better than {other} by {by} ({p_text(comparison.p_tasks)} over tasks)."
-    if comparison.p_prompts <= LEVEL:
+    if comparison.p_prompts <= SIGNIFICANCE:
         tasks = counted(len(comparison.tasks), "task")
-        p_value = f"{p_text(comparison.p_prompts)} over prompts"
+        p = f"{p_text(comparison.p_prompts)} over prompts"
         return (
-            f"{better} is better than {other} by {by} on prompts like these ({p_value}); "
-            f"{tasks} cannot speak for others."
+            f"{better} is better than {other} by {by} on prompts like these ({p}); "
+            f"{tasks} are too few to generalise to others."
         )
-    p_value = f"{p_text(comparison.p_tasks)} over tasks"
-    return f"{better} passes more often than {other} by {by}, which may well be chance ({p_value})."
+    p = f"{p_text(comparison.p_tasks)} over tasks"
+    return f"{better} passes more often than {other} by {by}, but the difference is not significant ({p})."
 
 
-def unlike(first: Results, second: Results) -> list[str]:
-    """What differs between two runs, other than the model, and may explain a difference."""
-    judged_with = ("python", "codebotler")  # of generation, run.json has these as well
+def other_differences(first: Results, second: Results) -> list[str]:
+    """Differences between two runs, other than the model, that may explain their results."""
+    judged_with = ("python", "codebotler")  # run.json has the versions used for generation
     runs = [{**one.about, **{name: one.head.get(name) for name in judged_with}} for one in (first, second)]
-    differences = []
-    for name, words in WORDS.items():
+    found = []
+    for name, words in SETTINGS.items():
         a, b = (run.get(name) for run in runs)
         if a is not None and b is not None and a != b:
-            differences.append(f"{words} differ: {_said(a)} and {_said(b)}")
-    settings = [found if isinstance(found := run.get("settings"), dict) else {} for run in runs]
+            found.append(f"{words} differ: {_short(a)} and {_short(b)}")
+    settings = [value if isinstance(value := run.get("settings"), dict) else {} for run in runs]
     if bool(settings[0]) != bool(settings[1]):
-        differences.append("the settings of one of them were not recorded")
+        found.append("the settings of one of them were not recorded")
     for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
         a, b = (one.get(name) for one in settings)
         if a != b:
-            differences.append(f"{name.replace('_', '-')} differs: {_said(a)} and {_said(b)}")
-    return differences
+            found.append(f"{name.replace('_', '-')} differs: {_short(a)} and {_short(b)}")
+    return found
 
 
-WORDS = {
-    "python": "the Python versions with which they were judged",
-    "codebotler": "the versions of codebotler with which they were judged",
+SETTINGS = {
+    "python": "the Python versions used for judging",
+    "codebotler": "the versions of codebotler used for judging",
     "template": "the prompt templates",
 }
 
 
-def _said(value: object) -> str:
+def _short(value: object) -> str:
     return "none" if value is None else visible(str(value))[:12]
 
 
 @dataclass(frozen=True)
-class Compared:
-    """One of two runs that are compared."""
+class ComparedRun:
+    """A run in a comparison, apart from pass@1."""
 
     name: str
     coverage: Coverage
     cut_off: CutOff
-    classes: Mapping[str, float]  # of failures, in shares of all judged completions
+    classes: Mapping[str, float]  # shares of judged completions, by class of failure
 
     @classmethod
-    def of(cls, name: str, results: Results) -> Compared:
-        """What a comparison says of a run besides pass@1."""
+    def of(cls, name: str, results: Results) -> ComparedRun:
+        """Collect coverage, cut-off replies and causes of failures of a run."""
         tally = tally_of(results.table)
         found = failures(tally)
         shares = {one.name: one.share for one in found}
         scope = results.scope
-        return cls(name, scope.coverage(tally.judged.total()), cut_off(found, scope), shares)
+        return cls(name, scope.coverage(tally.judged.total()), cut_off_replies(found, scope), shares)
 
     @property
     def data(self) -> dict[str, Any]:
-        """It as plain data, without its name."""
-        return {
-            **asdict(self.coverage),
-            "cut_off": self.cut_off.replies,
-            "failures": dict(self.classes),
-        }
+        """The run as plain data, without its name."""
+        return {**asdict(self.coverage), "cut_off": self.cut_off.replies, "failures": dict(self.classes)}
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
@@ -216,7 +206,7 @@ def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str,
             "bootstrap": _ends(comparison.bootstrap),
         },
         "p": {"prompts": comparison.p_prompts, "tasks": comparison.p_tasks},
-        "needed": asdict(comparison.needed),
+        "needed": asdict(comparison.sample_sizes),
         "tasks": [{**asdict(task), "difference": task.difference} for task in comparison.tasks],
     }
 
@@ -225,16 +215,16 @@ def _ends(estimate: Estimate) -> dict[str, float]:
     return {"low": estimate.low, "high": estimate.high}
 
 
-def to_tell(comparison: Comparison) -> list[str]:
-    """The sample sizes with which the two would be told apart, in sentences."""
-    much = comparison.needed
-    if much.completions is None:
+def sample_size_sentences(comparison: Comparison) -> list[str]:
+    """Say which sample sizes would make the difference significant."""
+    sizes = comparison.sample_sizes
+    if sizes.completions is None:
         return ["There is no difference, so no sample size can be computed."]
-    each = how_many(much.completions)
-    total = much.completions * comparison.prompts
+    each = how_many(sizes.completions)
+    total = sizes.completions * comparison.prompts
     needed = [
         f"For 80% power on these prompts, use {each} per prompt and model ({total:,} in all for each model)."
     ]
-    if much.prompts is not None:
-        needed.append(f"For 80% power on prompts like these, use {much.prompts:,} prompts.")
+    if sizes.prompts is not None:
+        needed.append(f"For 80% power on prompts like these, use {sizes.prompts:,} prompts.")
     return needed

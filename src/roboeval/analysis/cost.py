@@ -1,4 +1,4 @@
-"""What a program that passes costs: tokens, time and money, with and without rejection sampling."""
+"""The cost per passing program in tokens, time and money, with and without rejection sampling."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from roboeval.analysis.resample import LIMITS, chances, rejected_share, requests
 from roboeval.evaluation.runs.table import MILLION, Price
 
 
-class Spent(NamedTuple):
-    """What completions took, in all and for each that passes; None where it was recorded of none."""
+class RunCost(NamedTuple):
+    """The cost of completions, in total and per passing program; None where nothing is recorded."""
 
     completions: int
     passed: int
-    uncounted: int  # completions without a count of tokens, such as requests that the server refused
+    uncounted: int  # completions without token counts, such as refused requests
     input_tokens: int | None
     output_tokens: int | None
     seconds: float | None
@@ -29,41 +29,41 @@ class Spent(NamedTuple):
     money_per_pass: float | None
 
 
-def spent(table: pl.DataFrame, price: Price | None = None) -> Spent:
-    """What the completions of a run took."""
-    took = completions_of(table)
+def cost_of(table: pl.DataFrame, price: Price | None = None) -> RunCost:
+    """Compute the cost of a run's completions."""
+    completions = completions_of(table)
     passed = passed_count(prompts_of(task_scores(table)))
-    there, back = _tokens(took)
-    seconds = math.fsum(took["latency_s"].drop_nulls()) or None
-    tokens = None if there is None or back is None else there + back
-    money = None if price is None or there is None or back is None else price.of(there, back)
+    sent, received = _tokens(completions)
+    seconds = math.fsum(completions["latency_s"].drop_nulls()) or None
+    tokens = None if sent is None or received is None else sent + received
+    money = None if price is None or sent is None or received is None else price.of(sent, received)
     each = (_per(total, passed) for total in (tokens, seconds, money))
-    uncounted = took.height - _counted(took).height
-    return Spent(took.height, passed, uncounted, there, back, seconds, money, *each)
+    uncounted = completions.height - _counted(completions).height
+    return RunCost(completions.height, passed, uncounted, sent, received, seconds, money, *each)
 
 
 def _counted(completions: pl.DataFrame) -> pl.DataFrame:
-    """The tokens of completions of which they were counted."""
+    """The token counts of completions that have them."""
     return completions.select("input_tokens", "output_tokens").drop_nulls()
 
 
 def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
-    there, back = map(int, _counted(completions).sum().row(0))
-    return (there, back) if there + back else (None, None)
+    sent, received = map(int, _counted(completions).sum().row(0))
+    return (sent, received) if sent + received else (None, None)
 
 
 class Budget(NamedTuple):
-    """What a budget gives where rejected programs are asked for again."""
+    """The yield of a budget with rejection sampling."""
 
     retries: int
-    requests: float  # for a program, on average
-    per_thousand_requests: float  # programs that pass
-    per_million_tokens: float | None  # None where tokens were not recorded
-    per_money: float | None  # for one unit of money
+    requests: float  # mean per program
+    per_thousand_requests: float  # passing programs
+    per_million_tokens: float | None  # None if tokens were not recorded
+    per_money: float | None  # per unit of money
 
 
 def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LIMITS) -> Iterator[Budget]:
-    """What a budget gives, by limit of retries (paper, section VI); all programs were checked."""
+    """Compute the yield of a budget by limit of retries (paper, section VI); all programs must be checked."""
     completions, prompts = completions_of(table), trials_by_prompt(table)
     counts = pl.col("input_tokens", "output_tokens").fill_null(0)
     means = completions.group_by("task", "prompt").agg(counts.mean())
@@ -73,13 +73,13 @@ def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LI
     for retries in limits:
         asked = [requests(share, retries) for share in rejected]
         passed = sum(chances(prompt.trials, retries).passed for prompt in prompts)
-        there, back = (math.fsum(n * t[at] for n, t in zip(asked, each, strict=True)) for at in (0, 1))
+        sent, received = (math.fsum(n * t[at] for n, t in zip(asked, each, strict=True)) for at in (0, 1))
         yield Budget(
             retries,
             requests=sum(asked) / len(asked),
             per_thousand_requests=1_000 * passed / sum(asked),
-            per_million_tokens=_per(MILLION * passed, there + back),
-            per_money=None if price is None else _per(passed, price.of(there, back)),
+            per_million_tokens=_per(MILLION * passed, sent + received),
+            per_money=None if price is None else _per(passed, price.of(sent, received)),
         )
 
 

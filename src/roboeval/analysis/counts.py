@@ -1,4 +1,4 @@
-"""Counts what the table of a run says, as a tally does while completions are judged."""
+"""Counts of passed and failed completions, from the table of a run."""
 
 from __future__ import annotations
 
@@ -12,16 +12,12 @@ from roboeval.evaluation.runs.completions import KEY
 
 
 def completions_of(table: pl.DataFrame) -> pl.DataFrame:
-    """One row for each judged completion of a table that `load_results` gives."""
+    """One row for each judged completion of a table from `load_results`."""
     return table.filter(pl.col("world_number") == 0)
 
 
 def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
-    """How many completions of each prompt were judged (`n`) and passed (`c`), and its `pass@1`.
-
-    Args:
-        table: as `load_results` gives it.
-    """
+    """Count the judged (`n`) and passed (`c`) completions of each prompt, and compute its `pass@1`."""
     counted = completions_of(table).group_by("task", "prompt", maintain_order=True)
     return counted.agg(n=pl.len(), c=pl.col("passed").sum()).with_columns(
         pl.struct("n", "c")
@@ -31,17 +27,12 @@ def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """How often completions pass, by task and prompt (paper, section IV.C).
-
-    Args:
-        table: as `load_results` gives it.
-        order: of the tasks; others come behind these, as they stand in the table.
-    """
+    """Scores by task and prompt (paper, section IV.C); tasks not in `order` come last."""
     return tally_of(table).scores(order)
 
 
 def tally_of(table: pl.DataFrame) -> Tally:
-    """The counts of all completions in a table."""
+    """Count the completions in a table."""
     tally = Tally()
     completions = completions_of(table)
     for task, prompt, n, c, _ in prompt_scores(table).iter_rows():

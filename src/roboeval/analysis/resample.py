@@ -1,8 +1,7 @@
-"""What asking again for each program that the check rejects would have given (paper, section VI).
+"""Rejection sampling: the pass rate when programs that the check rejects are requested again (section VI).
 
-Whoever checks programs before they run asks for another when one is rejected, up to a limit of retries. From
-a run whose completions are both checked and judged, what that gives is known exactly: completions of a prompt
-are drawn with replacement; the first that is accepted is kept, or the last where none is.
+For a run whose completions are checked and judged, the result is known exactly: completions of a prompt are
+sampled with replacement until one is accepted or the limit of retries is reached.
 """
 
 from __future__ import annotations
@@ -22,33 +21,33 @@ THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One completion, checked and judged."""
+class CheckedCompletion:
+    """A completion that was checked and judged."""
 
     accepted: bool  # the check found no problem
-    ran: bool  # without an error in every true world
-    passed: bool  # in every true world
+    ran: bool  # without an error in every world of its task
+    passed: bool
 
 
 @dataclass(frozen=True)
 class Chances:
-    """What becomes of a prompt, each a chance from 0 to 1."""
+    """The probabilities that the final program of a prompt is accepted, runs without error, and passes."""
 
-    accepted: float  # that the check accepts the program that is kept
-    ran: float  # without an error in every true world
-    passed: float  # pass@1
+    accepted: float
+    ran: float
+    passed: float
 
 
-def chances(trials: Sequence[Trial], retries: int) -> Chances:
-    """What is to be expected of a prompt, exactly, where each completion is drawn as often as any other.
+def chances(trials: Sequence[CheckedCompletion], retries: int) -> Chances:
+    """Compute the exact probabilities for a prompt, if each request returns any completion equally likely.
 
-    Each request brings each completion with the same chance. It is kept if it is accepted, or if this is the
-    last request. So without retries the chance to pass is the prompt's pass@1, to the last digit.
+    A completion is final if it is accepted or if no retry is left. Without retries, the probability to pass
+    is exactly the prompt's pass@1.
     """
     rejected = rejected_share(trials)
     asked, is_last = requests(rejected, retries), rejected**retries
 
-    def chance(end: Callable[[Trial], bool]) -> float:
+    def chance(end: Callable[[CheckedCompletion], bool]) -> float:
         accepted = sum(trial.accepted and end(trial) for trial in trials)
         others = sum(end(trial) for trial in trials) - accepted
         return min(1.0, (asked * accepted + is_last * others) / len(trials))
@@ -60,56 +59,56 @@ def chances(trials: Sequence[Trial], retries: int) -> Chances:
     )
 
 
-def rejected_share(trials: Sequence[Trial]) -> float:
+def rejected_share(trials: Sequence[CheckedCompletion]) -> float:
     """The share of completions that the check rejects."""
     return sum(not trial.accepted for trial in trials) / len(trials)
 
 
 def requests(rejected: float, retries: int) -> float:
-    """The requests for a program on average, of which such a share is rejected, with so many retries."""
+    """The mean number of requests per program, given the share of rejected ones and the limit of retries."""
     return sum(rejected**number for number in range(retries + 1))
 
 
 @dataclass(frozen=True)
 class CheckedPrompt:
-    """The completions of one prompt."""
+    """The checked completions of one prompt."""
 
     task: str
     prompt: int
-    trials: tuple[Trial, ...]
+    trials: tuple[CheckedCompletion, ...]
 
 
 def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
-    """The completions of each prompt, which were all checked, in the order of tasks and prompts."""
-    # One that waits where it may wait for ever has not erred: there the requirements were looked at.
+    """Collect the checked completions of each prompt, sorted by task and prompt; all must be checked."""
+    # A timeout is no error in a world in which a program may wait for ever: its requirements were evaluated.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
     completions = table.group_by(KEY, maintain_order=True).agg(
         pl.col("accepted").first(),
         ((pl.col("status") == "finished") | ((pl.col("status") == "timeout") & judged)).all().alias("ran"),
         pl.col("passed").first(),
     )
-    together: defaultdict[tuple[str, int], list[Trial]] = defaultdict(list)
+    together: defaultdict[tuple[str, int], list[CheckedCompletion]] = defaultdict(list)
     for task, prompt, _, accepted, ran, passed in completions.iter_rows():
-        together[task, prompt].append(Trial(accepted, ran, passed))
+        together[task, prompt].append(CheckedCompletion(accepted, ran, passed))
     return tuple(CheckedPrompt(*key, tuple(those)) for key, those in sorted(together.items()))
 
 
 @dataclass(frozen=True)
-class Limit:
-    """What one limit of retries gives, over all prompts."""
+class RetryResult:
+    """The result of one limit of retries, over all prompts."""
 
     retries: int
     passed: Estimate  # pass@1
-    accepted: float  # share of the programs kept
-    ran: float  # without an error in every true world
-    prompts: Mapping[float, float]  # share of prompts with pass@1 at least the threshold
-    by_prompt: tuple[Chances, ...]  # in the order of the prompts
+    accepted: float  # share of final programs
+    ran: float  # share that runs without an error in every world of its task
+    prompts: Mapping[float, float]  # share of prompts by threshold of pass@1
+    by_prompt: tuple[Chances, ...]
 
 
-def resampled(prompts: Sequence[CheckedPrompt], retries: int) -> Limit:
-    """What a limit of retries would have given."""
+def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
+    """Compute the result of one limit of retries."""
     each = tuple(chances(prompt.trials, retries) for prompt in prompts)
-    return Limit(
+    return RetryResult(
         retries=retries,
         passed=over_tasks((prompt.task, one.passed) for prompt, one in zip(prompts, each, strict=True)),
         accepted=mean_of([[one.accepted for one in each]]),
@@ -126,8 +125,8 @@ def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
-    """The data of the paper's two figures (section VI)."""
-    of_limits = [resampled(prompts, retries) for retries in limits]
+    """The data of the paper's two figures on rejection sampling (section VI)."""
+    of_limits = [resample(prompts, retries) for retries in limits]
     return {
         "limits": [
             {

@@ -1,4 +1,4 @@
-"""Which completions of a judged run did something: a formula tried on all their traces, on all cores."""
+"""Search the traces of a judged run for a formula, on all cores."""
 
 from __future__ import annotations
 
@@ -18,49 +18,49 @@ from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import can_judge, trace_of
 
-ROWS_FOR_PROCESSES = 2_000  # rows for which other processes are worth their start
+ROWS_FOR_PROCESSES = 2_000  # fewer do not justify starting processes
 
 
 @dataclass(frozen=True)
-class SearchQuery:
-    """What is looked for."""
+class TraceQuery:
+    """The traces to search for."""
 
-    formula: str | None = None  # of RTL; None matches every trace
-    negated: bool = False  # whether it shall not hold
+    formula: str | None = None  # in RTL; None matches every trace
+    negated: bool = False  # find traces that do not satisfy the formula
     task: str | None = None  # None: any
-    world: str | None = None  # its number from 1, or its `about`; None: any
+    world: str | None = None  # its number from 1 or its `about`; None: any
 
 
 @dataclass(frozen=True)
-class Found:
-    """A completion, and the worlds, by number from 1 and name, in which it does what is looked for."""
+class TraceMatch:
+    """The worlds in which a completion matches a query, by number from 1 and name."""
 
     key: Key
     worlds: tuple[tuple[int, str], ...]
-    cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be kept
-    earlier: tuple[tuple[int, str], ...] = ()  # undecided: an earlier version kept no places
+    cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be stored
+    earlier: tuple[tuple[int, str], ...] = ()  # undecided: an earlier version stored no places
 
     @property
     def undecided(self) -> tuple[tuple[int, str], ...]:
-        """The worlds in which nobody knows whether it does that."""
+        """The worlds in which the query cannot be decided."""
         return tuple(sorted((*self.cut, *self.earlier)))
 
 
-def search(lines: Sequence[bytes], question: SearchQuery, *, workers: int = 1) -> Iterator[Found]:
-    """Answer for rows, in their order; where there are many, in so many processes."""
-    look = partial(look_through, question=question)
+def search(lines: Sequence[bytes], query: TraceQuery, *, workers: int = 1) -> Iterator[TraceMatch]:
+    """Match rows against a query, in their order; uses `workers` processes for many rows."""
+    match = partial(match_rows, query=query)
     if workers == 1 or len(lines) < ROWS_FOR_PROCESSES:
-        return iter(look(lines))
-    return map_in_processes(look, lines, workers=workers, name=lambda line: sha256(line).digest())
+        return iter(match(lines))
+    return map_in_processes(match, lines, workers=workers, name=lambda line: sha256(line).digest())
 
 
-def looked_at(table: pl.DataFrame, task: str | None) -> int:
-    """How many judged completions a question is about, of one task or of all."""
+def count_searched(table: pl.DataFrame, task: str | None) -> int:
+    """The number of judged completions, of one task or of all."""
     return completions_of(table if task is None else table.filter(task=task)).height
 
 
-def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
-    """How many completions of each `task` were `found`, and how many of these `passed`."""
+def matches_by_task(found: Sequence[TraceMatch], table: pl.DataFrame) -> pl.DataFrame:
+    """Count the completions of each `task` that were `found`, and how many of these `passed`."""
     keys = pl.DataFrame(
         [one.key for one in found], schema={name: table.schema[name] for name in KEY}, orient="row"
     )
@@ -71,31 +71,31 @@ def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
     return counted.agg(found=pl.len(), passed=pl.col("passed").sum())
 
 
-def look_through(lines: Sequence[bytes], question: SearchQuery) -> list[Found]:
-    """Answer for some rows; the work of one process."""
-    formula = None if question.formula is None else parse(question.formula)
-    return [answer(json.loads(line), question, formula) for line in lines]
+def match_rows(lines: Sequence[bytes], query: TraceQuery) -> list[TraceMatch]:
+    """Match a batch of rows; runs in a worker process."""
+    formula = None if query.formula is None else parse(query.formula)
+    return [match_row(json.loads(line), query, formula) for line in lines]
 
 
-def answer(row: Mapping[str, Any], question: SearchQuery, formula: Formula | None) -> Found:
-    """Answer for one row."""
+def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:
+    """Match one row."""
     worlds, cut, earlier = [], [], []
-    for number, verdict in _asked(row, question):
+    for number, verdict in _verdicts_in_scope(row, query):
         if formula is not None and "cut" in verdict:
             cut.append((number, verdict["world"]))
         elif formula is not None and not can_judge(formula, verdict):
             earlier.append((number, verdict["world"]))
-        elif formula is None or _holds(formula, verdict) != question.negated:
+        elif formula is None or _holds(formula, verdict) != query.negated:
             worlds.append((number, verdict["world"]))
-    return Found(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
+    return TraceMatch(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
 
 
-def _asked(row: Mapping[str, Any], question: SearchQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    """The verdicts that a question is about, counted from 1."""
-    if question.task not in {None, row["task"]}:
+def _verdicts_in_scope(row: Mapping[str, Any], query: TraceQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    """The verdicts in the worlds of a query, numbered from 1."""
+    if query.task not in {None, row["task"]}:
         return
     for number, verdict in enumerate(row["verdicts"], 1):
-        if question.world in {None, str(number)} or verdict["world"].lower() == str(question.world).lower():
+        if query.world in {None, str(number)} or verdict["world"].lower() == str(query.world).lower():
             yield number, verdict
 
 

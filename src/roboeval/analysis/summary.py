@@ -1,4 +1,4 @@
-"""How the completions of an evaluation did: how often programs succeed and how they fail, counted."""
+"""The summary of an evaluation: pass rates, and counts of failures by class and kind."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Failures:
-    """How many completions failed by one class or one kind of it."""
+    """The completions that failed by a class, or by a kind of it."""
 
     name: str
     count: int
-    share: float  # of all completions
-    kinds: tuple[Failures, ...] = ()  # of a class; the known ones first, also where nothing failed by them
+    share: float  # of all judged completions
+    kinds: tuple[Failures, ...] = ()  # of a class; known kinds come first, even with a count of 0
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class EvaluationSummary:
     """An evaluation in numbers."""
 
     k: tuple[int, ...]
-    tasks: tuple[TaskScore, ...]  # those that have completions, in the suite's order
+    tasks: tuple[TaskScore, ...]  # with completions, in the suite's order
     overall: tuple[Estimate, ...]  # pass@k for each k
     failures: tuple[Failures, ...]
     scope: JudgingScope
     missing: Missing  # tasks of the suite without a score
-    ablated: bool = False  # common sense only was required
+    ablated: bool = False  # judged by common-sense requirements only
 
     @property
     def prompts(self) -> list[PromptScore]:
@@ -54,17 +54,17 @@ class EvaluationSummary:
 
     @property
     def coverage(self) -> Coverage:
-        """Of how many completions the numbers speak."""
+        """How many completions were judged, are there, and were requested."""
         return self.scope.coverage(judged_count(self.prompts))
 
     @property
     def cut_off(self) -> CutOff:
         """The replies that were cut off."""
-        return cut_off(self.failures, self.scope)
+        return cut_off_replies(self.failures, self.scope)
 
 
-def cut_off(failures: Iterable[Failures], scope: JudgingScope) -> CutOff:
-    """The replies of a run that were cut off, given how its completions fail."""
+def cut_off_replies(failures: Iterable[Failures], scope: JudgingScope) -> CutOff:
+    """The replies of a run that were cut off, given its failures."""
     kinds = (kind for one in failures if one.name == NO_PROGRAM for kind in one.kinds)
     without = sum(kind.count for kind in kinds if kind.name == "cut-off")
     return CutOff(max(scope.cut_off, without), without, scope.total, scope.limit)
@@ -72,25 +72,20 @@ def cut_off(failures: Iterable[Failures], scope: JudgingScope) -> CutOff:
 
 @dataclass(frozen=True)
 class Missing:
-    """Tasks of a suite that have no score, by the reason."""
+    """Tasks of a suite without a score, by the reason."""
 
     no_completions: tuple[str, ...] = ()
     not_judged: tuple[str, ...] = ()
     not_selected: tuple[str, ...] = ()
 
 
-def summary(
-    tally: Tally,
-    suite: Suite,
-    scope: JudgingScope,
-    *,
-    k: Sequence[int] = (1,),
-    ablated: bool = False,
+def summarise(
+    tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
 ) -> EvaluationSummary:
-    """Count how completions did; raises UserError where there is none, or k is too large for a prompt."""
+    """Summarise an evaluation; raises UserError if nothing was judged, or if k is too large for a prompt."""
     tasks = tally.scores(suite.tasks)
     if not tasks:
-        raise UserError(f"0 of {how_many(scope.total)} judged, so there are no results yet")
+        raise UserError(f"0 of {how_many(scope.total)} judged; there are no results yet")
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
@@ -112,7 +107,7 @@ def _missing(tasks: Sequence[str], scope: JudgingScope) -> Missing:
 
 
 def failures(tally: Tally) -> tuple[Failures, ...]:
-    """How many completions, of one or more, failed by each class and kind (paper, section V.B)."""
+    """Count failures by class and kind (paper, section V.B); at least one completion must be judged."""
     failed: dict[str, Counter[str]] = defaultdict(Counter)
     for (name, kind), count in tally.failed.items():
         failed[name][kind] = count
@@ -133,15 +128,15 @@ PASSED, ALL = "passed", "all"
 
 @dataclass(frozen=True)
 class Causes:
-    """How completions ended, in shares."""
+    """The outcomes of completions, as shares."""
 
-    classes: Mapping[str, float]  # of all completions; also those that passed
+    classes: Mapping[str, float]  # of all completions, including PASSED
     kinds: Mapping[str, Mapping[str, float]]  # of the failures of a class
     counts: Mapping[tuple[str, str], int]  # by class and kind, ALL for the class; may be empty
 
 
 def causes(tally: Tally) -> Causes:
-    """How the completions of a run, one or more, ended (paper, section V.B)."""
+    """Compute the shares of outcomes (paper, section V.B); at least one completion must be judged."""
     found = failures(tally)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
     return Causes(
@@ -153,7 +148,7 @@ def causes(tally: Tally) -> Causes:
 
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
-    """The kinds of a class by which some completion fails, known ones first."""
+    """The kinds of a class that occur, known kinds first."""
     there = {kind for one in found for kind in one.kinds.get(name, {})}
     known = [kind for kind in CLASSES[name].kinds if kind in there]
     return [*known, *sorted(there - {*known})]

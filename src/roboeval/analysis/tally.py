@@ -1,4 +1,4 @@
-"""Counts completions while they are judged: how many of each prompt pass, and how the others fail."""
+"""Running counts of completions while they are judged."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from roboeval.evaluation.runs.rows import Row, key_of
 
 
 class Tally:
-    """The counts of an evaluation."""
+    """Counts of judged, passed and failed completions."""
 
     def __init__(self) -> None:
         self.judged: Counter[tuple[str, int]] = Counter()  # by task and prompt
-        self.passed: Counter[tuple[str, int]] = Counter()  # of these
+        self.passed: Counter[tuple[str, int]] = Counter()  # by task and prompt
         self.failed: Counter[tuple[str, str]] = Counter()  # by class and kind of the failure
         self.first_failed: Key | None = None
 
@@ -31,11 +31,7 @@ class Tally:
             self.first_failed = key_of(row)
 
     def scores(self, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-        """How often completions pass, by task and prompt (paper, section IV.C).
-
-        Args:
-            order: of the tasks; others come behind these, as they were met.
-        """
+        """Scores by task and prompt (paper, section IV.C); tasks not in `order` come last."""
         prompts: dict[str, list[PromptScore]] = {task: [] for task in order}
         for (task, prompt), n in self.judged.items():
             prompts.setdefault(task, []).append(PromptScore(task, prompt, n, self.passed[task, prompt]))

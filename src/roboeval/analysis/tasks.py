@@ -1,4 +1,4 @@
-"""One task of a run, prompt by prompt, and one prompt, program by program."""
+"""The results of one task by prompt, and of one prompt by program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roboeval.evaluation.runs.scope import requested_of_prompts
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:
-    """A task, prompt by prompt: how many completions passed, and how the others failed."""
+    """The results of a task by prompt, as plain data: pass rates and kinds of failure."""
     suite = results.suite
     of_task = completions_of(results.table).filter(pl.col("task") == task).sort("prompt", maintain_order=True)
     return {
@@ -30,13 +30,13 @@ def task_data(results: Results, task: str) -> dict[str, Any]:
 
 
 def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
-    """A judged prompt, program by program, with why each fails; equal programs stand together."""
+    """The distinct programs of a judged prompt as plain data, with the reason why each fails."""
     of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
     programs = results.programs
-    together: dict[object, list[Key]] = defaultdict(list)
+    groups: dict[object, list[Key]] = defaultdict(list)
     for index in of_prompt["index"]:
         key = task, prompt, index
-        together[programs.get(key, index)].append(key)
+        groups[programs.get(key, index)].append(key)
     return {
         "task": task,
         **_prompt_head(results, of_prompt),
@@ -46,16 +46,16 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
                 "gone": same[0] not in programs,
                 **_reason(results, same[0]),
             }
-            for same in together.values()
+            for same in groups.values()
         ],
     }
 
 
 def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame:
-    """How many completions of each prompt are `written`, `judged`, and `counted` by a condition.
+    """Count the completions of each prompt that are `written`, `judged`, and `counted` by a condition.
 
-    Of completions, judged or not, with `written` and `passed` (null where not judged); their `share` is
-    that of the judged ones which are counted, null where there are none.
+    The input has `written` and `passed` (null if not judged). `share` is the counted part of the judged
+    completions, null if there are none.
     """
     judged = pl.col("judged")
     counts = completions.group_by("task", "prompt", maintain_order=True).agg(
@@ -77,9 +77,9 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
     return {
         "prompt": prompt,
-        "instructions": _different(written, "instruction"),
+        "instructions": _distinct(written, "instruction"),
         "suite_instruction": suite_instruction(results.suite, task, prompt),
-        "models": _different(written, "model"),
+        "models": _distinct(written, "model"),
         "completions": n,
         "requested": None if requested is None else requested.get(task, 0),
         "gone": n - len(written),
@@ -88,7 +88,7 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     }
 
 
-def _different(written: Sequence[Completion], name: str) -> list[str]:
+def _distinct(written: Sequence[Completion], name: str) -> list[str]:
     values = dict.fromkeys(getattr(completion, name) for completion in written)
     return [value for value in values if value is not None]
 

@@ -67,18 +67,18 @@ PAIR = 2
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print by how much the second of two runs is better."""
-    from roboeval.analysis.compare import Compared, compared, comparison_data, unlike
+    from roboeval.analysis.compare import ComparedRun, compare_scores, comparison_data, other_differences
     from roboeval.analysis.counts import task_scores
     from roboeval.analysis.metrics import pass_at_1
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
     expect_same_suite(opened)
-    result = compared(*(pass_at_1(task_scores(one.results.table)) for one in opened))
-    warnings = unlike(*(one.results for one in opened))
+    result = compare_scores(*(pass_at_1(task_scores(one.results.table)) for one in opened))
+    warnings = other_differences(*(one.results for one in opened))
     for warning in warnings:
         note(f"warning: {warning}")
-    first, second = (Compared.of(str(path), one.results) for path, one in zip(paths, opened, strict=True))
+    first, second = (ComparedRun.of(str(path), one.results) for path, one in zip(paths, opened, strict=True))
     if as_json:
         data = comparison_data(result, (first.name, second.name))
         both = {side: data[side] | run.data for side, run in (("first", first), ("second", second))}

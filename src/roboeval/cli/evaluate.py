@@ -66,7 +66,7 @@ def evaluate(
     isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
     with engine_named(engine, workers, **isolation) as engine_for:
         from roboeval.analysis.metrics import judged_count
-        from roboeval.analysis.summary import summary
+        from roboeval.analysis.summary import summarise
         from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
         from roboeval.evaluation.runs.folder import Run, about_of, tasks_to_judge
@@ -96,7 +96,7 @@ def evaluate(
                 tally.add(row)
                 if table is not None:
                     table.add(row)
-            counted = summary(tally, judged_by, scope, ablated=ablation)
+            counted = summarise(tally, judged_by, scope, ablated=ablation)
             house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
         except KeyboardInterrupt:

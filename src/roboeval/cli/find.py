@@ -19,7 +19,7 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
-    from roboeval.analysis.search import Found, SearchQuery
+    from roboeval.analysis.search import TraceMatch, TraceQuery
     from roboeval.evaluation.runs.completions import Key
     from roboeval.suites.load import Suite
 
@@ -48,8 +48,8 @@ def find(
     that failed by reason.
     """
     from codebotler.simulator.pool import cores
-    from roboeval.analysis.cluster import cluster_data, clusters, groups
-    from roboeval.analysis.search import SearchQuery, found_by_task, looked_at, search
+    from roboeval.analysis.cluster import cluster_data, describe_groups, group_failures
+    from roboeval.analysis.search import TraceQuery, count_searched, matches_by_task, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, as_judged
@@ -58,57 +58,57 @@ def find(
         fail("--not needs a formula; add one, or leave --not out")
     known = as_judged(Run(run), load(suite), ablated=ablation)
     task = None if task is None else known.task(task).name
-    question = SearchQuery(formula, negated, task, world)
-    expect_question(question, known, ablated=ablation)
+    query = TraceQuery(formula, negated, task, world)
+    expect_query(query, known, ablated=ablation)
     lines: list[bytes] = []
     results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
-    every = list(watched(search(lines, question, workers=workers or cores()), "looking", len(lines)))
+    every = list(watched(search(lines, query, workers=workers or cores()), "looking", len(lines)))
     found = [one for one in every if one.worlds]
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
-    together = groups(failed, results.programs)
+    together = group_failures(failed, results.programs)
     shown = together if json else together[:most]
-    described = list(watched(clusters(shown, results), "comparing", len(shown)))
+    clusters = list(watched(describe_groups(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if cut := sum(bool(one.cut) for one in every):
         note(f"undecided, since their traces were too long to keep: {how_many(cut)}")
     if earlier := sum(bool(one.earlier) for one in every):
         note(f"undecided, since an earlier version kept no places: {how_many(earlier)}; evaluate with --redo")
-    total, passed = looked_at(results.table, task), {*results.passed}
+    total, passed = count_searched(results.table, task), {*results.passed}
     if json:
         data = {
             "looked_at": total,
             "found": [found_data(one, one.worlds, passed) for one in found],
             "undecided": [found_data(one, one.undecided, passed) for one in undecided],
         }
-        print_json({**data, "groups": list(map(cluster_data, described))})
+        print_json({**data, "groups": list(map(cluster_data, clusters))})
     else:
-        counts = found_by_task(found, results.table)
+        counts = matches_by_task(found, results.table)
         is_search = formula is not None
-        print_rich(found_view(found, counts, total, described, groups=len(together), is_search=is_search))
+        print_rich(found_view(found, counts, total, clusters, groups=len(together), is_search=is_search))
 
 
-def expect_question(question: SearchQuery, suite: Suite, *, ablated: bool) -> None:
+def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
     """Refuse a wrong formula, and a world that no task has."""
     from codebotler.core.errors import UserError
     from codebotler.rtl import RtlSyntaxError, parse
 
-    if question.formula is not None:
+    if query.formula is not None:
         try:
-            parse(question.formula)
+            parse(query.formula)
         except RtlSyntaxError as error:
             raise UserError(f"this is not a formula: {error}") from None
-    if question.world is None:
+    if query.world is None:
         return
-    tasks = [suite.tasks[question.task]] if question.task else list(suite.tasks.values())
+    tasks = [suite.tasks[query.task]] if query.task else list(suite.tasks.values())
     scenarios = [task.judged_in(ablated=ablated) for task in tasks]
     abouts = {scenario.world.about.lower() for those in scenarios for scenario in those}
     numbers = {str(n) for n in range(1, max(map(len, scenarios)) + 1)}
-    if question.world.lower() not in abouts | numbers:
-        where = question.task or f'the suite "{suite.name}"'
-        fail(f'{where} has no world "{question.world}"; `roboeval tasks TASK` lists the worlds of a task')
+    if query.world.lower() not in abouts | numbers:
+        where = query.task or f'the suite "{suite.name}"'
+        fail(f'{where} has no world "{query.world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
-def found_data(one: Found, worlds: Sequence[tuple[int, str]], passed: Container[Key]) -> dict[str, Any]:
+def found_data(one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[Key]) -> dict[str, Any]:
     """A completion and the worlds in which it was found, as JSON."""
     from roboeval.evaluation.runs.completions import name_of
 

@@ -67,18 +67,18 @@ def mutate(
     It runs and judges mutants: right programs changed by mistakes that models make.
     """
     from codebotler.simulator.pool import WorkerPool, cores
-    from roboeval.mutation.report import keep
+    from roboeval.mutation.report import write_scores
     from roboeval.mutation.trials import mutation_score
 
     known = load(suite)
     wanted = wanted_tasks(known, tasks)
     further = named_programs(also or [], known)
-    score = partial(mutation_score, worlds=worlds, most=most, seed=seed, watched=watched)
+    score = partial(mutation_score, worlds=worlds, most=most, seed=seed, progress=watched)
     with WorkerPool(workers or cores(), one_process_per_run=one_process_per_run) as pool:
         scores = [score(task, known, pool, further=further.get(task.name, ())) for task in wanted]
     show_scores(scores, known.name, brief=brief)
     if out is not None:
-        keep(scores, out)
+        write_scores(scores, out)
         note(f"scores, mutants and survivors are in {out}")
     if at_least is not None and any(score.score is None or score.score < at_least for score in scores):
         raise SystemExit(1)

@@ -55,7 +55,7 @@ def report(
     from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines import Local
     from roboeval.report.cost import expect_known, read_prices
-    from roboeval.report.runs import named_apart, read_labels
+    from roboeval.report.runs import name_runs, read_labels
     from roboeval.report.writing import expect_no_others, headline, pieces, sections, write_report
 
     expect_no_others(out)
@@ -65,7 +65,7 @@ def report(
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened)
     engine = Local(workers or cores()) if check else None
-    read = named_apart(
+    read = name_runs(
         [judged_run(one.results, suite, beside=beside, rules=rules, engine=engine) for one in opened],
         labels,
     )
@@ -111,4 +111,4 @@ def judged_run(
         other = open_current(run.path, beside, ablated=False, reuse_from=results).results
     if rules is not None:
         house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results).results
-    return JudgedRun(results, table, ablated=ablated, beside=other, house=house)
+    return JudgedRun(results, table, ablated=ablated, other_suite=other, house=house)

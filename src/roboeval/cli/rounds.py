@@ -82,7 +82,7 @@ def _round(
     number: int,
     engine: OpenEngine,
 ) -> Round:
-    from roboeval.analysis.summary import summary
+    from roboeval.analysis.summary import summarise
     from roboeval.analysis.tally import Tally
     from roboeval.cli.views.rounds import Round
     from roboeval.evaluation.evaluate import evaluate_run
@@ -99,5 +99,5 @@ def _round(
     requested = [one for one in completions.values() if round_of(one) == number]
     for one in requested:
         add_usage(usage, one.more.get("usage"))
-    counted = summary(tally, plan.suite, JudgingScope.of(completions.values(), plan.tasks))
+    counted = summarise(tally, plan.suite, JudgingScope.of(completions.values(), plan.tasks))
     return Round(number, counted, len(requested), len(completions) - len(problems), usage.total())

@@ -89,14 +89,14 @@ def show(
 
 def house_of(run: Run | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
     """How a run did by the rules of a house, beside its evaluation without them if there is one."""
-    from roboeval.analysis.broken_rules import broken_rules
+    from roboeval.analysis.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.evaluation.runs.results import read_results
 
     key = evaluation_key(suite.with_house_rules(None), ablated=ablated)
     if run is None or not run.rows(key).is_file():
-        return broken_rules(table)
-    return broken_rules(table, read_results(run, key, suite, keep_failed=False).table)
+        return count_broken_rules(table)
+    return count_broken_rules(table, read_results(run, key, suite, keep_failed=False).table)
 
 
 def print_summary(
@@ -128,10 +128,10 @@ def print_summary(
 def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_json: bool) -> None:
     """Print the tables of a run."""
     from roboeval.analysis.counts import tally_of
-    from roboeval.analysis.summary import summary
+    from roboeval.analysis.summary import summarise
 
     ablated, suite = results.is_ablated, results.known_suite
-    counted = summary(tally_of(results.table), suite, results.scope, k=sorted({1, *k}), ablated=ablated)
+    counted = summarise(tally_of(results.table), suite, results.scope, k=sorted({1, *k}), ablated=ablated)
     house = house_of(results.run, suite, results.table, ablated=ablated) if has_rules else None
     print_summary(counted, title=title, as_json=as_json, stale=results.stale, house=house)
 

@@ -91,10 +91,10 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint
-    from roboeval.linting.trials import tried
+    from roboeval.linting.trials import judge_solutions
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
-    linted = (lint(one, tried(one, suite, workers=cores())) for one in wanted)
+    linted = (lint(one, judge_solutions(one, suite, workers=cores())) for one in wanted)
     findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
     print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):

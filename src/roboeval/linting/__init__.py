@@ -1,4 +1,4 @@
-"""Mistakes in tasks: requirements that cannot hold, checks that never fail, regexes that match nothing.
+"""The linter of tasks: finds requirements that cannot hold, checks that never fail, and dead regexes.
 
 Start with `lint.py`.
 """

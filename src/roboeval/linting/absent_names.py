@@ -19,30 +19,30 @@ ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someon
 
 
 def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
-    """The sort and the name of what a requirement names and its world lacks."""
-    for what, name, known in _named(requirement, scenario.world.rooms, task):
+    """Yield the category and name of everything that a requirement names and its world lacks."""
+    for category, name, known in _names(requirement, scenario.world.rooms, task):
         if not may_mean(name, known):
-            yield what, name
+            yield category, name
 
 
-def _named(
+def _names(
     requirement: Requirement, rooms: Sequence[Room], task: Task
 ) -> Iterator[tuple[str, str, Sequence[str]]]:
-    """Sort and name of each, and what of this sort the world has; of people also the owners of rooms."""
+    """Yield the category and name of everything that a requirement names, and all known names of it."""
     objects = [label for room in rooms for label in room.objects]
     people = [person.name for room in rooms for person in room.people]
-    there = {
+    known_names = {
         "room": [room.name for room in rooms],
         "object": objects,
         "object or person": [*objects, *people, *ANYBODY],
     }
     for element in elements(requirement.formula):
         row = by_event(element.kind)
-        what = row.recording.names if row is not None and row.recording is not None else ""
-        if (known := there.get(what)) is not None:
+        category = row.recording.names if row is not None and row.recording is not None else ""
+        if (known := known_names.get(category)) is not None:
             found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
-            yield from ((what, one, known) for one in found)
-        elif not what:
+            yield from ((category, one, known) for one in found)
+        elif not category:
             yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
         if element.holding is not None:
             yield from (("object", one, objects) for one in patterns(element.holding))
@@ -50,7 +50,7 @@ def _named(
             known = [*people, *_owners(rooms), *ANYBODY]
             yield from (("person", one, known) for one in patterns(element.to))
         if element.place is not None:
-            yield from (("room", one, there["room"]) for one in _alternatives(element.place))
+            yield from (("room", one, known_names["room"]) for one in _alternatives(element.place))
     check = next(check for check in task.checks if check.name == requirement.check)
     for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
         if parameter == "person" or argument.lower() in _people(task):
@@ -61,7 +61,7 @@ def _named(
 
 
 def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
-    """The names of people of the task that stand in what is said or asked."""
+    """Yield the names of the task's people that occur in the texts of an event."""
     texts = (text for text in (element.text, element.options) if text is not None)
     found = " | ".join(pattern for text in texts for pattern in patterns(text)).lower()
     plain = re.sub(r"\\(.)", lambda escape: " " if escape[1].isalnum() else escape[1], found)
@@ -71,7 +71,7 @@ def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
 
 
 def _people(task: Task) -> set[str]:
-    """Lower-case names of the people in all worlds of a task, and of the owners of offices and labs."""
+    """The lower-case names of people in all worlds of a task, and of owners of offices and labs."""
     scenarios = (*task.scenarios, *(task.ablation or ()))
     rooms = [room for scenario in scenarios for room in scenario.world.rooms]
     names = [*(person.name for room in rooms for person in room.people), *_owners(rooms)]
@@ -89,7 +89,7 @@ def _arguments(requirement: Requirement) -> list[str]:
     return [str(value.value) for value in values if isinstance(value, ast.Constant)]
 
 
-# --- regexes that leave a choice
+# --- regexes with alternatives
 
 _BACKREFERENCE = re.compile(r"\\\d|\(\?P=|\(\?\(")
 _PIECE = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|.", re.DOTALL)
@@ -97,7 +97,7 @@ _CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
 
 
 def _alternatives(pattern: str) -> Iterator[str]:
-    """A regex once for each word of its choices; unchanged if it has none, or refers back."""
+    """Expand the alternatives of a regex; yield it unchanged if it has none, or has backreferences."""
     if _BACKREFERENCE.search(pattern):
         yield pattern
         return
@@ -111,7 +111,7 @@ def _alternatives(pattern: str) -> Iterator[str]:
 
 
 def _branches(pattern: str) -> list[str]:
-    """The parts between the bars outside of groups and sets."""
+    """Split a regex at the bars outside of groups and sets."""
     branches, depth = [""], 0
     for piece in _PIECE.findall(pattern):
         depth += (piece == "(") - (piece == ")")

@@ -1,4 +1,4 @@
-"""The linter of tasks: all findings about one task, in order, and which of them its file accepts."""
+"""The linter: all findings about a task, in order, and which of them its file accepts."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import JudgedWorld, judged_worlds
 from roboeval.suites.load import Requirement, Scenario, Task
 
-_MOST_DRAWN = 6  # drawn worlds with different requirements in which conflicts and implications are sought
-_MOST_ALIKE = 5  # requirements that one line of `require` makes by its `for`
+_MOST_SAMPLED = 6  # sampled worlds with different requirements to search for conflicts and implications
+_MOST_ALIKE = 5  # requirements that a single `for` generates
 
 
 def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
-    """Look for mistakes in a task, given the verdicts on its solutions."""
+    """Find likely mistakes in a task, given the verdicts on its solutions."""
     worlds = [*judged_worlds(task)]
     found = [*task_findings(task, verdicts)]
-    if task.drawn:
-        found += _of_drawn([asked for world in worlds for asked in world.by_prompt()])
+    if task.is_sampled:
+        found += _lint_sampled([asked for world in worlds for asked in world.by_prompt()])
     else:
-        found += [*_same_worlds(worlds), *(finding for world in worlds for finding in _of_listed(world))]
+        found += [*_same_worlds(worlds), *(finding for world in worlds for finding in _lint_listed(world))]
     distinct = {(finding.name, finding.line): finding for finding in reversed(found)}
     ordered = sorted(distinct.values(), key=lambda finding: (finding.line or 0, finding.name))
     reasons = {accepted.finding: accepted.because for accepted in task.accepted}
@@ -39,12 +39,12 @@ def _stale(findings: Iterable[Finding], task: Task) -> Iterator[Finding]:
     for index, accepted in enumerate(task.accepted):
         if accepted.finding not in names:
             line = YamlFile.read(task.path).line(("accepted", index))
-            message = f'"{accepted.finding}" is accepted but not found; remove the entry'
+            message = f'"{accepted.finding}" is accepted but does not occur; remove the entry'
             yield Finding("stale-acceptance", accepted.finding, message, task.path, line)
 
 
-def _of_listed(world: JudgedWorld) -> Iterator[Finding]:
-    """Findings in a world; a requirement is implied only if it is so for each prompt that asks for it."""
+def _lint_listed(world: JudgedWorld) -> Iterator[Finding]:
+    """Findings in a world; a requirement is implied only if it is for each prompt that asks for it."""
     needed: set[str] = set()
     found: list[Finding] = []
     for asked in world.by_prompt():
@@ -55,10 +55,10 @@ def _of_listed(world: JudgedWorld) -> Iterator[Finding]:
     yield from (one for one in found if one.kind != "implied" or one.subject not in needed)
 
 
-def _of_drawn(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
-    """Findings in drawn worlds; a requirement is implied only if it is so in all worlds looked at.
+def _lint_sampled(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
+    """Findings in sampled worlds; a requirement is implied only if it is in all worlds that are searched.
 
-    Absent people are no finding here: requirements are computed from who is present.
+    Absent people are not reported, since requirements are computed from the people present.
     """
     different = [*{frozenset(r.formula for r in w.require): w for w in reversed(worlds)}.values()]
     first = {
@@ -70,7 +70,7 @@ def _of_drawn(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
         yield from world.dead_regexes(requirement)
     implied: dict[int | None, Finding] = {}
     needed: set[int | None] = set()
-    for world in map(_with_few_alike, different[::-1][:_MOST_DRAWN]):
+    for world in map(_with_few_alike, different[::-1][:_MOST_SAMPLED]):
         found = [*world.logic()]
         yield from (one for one in found if one.kind != "implied")
         redundant = {one.subject: one for one in found if one.kind == "implied"}
@@ -81,7 +81,7 @@ def _of_drawn(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
 
 
 def _with_few_alike(world: JudgedWorld) -> JudgedWorld:
-    """The world with few of the requirements that one `for` makes: texts to tell all apart are too many."""
+    """Keep few of the requirements that one `for` generates, since the search grows with their number."""
     alike: defaultdict[int | None, list[Requirement]] = defaultdict(list)
     for requirement in world.require:
         alike[requirement.line].append(requirement)
@@ -91,17 +91,17 @@ def _with_few_alike(world: JudgedWorld) -> JudgedWorld:
 
 def _same_worlds(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
     for first, second in combinations(worlds, 2):
-        if first.ablated == second.ablated and _require_the_same(first.scenario, second.scenario):
+        if first.ablated == second.ablated and _is_equivalent(first.scenario, second.scenario):
             message = (
-                f'{second.name} ("{second.scenario.world.about}") requires the same as '
-                f'{first.name} ("{first.scenario.world.about}")'
+                f'{second.name} ("{second.scenario.world.about}") has the same requirements as '
+                f'{first.name} ("{first.scenario.world.about}"); change or remove one'
             )
             subject = f"{'ablation ' if first.ablated else ''}{first.number} and {second.number}"
             yield second.finding("same-worlds", subject, message, second.line)
 
 
-def _require_the_same(one: Scenario, other: Scenario) -> bool:
-    """Whether no events satisfy just one; False for two that nothing satisfies, unless written alike."""
+def _is_equivalent(one: Scenario, other: Scenario) -> bool:
+    """Whether the same traces satisfy both; False if no trace satisfies them, unless the text is equal."""
     first, second = ({r.formula: None for r in scenario.require} for scenario in (one, other))
     if first.keys() == second.keys():
         return True

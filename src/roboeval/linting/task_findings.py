@@ -1,4 +1,4 @@
-"""Findings about a task as a whole: its checks, facts and regexes, and how its solutions do."""
+"""Findings about a whole task: its checks, facts, regexes and solutions."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import NamedTuple
 
+from codebotler.core.words import counted
 from codebotler.core.world import World
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
@@ -27,7 +28,7 @@ from roboeval.suites.task import check_label
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """All findings that are not about one world."""
+    """All findings that do not concern a single world."""
     yield from (*_unused(task), *_unsaid(task), *_uncovered(task), *_slow(task), *_unworded(task))
     yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
 
@@ -45,16 +46,16 @@ def _unused(task: Task) -> Iterator[Finding]:
 
 
 def _unsaid(task: Task) -> Iterator[Finding]:
-    """Facts of the task's own file that a prompt leaves out, or says although they are common sense."""
+    """Facts of the task's own file that a prompt omits, or mentions although they are common sense."""
     file = YamlFile.read(task.path)
     own = len(file.data.get("facts", ())) if isinstance(file.data, dict) else 0
     for number, fact in enumerate(task.facts[len(task.facts) - own :]):
         for prompt, text in enumerate(task.prompts):
             word = next((word for word in fact.words if re.search(word, text, re.IGNORECASE)), None)
             if word is None and not fact.commonsense:
-                wrong = f'does not say "{fact.fact}", in any of its words; add it'
+                wrong = f'does not mention "{fact.fact}" in any of its words; add it'
             elif word is not None and fact.commonsense:
-                wrong = f'says "{fact.fact}" by "{word}", but that is marked as common sense; leave it out'
+                wrong = f'mentions "{fact.fact}" by "{word}", but it is marked as common sense; remove it'
             else:
                 continue
             line = file.line(("facts", number))
@@ -62,13 +63,13 @@ def _unsaid(task: Task) -> Iterator[Finding]:
 
 
 def _uncovered(task: Task) -> Iterator[Finding]:
-    """Facts and clauses of the prompts that no check covers, where a task says which checks cover what."""
+    """Facts and clauses that no check covers, for tasks with `covered_by`."""
     if not task.covered_by:
         return
     line = YamlFile.read(task.path).line(("covered_by",))
     for fact in task.facts:
         if fact.fact not in dict(task.covered_by):
-            message = f'covered_by does not say which checks cover "{fact.fact}"; add it there'
+            message = f'covered_by lacks the fact "{fact.fact}"; add it'
             yield Finding("uncovered", fact.fact, message, task.path, line)
     for clause in clauses_of(task):
         if not clause.is_covered:
@@ -79,7 +80,7 @@ def _uncovered(task: Task) -> Iterator[Finding]:
 
 
 def _unworded(task: Task) -> Iterator[Finding]:
-    """Checks with a regex that explanations cannot put into words."""
+    """Checks with a regex that explanations cannot describe."""
     unclear = {
         requirement.check
         for requirement in _required(task)
@@ -88,7 +89,7 @@ def _unworded(task: Task) -> Iterator[Finding]:
     for check in task.checks:
         if check.name in unclear:
             message = (
-                f'no sentence can show a regex of the check "{check.name}"; add what it means under "means"'
+                f'a regex of the check "{check.name}" cannot be described; add its meaning under "means"'
             )
             yield Finding("unworded", check.name, message, task.path, check.line)
 
@@ -97,17 +98,17 @@ def _unworded(task: Task) -> Iterator[Finding]:
 
 
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Solutions whose verdict is not the one in their file."""
-    if task.borrows:  # programs that were written for other requirements
+    """Solutions whose verdict differs from their file."""
+    if task.borrows:  # its programs were written for other requirements
         return
-    for solution, judged in zip(solutions(task), verdicts, strict=False):  # an ablation's come afterwards
+    for solution, judged in zip(solutions(task), verdicts, strict=False):  # verdicts on an ablation follow
         failed = _by_some_prompt(judged, len(task.prompts))
         if (None if failed is None else failed["kind"]) == solution.fails:
             continue
-        said = "pass" if solution.fails is None else f"fail by {solution.fails}"
+        expected = "pass" if solution.fails is None else f"fail by {solution.fails}"
         where = "" if failed is None else _why(failed, judged)
         message = (
-            f'the solution "{solution.about}" is said to {said}, but it '
+            f'the solution "{solution.about}" should {expected}, but it '
             f"{'passes' if failed is None else 'fails'}{where}; correct the program, its `fails`, or a check"
         )
         path, line = place_of(task, solution)
@@ -115,36 +116,31 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
 
 
 def _why(failed: Failure, judged: Verdicts) -> str:
-    """By which check or error a program fails, and where."""
-    kind, check, world = failed["kind"], failed["check"], failed["world"]
-    by = kind if check is None else f'{kind}, by "{check}",'
-    return f' by {by} in world {world + 1}, "{judged[world].world}"'
+    """The check or error by which a program fails, and the world."""
+    by = failed["kind"] if failed["check"] is None else f'{failed["kind"]}, by "{failed["check"]}",'
+    return f' by {by} in world {failed["world"] + 1}, "{judged[failed["world"]].world}"'
 
 
 def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
-    """The failure of a program that was written for some prompt; None if it does what one of them asks."""
+    """The failure of a program; None if it satisfies at least one prompt."""
     failures = [failure([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)]
     return None if None in failures else failures[0]
 
 
 def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Checks, with or without `not`, by which no solution fails."""
+    """Checks, with or without `not`, that no wrong solution fails."""
     wrong = [one for one in verdicts if not all(verdict.satisfied for verdict in one)]
     if not wrong:
-        message = f'there is no wrong program to show that the checks of "{task.name}" can fail'
+        message = f'"{task.name}" has no wrong solution that shows that its checks can fail; add one'
         yield Finding("untripped", task.name, message, task.path, 1)
         return
     tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
-    no_program = (
-        "the only program of the task that fails does not trip"
-        if len(wrong) == 1
-        else f"of the {len(wrong)} programs of the task that fail, none trips"
-    )
+    no_program = f"none of {counted(len(wrong), 'wrong program')} fails by"
     lines = {check.name: check.line for check in task.checks}
     sides = {_side(requirement): requirement for requirement in reversed(_required(task))}
     for side, requirement in sides.items():
         if side not in tripped:
-            meant = ' where it is required without "not"' if f"not {side}" in sides else ""
+            meant = ' without "not"' if f"not {side}" in sides else ""
             message = f'{no_program} "{side}"{meant}; add one that does'
             yield Finding("untripped", side, message, task.path, lines[requirement.check])
 
@@ -153,14 +149,14 @@ def _side(requirement: Requirement) -> str:
     return f"not {requirement.check}" if requirement.text.strip().startswith("not ") else requirement.check
 
 
-# --- regexes that make the judge slow
+# --- slow regexes
 
 
 class SearchedRegex(NamedTuple):
-    """A regex as the judge searches for it."""
+    """A regex that the judge searches for."""
 
     pattern: str
-    where: str  # the requirement or the world that has it
+    where: str  # the requirement or the world that contains it
     line: int | None
 
 
@@ -168,14 +164,14 @@ def _slow(task: Task) -> Iterator[Finding]:
     for pattern, one in {one.pattern: one for one in reversed([*searched_regexes(task)])}.items():
         if (text := slow_text(pattern)) is not None:
             message = (
-                f"finding the regex {pattern!r} of {one.where} takes much longer the longer a text is, "
-                f"such as one that begins with {text!r}; let no two repeats match the same text"
+                f"searching the regex {pattern!r} of {one.where} is slow for long texts, such as one that "
+                f"begins with {text!r}; avoid overlapping repetitions"
             )
             yield Finding("slow-regex", pattern, message, task.path, one.line)
 
 
 def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
-    """The regexes of a task: of its requirements, and of the labels and answers in its worlds."""
+    """The regexes in the requirements of a task, and for the labels and answers in its worlds."""
     lines = {check.name: check.line for check in task.checks}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):
@@ -184,7 +180,7 @@ def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
                 yield SearchedRegex(pattern, f'"{requirement.text}"', lines[requirement.check])
     labels = {label: world for world in judged_worlds(task) for label in _labels(world.scenario.world)}
     for label, world in labels.items():
-        yield SearchedRegex(whole_words(label), world.name, None if task.drawn else world.line)
+        yield SearchedRegex(whole_words(label), world.name, None if task.is_sampled else world.line)
 
 
 def _labels(world: World) -> Iterator[str]:

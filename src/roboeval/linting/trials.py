@@ -1,4 +1,4 @@
-"""How the reference solutions of a task do in its worlds."""
+"""Judges the reference solutions of a task in its worlds."""
 
 from __future__ import annotations
 
@@ -13,14 +13,11 @@ from roboeval.evaluation.judge import judge, robot_in
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import solutions
 
-Verdicts: TypeAlias = Sequence[Verdict]  # on one program in all worlds of a task, or of its ablation
+Verdicts: TypeAlias = Sequence[Verdict]  # on a program in all worlds of a task, or of its ablation
 
 
-def tried(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
-    """Run the solutions of a task in its worlds, and after all of them once more in those of its ablation.
-
-    The verdicts are by all requirements, also by those that only some prompts ask for.
-    """
+def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
+    """Judge the solutions of a task in its worlds, then in those of its ablation, by all requirements."""
     judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
     runs = [(solution.program, worlds) for worlds in judges for solution in solutions(task)]
     with WorkerPool(workers) as pool:

@@ -1,7 +1,7 @@
-"""Findings about the requirements of one world: what they allow together, and what their regexes match.
+"""Findings about the requirements of one world: conflicts, implications and dead regexes.
 
-`unsatisfiable` and `implied` follow from RTL alone (`codebotler.rtl.reasoning`), first with visits that name
-one room of the world each, then with any.
+`unsatisfiable` and `implied` are decided by `codebotler.rtl.reasoning`, first for visits that each
+name one room of the world, then for any visits.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.skills.kinds import GOTO
 from codebotler.core.words import listed
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Formula, Regex, Text
@@ -21,9 +20,9 @@ from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
 from codebotler.simulator.settings import resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, Kind
-from roboeval.suites.load import Check, Requirement, Scenario, Task
+from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck
 
-_PLAIN = ", as long as each visit names one room of the world"
+_PLAIN = ", if each visit names one room of the world"
 
 
 @dataclass(frozen=True)
@@ -37,21 +36,21 @@ class JudgedWorld:
 
     @property
     def name(self) -> str:
-        """Its name in messages."""
+        """The name of the world in messages."""
         return f"{'the ablation of ' if self.ablated else ''}world {self.number}"
 
     @property
     def require(self) -> tuple[Requirement, ...]:
-        """Its requirements."""
+        """The requirements of the world."""
         return self.scenario.require
 
     @property
     def line(self) -> int | None:
-        """Its line in the task file."""
+        """The line of the world in the task file."""
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
     def finding(self, kind: Kind, subject: str, message: str, line: int | None) -> Finding:
-        """A finding in the task's file."""
+        """Create a finding in the task file."""
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:
@@ -59,14 +58,14 @@ class JudgedWorld:
         for requirement in self.require:
             yield from self.dead_regexes(requirement)
             for what, name in absent_names(requirement, self.scenario, self.task):
-                message = f'"{requirement.text}" is about the {what} "{name}", but {self.name} has none'
+                message = f'"{requirement.text}" names the {what} "{name}", which {self.name} lacks'
                 yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
         yield from self.logic()
 
-    # --- requirements together
+    # --- conflicts and implications
 
     def logic(self) -> Iterator[Finding]:
-        """Requirements that cannot hold, or follow from others."""
+        """Find requirements that cannot hold, or follow from others."""
         rest = [*self.require]
         try:
             while (conflict := self._conflict([r.formula for r in rest])) is not None:
@@ -81,7 +80,7 @@ class JudgedWorld:
     def _unsatisfiable(self, involved: Sequence[Requirement], condition: str) -> Finding:
         subject = " and ".join(r.text for r in involved)
         together = "" if len(involved) == 1 else " together"
-        message = f'no text was found with which "{subject}" can hold{together} in {self.name}{condition}'
+        message = f'"{subject}" can probably not hold{together} in {self.name}{condition}'
         line = involved[-1].line if condition or together else self._line_of_fault(involved[0])
         return self.finding("unsatisfiable", subject, message, line)
 
@@ -97,27 +96,27 @@ class JudgedWorld:
             reasons = [f'"{r.text}"' for r in others if r.formula in premises]
             unless = f" without breaking {'one of ' * (len(reasons) > 1)}{listed(reasons)}" if reasons else ""
             message = (
-                f'no sequence of the texts that were tried breaks "{subject}" in {self.name}{unless}'
-                f"{condition}; it may never fail alone"
+                f'nothing was found that breaks "{subject}" in {self.name}{unless}'
+                f"{condition}; it may be redundant"
             )
             fault = line if reasons or condition else self._line_of_fault(requirement)
             yield self.finding("implied", subject, message, fault)
 
     def _undecided(self, subject: str, what: str, line: int | None) -> Finding:
-        return self.finding("undecided", subject, f"{what} would take too long to find out", line)
+        return self.finding("undecided", subject, f"{what} takes too long to decide", line)
 
     def _line_of_fault(self, requirement: Requirement) -> int | None:
-        """The line to mend where a mistake is in every world: the check's, unless it takes arguments."""
+        """The line to fix: that of the check if it has no parameters, since the mistake is in every world."""
         check = self._check(requirement)
         return requirement.line if check.parameters else check.line
 
-    def _check(self, requirement: Requirement) -> Check:
+    def _check(self, requirement: Requirement) -> TaskCheck:
         return next(check for check in self.task.checks if check.name == requirement.check)
 
     def _conflict(
         self, formulas: Sequence[Formula], denied: Formula | None = None
     ) -> tuple[list[Formula], str] | None:
-        """Formulas that conflict, or imply the denied one, and the condition on which they do."""
+        """Find formulas that conflict or imply the denied one, and the condition for it."""
         conflict = self._plain_moves.conflict(formulas, denied)
         if conflict is None:
             return None
@@ -139,28 +138,27 @@ class JudgedWorld:
 
     @cached_property
     def _requests(self) -> list[str]:
-        """For each room a request that leads there and, as far as possible, is no more than its name."""
+        """For each room, a short request that leads there."""
         rooms = self._rooms
         return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
 
     # --- regexes
 
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
-        """Regexes of a requirement that match nothing, or visits that lead nowhere."""
+        """Find regexes of a requirement that match nothing, and visits that lead nowhere."""
         line = self._check(requirement).line
         for element in dict.fromkeys(elements(requirement.formula)):
             for text in [element.text] if element.options is None else [element.text, element.options]:
                 subject = f"{text} in {requirement.check}"
                 if not can_match(text, outer=text is element.options):
-                    message = f'no text was found that matches {text}, for which "{requirement.check}" looks'
+                    message = f'nothing was found that matches {text} in "{requirement.check}"'
                     yield self.finding("dead-regex", subject, message, line)
-                elif element.kind == GOTO and not self._leads_somewhere(text):
-                    there = f'in "{requirement.check}" and gets anywhere in {self.name}'
-                    message = f"no visit was found that matches {text} {there}"
+                elif element.kind == "goto" and not self._leads_somewhere(text):
+                    message = f'no room of {self.name} was found that matches {text} in "{requirement.check}"'
                     yield self.finding("dead-regex", subject, message, line)
 
     def by_prompt(self) -> list[JudgedWorld]:
-        """The same world with what each prompt asks for, once where two ask for the same."""
+        """The world with the requirements of each prompt; equal ones only once."""
         asked = {self.scenario.asked_by(prompt): None for prompt in range(len(self.task.prompts))}
         return [replace(self, scenario=scenario) for scenario in asked]
 
@@ -172,7 +170,7 @@ class JudgedWorld:
 
 
 def judged_worlds(task: Task) -> Iterator[JudgedWorld]:
-    """The worlds of a task, and behind them those of its ablation."""
+    """The worlds of a task, then those of its ablation."""
     for ablated in (False, True):
         for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
             yield JudgedWorld(task, number, scenario, ablated)

@@ -1,4 +1,4 @@
-"""Right programs, and the distinct mutants made of them."""
+"""Right programs and their distinct mutants."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from itertools import chain, zip_longest
 from codebotler.core.cachedproperty import cached_property
 from roboeval.mutation.operator import Context, Operator, operators_in
 from roboeval.mutation.operators import control_flow, counting, manipulation, misuse, navigation, speech
-from roboeval.mutation.program_tree import ProgramTree, changed, read
+from roboeval.mutation.program_tree import ProgramTree, apply_edit, read
 from roboeval.suites.load import Task
 from roboeval.suites.solutions import bare_diff, solutions
 
@@ -26,41 +26,41 @@ class Original:
 
     name: str
     program: str
-    claimed: bool = True  # to be right, by its author
+    claimed: bool = True  # whether its author claims that it is right
 
     @cached_property
     def tree(self) -> ProgramTree | None:
-        """Its tree; None if it has none."""
+        """The syntax tree; None if the program does not parse."""
         return read(self.program)
 
     @property
     def text(self) -> str:
-        """The text that all programs with the same tree share; the source if there is no tree."""
+        """The normalised text, equal for programs with the same tree; the source if there is no tree."""
         return self.program if self.tree is None else self.tree.text
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A program made by an operator."""
+    """A program that an operator has changed."""
 
     operator: str
     original: Original
-    program: str  # as `ast.unparse` writes it
+    program: str  # formatted by `ast.unparse`
 
     @cached_property
     def diff(self) -> str:
-        """The change as lines of a unified diff, without file names."""
+        """The change as a unified diff, without file names."""
         before, after = self.original.text.splitlines(), self.program.splitlines()
         return "\n".join([*difflib.unified_diff(before, after, lineterm="")][2:]) + "\n"
 
     @property
     def key(self) -> tuple[str, str]:
-        """Its key in the list of equivalent mutants."""
+        """The key in the list of equivalent mutants."""
         return self.operator, bare_diff(self.diff)
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """The right solutions of a task, and further programs; of those with the same tree the first."""
+    """The right solutions of a task and further programs; only the first of those with the same tree."""
     right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
     for original in chain(right, further):
@@ -71,28 +71,28 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
 def mutants(
     right: Sequence[Original], context: Context, operators: Iterable[Operator] = OPERATORS
 ) -> Iterator[Mutant]:
-    """All mutants of right programs: of those with the same tree the first, and no right program again."""
+    """All distinct mutants of right programs that are not themselves right programs."""
     seen = {original.text for original in right}
     for original in right:
         if (tree := original.tree) is None:
             continue
         for operator in operators:
             for edit in operator.edits(tree, context):
-                program = changed(tree, edit)
+                program = apply_edit(tree, edit)
                 if program is not None and program not in seen:
                     seen.add(program)
                     yield Mutant(operator.name, original, program)
 
 
-def drawn(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
-    """Draw at most `most` mutants, evenly over the operators, whatever the order of `every`."""
+def sample_mutants(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
+    """Sample at most `most` mutants, evenly over the operators; the order of `every` does not matter."""
 
-    def lot(mutant: Mutant) -> bytes:
+    def random_key(mutant: Mutant) -> bytes:
         return hashlib.sha256(f"{seed}\n{mutant.program}".encode(errors="surrogatepass")).digest()
 
     by_operator: dict[str, list[Mutant]] = defaultdict(list)
     for mutant in every:
         by_operator[mutant.operator].append(mutant)
-    shuffled = [sorted(by_operator[name], key=lot) for name in sorted(by_operator)]
+    shuffled = [sorted(by_operator[name], key=random_key) for name in sorted(by_operator)]
     turns = zip_longest(*shuffled)
     return tuple([one for turn in turns for one in turn if one is not None][:most])

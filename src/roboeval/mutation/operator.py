@@ -1,4 +1,4 @@
-"""Mutation operators, and what they know of a task."""
+"""Mutation operators, and the context of a task that they use."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from roboeval.mutation.program_tree import Edit, ProgramTree, text_of
 
 @dataclass(frozen=True)
 class Context:
-    """The names in the worlds of a task, and its instruction."""
+    """The names in the worlds of a task, and its prompts."""
 
-    rooms: tuple[str, ...]  # but the start
-    people: tuple[str, ...]  # who have a room of their own; no instruction names others
+    rooms: tuple[str, ...]  # except starting rooms
+    people: tuple[str, ...]  # owners of rooms; instructions name no other people
     things: tuple[str, ...]
     prompts: tuple[str, ...]
 
     @classmethod
     def of(cls, worlds: Sequence[World], prompts: Sequence[str] = ()) -> Context:
-        """The context of a task."""
+        """Collect the context of a task."""
         starts = {world.robot for world in worlds}
         rooms = [room for world in worlds for room in world.rooms]
         owners = (re.fullmatch(r"(\w+)'s .+", room.name) for room in rooms)
@@ -37,7 +37,7 @@ class Context:
         )
 
     def idle_rooms(self, program: ProgramTree) -> tuple[str, ...]:
-        """The rooms whose names share no word with any text of a program."""
+        """The rooms whose names share no word with the strings of a program."""
         texts = filter(None, map(text_of, program.nodes))
         named = {word for text in texts for word in re.findall(r"\w+", text.lower())}
         return tuple(room for room in self.rooms if not named & set(re.findall(r"\w+", room.lower())))
@@ -50,22 +50,22 @@ Condition: TypeAlias = Callable[[Context], bool]
 
 @dataclass(frozen=True)
 class Operator:
-    """A mutation operator: one way in which models get a program wrong."""
+    """A mutation operator: a mistake that models make in programs."""
 
     name: str  # such as `drop-the-return`
     about: str
-    edits: Mutate  # each makes one mutant
+    edits: Mutate  # each edit makes one mutant
 
 
 def operators_in(module: ModuleType) -> Iterator[Operator]:
-    """The operators of a module: its public functions, each with its name and its docstring."""
+    """The operators of a module: its public functions."""
     for name, function in vars(module).items():
         if isfunction(function) and function.__module__ == module.__name__ and not name.startswith("_"):
             yield Operator(name.replace("_", "-"), function.__doc__ or "", function)
 
 
 def where(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Limit an operator to tasks that meet a condition; the others leave open what it changes."""
+    """Restrict an operator to tasks that meet a condition, since others do not require what it changes."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)
@@ -78,13 +78,13 @@ def where(condition: Condition) -> Callable[[Mutate], Mutate]:
 
 
 def asks(pattern: str) -> Condition:
-    """The condition that some phrasing matches; what none asks for, a program may leave out."""
+    """The condition that a prompt matches, since a program may omit what no prompt asks for."""
     compiled = re.compile(pattern)
     return lambda context: not context.prompts or any(map(compiled.search, context.prompts))
 
 
 def others(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
-    """The names that follow a name, starting over at the end."""
+    """The names that follow a name in a cyclic list."""
     folded = [one.lower() for one in names]
     at = folded.index(name.lower()) if name.lower() in folded else -1
     around = [*names[at + 1 :], *names[: max(at, 0)]]

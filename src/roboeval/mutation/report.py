@@ -22,7 +22,7 @@ ABOUT = {operator.name: operator.about for operator in OPERATORS}
 
 
 def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
-    """The score of each task."""
+    """A table of scores by task."""
     heads = "task", "worlds", "originals", "mutants", "killed", "equivalent", "survived", "score", "of all"
     table = _table(*heads, "same traces", "crashes")
     for score in scores:
@@ -39,7 +39,7 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
 
 
 def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
-    """The mutants of each operator that change behaviour, by status."""
+    """A table of the mutants that change behaviour, by operator."""
     table = _table("operator", "mutants", "killed", "survived")
     tried = (one for score in scores for one in score.mutants)
     counts = Counter((one.mutant.operator, one.result.status) for one in tried)
@@ -51,7 +51,7 @@ def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
 
 
 def survivors_view(score: MutationScore) -> RenderableType:
-    """The survivors of a task, each with its operator and its diff."""
+    """The surviving mutants of a task with their operators and diffs."""
     parts: list[RenderableType] = []
     for number, mutant in enumerate(score.survivors, 1):
         of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
@@ -70,7 +70,7 @@ def _table(*heads: str) -> Table:
     return table
 
 
-def keep(scores: Sequence[MutationScore], folder: Path) -> None:
+def write_scores(scores: Sequence[MutationScore], folder: Path) -> None:
     """Write scores.json, mutants/TASK.jsonl and survivors/TASK.yaml."""
     for score in scores:
         rows = b"".join(to_line(one.row()) for one in score.mutants)
@@ -84,14 +84,14 @@ def keep(scores: Sequence[MutationScore], folder: Path) -> None:
 
 
 def to_yaml(mutants: Iterable[Mutant]) -> str:
-    """A list of equivalent mutants whose reasons are to be filled in."""
+    """A list of equivalent mutants in YAML, with empty reasons."""
     entries = [{"operator": one.operator, "diff": one.diff, "because": ""} for one in mutants]
     listed = {"equivalent_mutants": entries}
     return yaml.dump(listed, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes texts of several lines line by line."""
+    """Writes multi-line strings as blocks."""
 
 
 def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:

@@ -1,4 +1,4 @@
-"""The status of each mutant of a task, and its mutation score."""
+"""The status of mutants, and the mutation score of a task."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from roboeval.mutation.mutants import Mutant, Original
 
-ENOUGH = 60  # mutants that change behaviour, for a score to mean something
-MOST_EQUIVALENT = 0.15  # share of them
+ENOUGH = 60  # mutants that change behaviour, for a reliable score
+MOST_EQUIVALENT = 0.15  # share of mutants that change behaviour
 
 
 class MutantStatus(StrEnum):
@@ -22,25 +22,25 @@ class MutantStatus(StrEnum):
     CRASHES = "crashes"
 
 
-CHANGED = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQUIVALENT  # behaviour, without crashing
+CHANGED = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQUIVALENT
 
 
-class Result(NamedTuple):
+class MutantResult(NamedTuple):
     """The status of a program, and the reason."""
 
     status: MutantStatus
-    world: str | None = None  # in which it was killed
-    why: str | None = None  # the check that failed there, or the error; of an equivalent mutant the reason
+    world: str | None = None  # the world in which it was killed
+    why: str | None = None  # the failed check or the error; the reason of an equivalent mutant
 
 
 class TriedMutant(NamedTuple):
     """A mutant and its result."""
 
     mutant: Mutant
-    result: Result
+    result: MutantResult
 
     def row(self) -> dict[str, Any]:
-        """A row of mutants.jsonl."""
+        """The row in mutants.jsonl."""
         return {
             "operator": self.mutant.operator,
             "original": self.mutant.original.name,
@@ -55,9 +55,9 @@ class MutationScore:
     """How many mutants of a task the checks kill."""
 
     task: str
-    worlds: int  # in which each mutant was tried
+    worlds: int
     right: tuple[Original, ...]
-    wrong: tuple[tuple[Original, Result], ...]  # by the suite's checks; no mutants are made of these
+    wrong: tuple[tuple[Original, MutantResult], ...]  # originals that fail the suite's checks
     mutants: tuple[TriedMutant, ...]
 
     def count(self, *statuses: MutantStatus) -> int:
@@ -66,12 +66,12 @@ class MutationScore:
 
     @property
     def score(self) -> float | None:
-        """The share of wrong mutants that are killed: equivalent ones are left out."""
+        """The share of killed mutants, without equivalent ones."""
         return self._killed_of(MutantStatus.KILLED, MutantStatus.SURVIVED)
 
     @property
     def score_of_all(self) -> float | None:
-        """The share of killed mutants among all that change behaviour, also equivalent ones."""
+        """The share of killed mutants among all that change behaviour, including equivalent ones."""
         return self._killed_of(*CHANGED)
 
     def _killed_of(self, *statuses: MutantStatus) -> float | None:
@@ -80,7 +80,7 @@ class MutationScore:
 
     @property
     def survivors(self) -> tuple[Mutant, ...]:
-        """The mutants that survive, and that no file explains."""
+        """The mutants that survive and are not listed as equivalent."""
         return tuple(one.mutant for one in self.mutants if one.result.status is MutantStatus.SURVIVED)
 
     @property
@@ -89,7 +89,7 @@ class MutationScore:
         changing, equivalent = self.count(*CHANGED), self.count(MutantStatus.EQUIVALENT)
         found = []
         if changing < ENOUGH:
-            found.append(f"{self.task}: only {changing} mutants do something else than their original")
+            found.append(f"{self.task}: only {changing} mutants change behaviour")
         if equivalent > MOST_EQUIVALENT * changing:
             share = f"more than {MOST_EQUIVALENT:.0%}"
             found.append(f"{self.task}: {equivalent} of {changing} mutants are equivalent, {share}")

@@ -12,17 +12,17 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judge, robot_in
-from roboeval.mutation.mutants import Mutant, Original, drawn, mutants, originals
+from roboeval.mutation.mutants import Mutant, Original, mutants, originals, sample_mutants
 from roboeval.mutation.operator import Context
-from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMutant
+from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, TriedMutant
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import equivalent_mutants
 
-WORLDS = 200  # to draw by default
-AT_ONCE = 16  # worlds in which a mutant runs before its outcomes are looked at
+WORLDS = 200  # sampled by default
+AT_ONCE = 16  # worlds per batch; a killed mutant skips further batches
 CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
-Watch: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # passes on a number of items
+ProgressBar: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # items, label and count
 
 
 def mutation_score(
@@ -34,14 +34,12 @@ def mutation_score(
     worlds: int | None = None,
     most: int = 400,
     seed: int = 1,
-    watched: Watch = lambda items, *_: iter(items),
+    progress: ProgressBar = lambda items, *_: iter(items),
 ) -> MutationScore:
-    """Run the solutions of a task and further originals, make mutants of the right ones, and try these.
+    """Run the solutions of a task and further originals, and judge mutants of the right ones.
 
-    An original is right if it does what some prompt asks for. Its mutants are judged by all prompts for which
-    it is right: one that is wrong for any of these is a wrong mutant.
-
-    Raises UserError if a number of worlds is given, but the suite's are written by hand.
+    An original is right if it satisfies some prompt. A mutant is killed if it fails any prompt that its
+    original satisfies. Raises UserError if `worlds` is given for a suite with listed worlds.
     """
     scenarios = worlds_of(suite, task, worlds, seed)
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
@@ -53,27 +51,27 @@ def mutation_score(
     def outcomes(some: Sequence[Original]) -> list[tuple[Outcome, ...]]:
         return [tuple(run(original.program)) for original in some]
 
-    def result(mutant: Mutant) -> Result:
+    def result(mutant: Mutant) -> MutantResult:
         original = mutant.original
         found = result_of(run(mutant.program), before[original], judges[original])
         if found.status is MutantStatus.SURVIVED and mutant.key in equivalent:
-            return Result(MutantStatus.EQUIVALENT, why=equivalent[mutant.key])
+            return MutantResult(MutantStatus.EQUIVALENT, why=equivalent[mutant.key])
         return found
 
     equivalent = equivalent_mutants(task)
     programs = originals(task, further)
     ran = pool.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
-    before = dict(zip(programs, watched(ran, f"running {task.name}", len(programs)), strict=True))
+    before = dict(zip(programs, progress(ran, f"running {task.name}", len(programs)), strict=True))
     asked = [tuple(one.asked_by(prompt) for one in scenarios) for prompt in range(len(task.prompts))]
     faults = {original: [fault_in(before[original], one) for one in asked] for original in programs}
-    judges = {one: _asked_by_fitting(scenarios, found) for one, found in faults.items() if None in found}
+    judges = {one: _satisfied(scenarios, found) for one, found in faults.items() if None in found}
     right = tuple(original for original in programs if original in judges)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
-    made = drawn(mutants(right, context), most, seed)
+    made = sample_mutants(mutants(right, context), most, seed)
     tried = pool.map_distinct(
         lambda some: [*map(result, some)], made, name=lambda mutant: digest(mutant.program)
     )
-    results = watched(tried, f"mutating {task.name}", len(made))
+    results = progress(tried, f"mutating {task.name}", len(made))
     return MutationScore(
         task=task.name,
         worlds=len(scenarios),
@@ -83,36 +81,33 @@ def mutation_score(
     )
 
 
-def _asked_by_fitting(scenarios: Sequence[Scenario], faults: Sequence[Result | None]) -> tuple[Scenario, ...]:
-    """The scenarios with what those prompts ask for by which an original has no fault."""
+def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | None]) -> tuple[Scenario, ...]:
+    """The scenarios with the requirements of the prompts that an original satisfies."""
     fitting = [prompt for prompt, fault in enumerate(faults) if fault is None]
     return tuple(one.asked_by(*fitting) for one in scenarios)
 
 
 def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
-    """The worlds in which mutants are tried; drawn ones never come from the suite's own seed."""
+    """The worlds for mutants; sampled ones use another seed than the suite."""
     if suite.worlds is not None:
         return suite.with_worlds(count or WORLDS, seed + 1 + (suite.seed or 0)).tasks[task.name].scenarios
     if count is not None:
-        raise UserError(
-            f'the worlds of the suite "{suite.name}" are written out, and no further ones can be made; '
-            "leave --worlds out"
-        )
+        raise UserError(f'the worlds of the suite "{suite.name}" are written by hand; omit --worlds')
     return task.scenarios
 
 
-def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> Result | None:
-    """The first failure of an original; None for a right one."""
+def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:
+    """The first failure of an original; None if it is right."""
     verdicts = map(judge, outcomes, scenarios)
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 
 
 def result_of(
     outcomes: Iterable[Outcome], before: Sequence[Outcome], scenarios: Sequence[Scenario]
-) -> Result:
-    """The result of one mutant, whose outcomes are read until a check kills it.
+) -> MutantResult:
+    """Judge a mutant; outcomes are read until a check kills it.
 
-    One that crashes is tried further: if it crashes in each world, no check is needed to find it wrong.
+    A mutant that crashes in every world is not counted as killed, since no check is needed to reject it.
     """
     crashes: list[Verdict] = []
     changed = False
@@ -126,13 +121,13 @@ def result_of(
     if crashes:
         killed = _killed(crashes[0])
         return killed._replace(status=MutantStatus.CRASHES) if len(crashes) == len(scenarios) else killed
-    return Result(MutantStatus.SURVIVED if changed else MutantStatus.SAME)
+    return MutantResult(MutantStatus.SURVIVED if changed else MutantStatus.SAME)
 
 
-def _killed(verdict: Verdict) -> Result:
+def _killed(verdict: Verdict) -> MutantResult:
     error = verdict.outcome.error
     why = verdict.failed[0].text if verdict.failed else "" if error is None else error.kind
-    return Result(MutantStatus.KILLED, verdict.world, why)
+    return MutantResult(MutantStatus.KILLED, verdict.world, why)
 
 
 def _alike(one: Outcome, other: Outcome) -> bool:

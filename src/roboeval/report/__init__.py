@@ -1,4 +1,4 @@
-"""The report: figures, tables and one page about what models can do and why they fail.
+"""The report: figures, tables and one page about how models do and why they fail.
 
-Start with `writing.py`, which puts the sections together; their words are in `page.yaml`.
+Start with `writing.py`, which assembles the sections; `page.yaml` holds their text.
 """

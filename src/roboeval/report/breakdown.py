@@ -1,4 +1,4 @@
-"""Sections on the abilities that tasks take, and on the phrasing of instructions."""
+"""Sections on the abilities that tasks need, and on the phrasing of instructions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.breakdown import by_ability, coming_back, phrasing, spread
+from roboeval.analysis.breakdown import by_ability, compare_phrasings, compare_report_back, spread_by_task
 from roboeval.analysis.counts import prompt_scores
 from roboeval.evaluation.failures import CLASSES
 from roboeval.report.runs import JudgedRun, tasks_of
@@ -21,13 +21,13 @@ MOST_SENTENCES = 20
 
 
 def abilities(runs: Sequence[JudgedRun]) -> Section:
-    """Failures by what a task takes (paper, section V.B)."""
-    back = coming_back_sheet(runs)
-    return section("abilities", ability_sheet(runs), Prose(coming_back_sentences(back)), back)
+    """Failures by the abilities that a task needs (paper, section V.B)."""
+    table = report_back_sheet(runs)
+    return section("abilities", ability_sheet(runs), Prose(report_back_sentences(table)), table)
 
 
 def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """pass@1 and causes by the abilities that tasks take."""
+    """pass@1 and causes of failures by ability."""
     order: list[str] = [ability for task in runs[0].suite.tasks.values() for ability in task.abilities]
     found = {(row[0], run.name): row[1:] for run in runs for row in by_ability(run.table, run.suite)}
     rows: list[list[Cell]] = []
@@ -37,29 +37,29 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     return sheet("abilities", rows, shares=[one.plural for one in CLASSES.values()])
 
 
-def coming_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Tasks that end with a report against the others."""
+def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
+    """Tasks that end with a report, compared with the others."""
     rows: list[list[Cell]] = []
     for run in runs:
-        for reports, completions, failed, away, lost, passed in coming_back(run.results).iter_rows():
+        for reports, completions, failed, away, lost, passed in compare_report_back(run.results).iter_rows():
             tasks = WITH_REPORT if reports else "others"
             shares = [count / failed if failed and count is not None else None for count in (away, lost)]
             rows.append([run.name, tasks, completions, passed, failed, away, shares[0], lost, shares[1]])
     return sheet("coming-back", rows)
 
 
-def coming_back_sentences(table: Sheet) -> list[str]:
+def report_back_sentences(table: Sheet) -> list[str]:
     """Sentences about tasks that end with a report."""
     return [
-        f"Of {failed:,} failures of {name} in tasks that end with a report, {_known(away)} left and never "
-        f"came back, and {lost:,} went to a room that does not exist."
+        f"{name}: of {failed:,} failures in tasks that end with a report, {_count_or_unknown(away)} never "
+        f"returned and {lost:,} went to a room that does not exist."
         for name, tasks, _, _, failed, away, _, lost, _ in table.rows[:MOST_SENTENCES]
         if tasks == WITH_REPORT and failed
     ]
 
 
-def _known(count: Any) -> str:  # noqa: ANN401 - of a table's cell
-    return "an unknown number (an earlier version judged them)" if count is None else f"{count:,}"
+def _count_or_unknown(count: int | None) -> str:
+    return "an unknown number (judged by an earlier version)" if count is None else f"{count:,}"
 
 
 # --- phrasing
@@ -71,39 +71,39 @@ def phrasings(runs: Sequence[JudgedRun]) -> Section:
 
 
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """How far the prompts of each task and run lie apart, the widest first."""
+    """The spread of pass@1 over the prompts of each task and run, the widest first."""
     order = tasks_of(runs)
-    found = [(run, row) for run in runs for row in spread(run.table).iter_rows()]
+    found = [(run, row) for run in runs for row in spread_by_task(run.table).iter_rows()]
     rows = []
     for run, (task, width, *ends) in sorted(found, key=lambda pair: (-pair[1][1], order.index(pair[1][0]))):
         texts = [run.instructions.get((task, prompt)) for prompt in (ends[0], ends[2])]
-        rows.append([task, run.name, width, *ends, *only(*texts)])
+        rows.append([task, run.name, width, *ends, *distinct_words(*texts)])
     return sheet("spread", rows)
 
 
-def only(one: str | None, other: str | None) -> tuple[str, str]:
-    """The words that only the one text has, and those that only the other has."""
+def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
+    """The words that only the first text has, and those that only the second has."""
     if one is None or other is None:
         return NOT_RECORDED, NOT_RECORDED
     words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))
     first, second = map(dict.fromkeys, words)
-    return _listed([w for w in first if w not in second]), _listed([w for w in second if w not in first])
+    return _join([w for w in first if w not in second]), _join([w for w in second if w not in first])
 
 
-def _listed(words: Sequence[str]) -> str:
+def _join(words: Sequence[str]) -> str:
     more = len(words) - MOST_WORDS
     return " ".join(words[:MOST_WORDS]) + (f" and {more} more" if more > 0 else "")
 
 
 def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Each prompt against the others of its task, the one that hurts most first."""
+    """Each prompt compared with the mean of its task, the most harmful first."""
     order = tasks_of(runs)
     scores = [prompt_scores(run.table).with_columns(model=pl.lit(at)) for at, run in enumerate(runs)]
-    found = phrasing(pl.concat(scores)).rows()
+    found = compare_phrasings(pl.concat(scores)).rows()
     rows = sorted(found, key=lambda row: (row[2], order.index(row[0]), row[1]))
     return sheet("phrasings", [[*row, _instructions(runs, row[:2])] for row in rows])
 
 
-def _instructions(runs: Sequence[JudgedRun], key: Any) -> str:  # noqa: ANN401 - of a table's row
+def _instructions(runs: Sequence[JudgedRun], key: Any) -> str:  # noqa: ANN401 - cells of a table have any type
     found = {run.instructions.get(key) for run in runs} - {None}
     return " / ".join(sorted(map(str, found))) or NOT_RECORDED

@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.cost import budgets, spent
+from roboeval.analysis.cost import budgets, cost_of
 from roboeval.analysis.metrics import threshold_curve
-from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resampled
+from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
 from roboeval.evaluation.runs.table import Price
 from roboeval.report import figures
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Cell, Picture, Section, Sheet, section, sheet
+from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, sheet
 
 
 def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
-    """Results by limit of retries, of runs whose programs were checked."""
+    """Results by limit of retries, for runs with checked programs."""
     checked = {run.name: run.trials for run in runs if run.trials}
     points = {name: curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
     steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
     parts = (
-        Picture("rejection-sampling", lambda: figures.limits(points, figures.most_completions(runs))),
+        ReportFigure("rejection-sampling", lambda: figures.limits(points, figures.most_completions(runs))),
         retries_sheet(checked),
-        Picture("accepted", lambda: figures.accepted(shares)),
+        ReportFigure("accepted", lambda: figures.accepted(shares)),
         curves_sheet(points),
         sheet("accepted", steps, shares=[*shares]),
     )
@@ -31,8 +31,8 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
 
 
 def curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
-    """For each limit of retries, the share of prompts by threshold of pass@1."""
-    found = {limit: resampled(prompts, limit).by_prompt for limit in LIMITS}
+    """Share of prompts by threshold of pass@1, for each limit of retries."""
+    found = {limit: resample(prompts, limit).by_prompt for limit in LIMITS}
     return {limit: threshold_curve([one.passed for one in each]) for limit, each in found.items()}
 
 
@@ -40,14 +40,14 @@ def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
     """pass@1 of each run at each limit of retries."""
     rows: list[list[Cell]] = []
     for name, prompts in checked.items():
-        for at in (resampled(prompts, limit) for limit in LIMITS):
+        for at in (resample(prompts, limit) for limit in LIMITS):
             passed = at.passed.mean, at.passed.low, at.passed.high
             rows.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted])
     return sheet("rejection-sampling", rows)
 
 
 def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]]]) -> Sheet:
-    """The curves by threshold."""
+    """The curves of rejection sampling as a table."""
     rows = [
         [name, limit, *point]
         for name, of_limits in points.items()
@@ -61,39 +61,39 @@ def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]
 
 
 def costs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
-    """The cost of programs, as far as runs record it."""
+    """The cost of programs, as far as the runs record it."""
     return section("cost", cost_sheet(runs, prices), budget_sheet(runs, prices))
 
 
 def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """The cost of each run, and of each of its programs that pass."""
-    found = [(run.name, spent(run.table, price_of(run, prices))) for run in runs]
+    """The cost of each run, in total and per passing program."""
+    found = [(run.name, cost_of(run.table, price_of(run, prices))) for run in runs]
     known = [one for one in found if one[1].input_tokens is not None or one[1].seconds is not None]
     return sheet("cost", [[name, *one] for name, one in known])
 
 
-def in_words(run: JudgedRun, prices: Mapping[str, Price]) -> str:
-    """The cost of a program that passes, in words; empty where nothing is known."""
-    took = spent(run.table, price_of(run, prices))
+def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
+    """The cost per passing program, in words; empty where nothing is recorded."""
+    cost = cost_of(run.table, price_of(run, prices))
     each = []
-    if took.money_per_pass is not None:
-        each.append(f"${took.money_per_pass:.3g}")
-    if took.tokens_per_pass is not None:
-        each.append(f"{took.tokens_per_pass:,.0f} tokens")
-    if took.seconds_per_pass is not None:
-        each.append(f"{took.seconds_per_pass:,.1f} s")
+    if cost.money_per_pass is not None:
+        each.append(f"${cost.money_per_pass:.3g}")
+    if cost.tokens_per_pass is not None:
+        each.append(f"{cost.tokens_per_pass:,.0f} tokens")
+    if cost.seconds_per_pass is not None:
+        each.append(f"{cost.seconds_per_pass:,.1f} s")
     return f"Cost per pass: {', '.join(each)}" if each else ""
 
 
 def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """The yield of a budget at each limit of retries, of runs whose programs were checked."""
+    """Passing programs per budget at each limit of retries, for runs with checked programs."""
     checked = [run for run in runs if run.trials]
     rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
     return sheet("budget", rows)
 
 
 def read_prices(texts: Sequence[str]) -> dict[str, Price]:
-    """Read `MODEL=INPUT/OUTPUT`, by model."""
+    """Read prices written as `MODEL=INPUT/OUTPUT`; return them by model."""
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
@@ -102,7 +102,7 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
         except ValueError:
             price = None
         if price is None or not model:
-            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, each for a million tokens')
+            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, per million tokens')
         if model in prices:
             raise UserError(f'--price names "{model}" twice; give one price')
         prices[model] = price
@@ -110,12 +110,12 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def price_of(run: JudgedRun, prices: Mapping[str, Price]) -> Price | None:
-    """The price given for a run's folder, or else for its model."""
+    """The price given for a run's folder, its name or its model."""
     return next((prices[name] for name in (run.folder, run.name, run.model or "") if name in prices), None)
 
 
 def expect_known(prices: Mapping[str, Price], runs: Sequence[JudgedRun]) -> None:
-    """Refuse a price of a model that wrote no run."""
+    """Raise a UserError for a price whose model wrote no run."""
     for model, price in prices.items():
         if not any(price_of(run, {model: price}) for run in runs):
             names = ", ".join(run.name for run in runs)

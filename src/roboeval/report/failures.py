@@ -1,38 +1,38 @@
-"""Sections on failures: causes, groups of similar ones, and verdicts by another suite."""
+"""Sections on failures: causes, groups of similar failures, and verdicts of another suite."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboeval.analysis.cluster import Cluster, clusters, groups
+from roboeval.analysis.cluster import Cluster, describe_groups, group_failures
 from roboeval.analysis.counts import tally_of
-from roboeval.analysis.summary import ALL, Causes, causes, cut_off
-from roboeval.analysis.summary import failures as counted_failures
-from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences, verdict_changes
+from roboeval.analysis.summary import ALL, Causes, causes, cut_off_replies
+from roboeval.analysis.summary import failures as count_failures
+from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun, coverage_of
-from roboeval.report.sheets import Cell, Groups, Picture, Prose, Section, Sheet, note, section, sheet
+from roboeval.report.sheets import Cell, Groups, Prose, ReportFigure, Section, Sheet, note, section, sheet
 from roboeval.suites.task import check_label
 
-MOST, FEWEST, ALTOGETHER = 100, 4, 200  # groups to show of a run, and of all runs
-MOST_REVERSALS = 100  # groups of each run
+MOST, FEWEST, ALTOGETHER = 100, 4, 200  # groups on the page: at most and at least per run, and in all
+MOST_REVERSALS = 100  # groups in the table, per run
 
 
 # --- causes
 
 
 def why(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
-    """How completions end (paper, section V.B)."""
+    """Causes of failures (paper, section V.B)."""
     found = all_causes(runs, with_published=with_published)
-    picture = Picture("causes", lambda: figures.causes(found), coverage_of(runs))
-    notes = Prose(beside_notes(runs) if with_published else [])
-    return section("causes", picture, notes, causes_sheet(found))
+    figure = ReportFigure("causes", lambda: figures.causes(found), coverage_of(runs))
+    notes = Prose(published_notes(runs) if with_published else [])
+    return section("causes", figure, notes, causes_sheet(found))
 
 
 def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:
-    """The causes of each run, each followed by the published ones if they are wanted and known."""
+    """The causes of each run, followed by the published ones if requested and known."""
     found: list[tuple[str, Causes]] = []
     for run in runs:
         found.append((run.name, causes(tally_of(run.table))))
@@ -42,7 +42,7 @@ def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple
 
 
 def most_frequent(run: JudgedRun) -> str:
-    """The most frequent kind of failure with its share of all completions, in words; empty if none fails."""
+    """Describe the most frequent kind of failure and its share of all completions; empty if none fails."""
     counts = {key: count for key, count in causes(tally_of(run.table)).counts.items() if key[1] != ALL}
     if not counts:
         return ""
@@ -51,13 +51,13 @@ def most_frequent(run: JudgedRun) -> str:
 
 
 def warnings(run: JudgedRun) -> list[str]:
-    """What a reader of the run's numbers must know: many replies that were cut off."""
-    warning = cut_off(counted_failures(tally_of(run.table)), run.results.scope).warning
+    """Warn if many replies of a run were cut off."""
+    warning = cut_off_replies(count_failures(tally_of(run.table)), run.results.scope).warning
     return [] if warning is None else [f"{warning}."]
 
 
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
-    """All shares and counts."""
+    """Shares and counts of all causes."""
     rows = [
         [name, of, kind, one.counts.get((of, kind)), share]
         for name, one in found
@@ -67,39 +67,39 @@ def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
     return sheet("causes", rows)
 
 
-def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
-    """Caveats where published causes stand beside ours."""
+def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
+    """Caveats on published causes."""
     known = [run for run in runs if paper.model_of(run) is not None]
     if not known:
-        return ["None of these runs names a model of the paper, so no published causes are shown."]
+        return ["None of these runs uses a model of the paper, so no published causes are shown."]
     tasks = {*paper.published()["pass_at_1"]}
     parts = ", ".join(run.name for run in known if {score.task for score in run.scores} != tasks)
-    more = f"Published causes are of all {len(tasks)} tasks of the paper, which is more than {parts} did."
-    return [*paper.taken_for(runs), note("two-sums"), *([more] if parts else [])]
+    more = f"Published causes cover all {len(tasks)} tasks of the paper; fewer were judged for {parts}."
+    return [*paper.recognised_models(runs), note("two-sums"), *([more] if parts else [])]
 
 
 # --- groups
 
 
-def alike(runs: Sequence[JudgedRun]) -> Section:
-    """Groups of failures of all runs; of each run, the page shows the largest with their programs."""
+def similar_failures(runs: Sequence[JudgedRun]) -> Section:
+    """Groups of similar failures; the page shows the programs of the largest groups of each run."""
     most = max(FEWEST, min(MOST, ALTOGETHER // len(runs)))
     every: list[tuple[str, Cluster]] = []
     shown: list[tuple[str, Cluster]] = []
     notes: list[str] = []
     for run in runs:
-        together = groups(map(run.results.failed_row, run.results.failed), run.results.programs)
-        named = [(run.name, one) for one in clusters(together, run.results)]
+        groups = group_failures(map(run.results.failed_row, run.results.failed), run.results.programs)
+        named = [(run.name, one) for one in describe_groups(groups, run.results)]
         every += named
         shown += named[:most]
         if len(named) > most:
-            notes.append(f"{run.name}: {most:,} of {len(named):,} groups are shown; the table below has all.")
+            notes.append(f"{run.name}: {most:,} of {len(named):,} groups are shown here; the table has all.")
     about = Prose([note("groups"), *notes] if shown else [])
     return section("failures", about, Groups(shown), groups_sheet(every))
 
 
 def groups_sheet(every: Sequence[tuple[str, Cluster]]) -> Sheet:
-    """The groups as numbers."""
+    """All groups as a table."""
     rows = [
         [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
         for name, one in every
@@ -116,27 +116,29 @@ def _cells(one: Cluster) -> list[Cell]:
 # --- other checks
 
 
-def beside(runs: Sequence[JudgedRun]) -> Section:
-    """What the verdicts of another suite change."""
-    found = [verdict_changes(run.name, run.results, run.beside) for run in runs if run.beside is not None]
+def other_suite(runs: Sequence[JudgedRun]) -> Section:
+    """Verdicts of another suite, compared with those of the report's own."""
+    found = [
+        verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
+    ]
     sheets = changes_sheet(found), changed_tasks_sheet(found), reversals_sheet(found)
     return section("beside", Prose(sentences(found)), *sheets)
 
 
 def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """pass@1 by both suites."""
+    """pass@1 under both suites."""
     here, there = ({one.name: one.pass_at_1[side] for one in found} for side in (0, 1))
     rows: list[list[Cell]] = []
     for one in found:
         before, after = one.pass_at_1
         over = one.comparison.over_tasks
-        places = place(one.name, here), place(one.name, there)
-        rows.append([one.name, before, after, after - before, over.low, over.high, *places])
+        ranks = rank(one.name, here), rank(one.name, there)
+        rows.append([one.name, before, after, after - before, over.low, over.high, *ranks])
     return sheet("beside", rows)
 
 
 def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """How many completions pass by which of both suites."""
+    """How many completions of each task pass under which suite."""
     rows = [
         [task.task, one.name, task.both, task.first_only, task.second_only, task.neither]
         for one in found
@@ -146,7 +148,7 @@ def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
 
 
 def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Groups of completions that pass by one of the suites only."""
+    """Groups of completions that pass under one suite only."""
     rows: list[list[Cell]] = []
     notes: list[str] = []
     for one in found:
@@ -156,6 +158,6 @@ def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
         for suite, group in those[:MOST_REVERSALS]:
             rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
         if (left := len(those) - MOST_REVERSALS) > 0:
-            more = f"{left:,} more groups are left out; `roboeval compare --suites` shows them."
+            more = f"{left:,} more groups are not shown; list them with `roboeval compare --suites`."
             notes.append(f"{one.name}: {more}")
     return sheet("reversals", rows, notes=notes)

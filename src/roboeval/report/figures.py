@@ -38,26 +38,17 @@ from roboeval.report.drawing import (
 from roboeval.report.runs import JudgedRun, tasks_of
 
 MOST_COLOURS = len(COLOURS)
-POWERS = (0.1, 0.01, 0.001)  # that an axis of thresholds marks
-SHORT_AXIS, BETWEEN = 20, (0.5, 0.2)  # completions up to which it has room for these, too
-APART = 1.6  # ratio of two marks on it that can be told apart
-HATCHES = (
-    "",
-    "////",
-    "....",
-    "\\\\\\\\",
-    "xxxx",
-    "----",
-    "",
-    "++++",
-)  # of bars, for those who see no colours
-A_ROW = 8  # tasks beside each other
-FEWEST = 4  # tasks to leave room for, lest a single bar fill a page
-SHORT_NAME = 16  # letters up to which two names fit beside each other below a narrow figure
-BAR = 0.82  # of the room that a task has
-MOST_PANELS = 3  # of kinds of failures beside each other, with the names of the kinds between them
-MOST_NUMBERS = 14  # rows or columns up to which each cell of a table has its number
-DARK_FROM = 0.75  # the share from which white is read better than black
+POWERS = (0.1, 0.01, 0.001)  # labelled on an axis of thresholds
+SHORT_AXIS, BETWEEN = 20, (0.5, 0.2)  # more labels, if prompts have at most 20 completions
+APART = 1.6  # smallest ratio of two labels that do not overlap
+HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "", "++++")  # distinguish bars without colours
+A_ROW = 8  # tasks per row
+FEWEST = 4  # leave room for this many tasks, so that a single bar does not fill the page
+SHORT_NAME = 16  # letters; two names of this length fit side by side below a narrow figure
+BAR = 0.82  # share of a task's width that its bars fill
+MOST_PANELS = 3  # panels side by side with labels between them
+MOST_NUMBERS = 14  # rows or columns; cells of larger tables have no numbers
+DARK_FROM = 0.75  # cells with larger shares need white text
 
 Points: TypeAlias = Sequence[tuple[float, float]]
 Cells: TypeAlias = Sequence[Sequence[float | None]]
@@ -67,7 +58,7 @@ Cells: TypeAlias = Sequence[Sequence[float | None]]
 
 
 def overall_scores(runs: Sequence[JudgedRun]) -> Figure:
-    """pass@1 of each run over all prompts, with its interval over tasks."""
+    """Draw pass@1 of each run over all prompts, with its interval over tasks."""
     figure = new_figure(WIDE, 0.62 + 0.21 * len(runs))
     axes = figure.add_subplot()
     for at, run in enumerate(runs):
@@ -76,16 +67,15 @@ def overall_scores(runs: Sequence[JudgedRun]) -> Figure:
         if passed.is_known:
             ends = [[passed.mean - passed.low], [passed.high - passed.mean]]
             axes.errorbar(passed.mean, at, xerr=ends, **_whisker(2.5))
-        told = f"{passed.mean:.3f}  ({passed.ends()})"
-        beside = (1.02, at), axes.get_yaxis_transform()
-        axes.text(*beside[0], told, transform=beside[1], va="center", fontsize=7)
+        label = f"{passed.mean:.3f}  ({passed.ends()})"
+        axes.text(1.02, at, label, transform=axes.get_yaxis_transform(), va="center", fontsize=7)
     axes.set_yticks(range(len(runs)), [short_name(run.name, 34) for run in runs])
     axes.set_ylim(len(runs) - 0.5, -0.5)
     axes.tick_params(axis="y", left=False, length=0)
     axes.set_xlim(0, 1)
     axes.set_xticks([0, 0.25, 0.5, 0.75, 1])
     axes.grid(visible=True, axis="x")
-    axes.set_xlabel("pass@1 over all prompts, with its 95% interval over tasks")
+    axes.set_xlabel("pass@1 over all prompts, with 95% confidence intervals over tasks")
     return figure
 
 
@@ -94,7 +84,7 @@ def _whisker(cap: float) -> dict[str, Any]:
 
 
 def bars(runs: Sequence[JudgedRun]) -> Figure:
-    """pass@1 by task and model, with intervals over prompts, and the ablated tasks beside it."""
+    """Draw pass@1 by task and model, with intervals over prompts, and next to it the ablated tasks."""
     tasks = tasks_of(runs)
     there = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in there]
@@ -103,8 +93,8 @@ def bars(runs: Sequence[JudgedRun]) -> Figure:
     lines = math.ceil(len(tasks) / A_ROW)
     sides = [("(a) all requirements", [run.scores for run in runs], _in_lines(tasks, lines))]
     if ablated:
-        alone = [run.ablated_scores for run in runs]
-        sides.append(("(b) common sense only", alone, _in_lines(ablated, lines)))
+        ablated_scores = [run.ablated_scores for run in runs]
+        sides.append(("(b) common sense only", ablated_scores, _in_lines(ablated, lines)))
     widths = [len(sides[0][2][0]), *([max(2, len(ablated) / lines)] if ablated else [])]
     figure = new_figure(WIDE, 1.75 * lines + 0.45)
     grid = figure.add_gridspec(lines, len(sides), width_ratios=widths)
@@ -157,32 +147,32 @@ def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[
         zeros = [place for place, mean in zip(places, means, strict=True) if mean == 0]
         if zeros:
             axes.plot(zeros, [0] * len(zeros), "o", color=COLOURS[number], markersize=2.2, clip_on=False)
-    beside = (room - len(tasks)) / 2 if len(tasks) < FEWEST else 0
-    axes.set_xlim(-0.5 - beside, room - 0.5 - beside)
+    margin = (room - len(tasks)) / 2 if len(tasks) < FEWEST else 0
+    axes.set_xlim(-0.5 - margin, room - 0.5 - margin)
     axes.set_ylim(0, 1.03)
     axes.set_yticks([0, 0.5, 1])
     axes.grid(visible=True, axis="y")
     axes.set_xticks(range(len(tasks)), [_two_lines(task) for task in tasks])
-    axes.tick_params(axis="x", bottom=False, length=0, labelsize=6.5 if room > 6 else 7)  # noqa: PLR2004 - many labels
+    axes.tick_params(axis="x", bottom=False, length=0, labelsize=6.5 if room > 6 else 7)  # noqa: PLR2004 - smaller labels for many tasks
 
 
 WORST_AND_BEST = "worst and best prompt"
 
 
 def _mark(size: float) -> dict[str, Any]:
-    """How a prompt of a task is marked."""
+    """The style of a diamond that marks a prompt."""
     edge = {"markerfacecolor": PAPER, "markeredgecolor": INK, "markeredgewidth": 0.5}
     return {"linestyle": "none", "marker": "D", "markersize": size, "clip_on": False, "zorder": 4, **edge}
 
 
 def _two_lines(task: str) -> str:
-    """The name of a task, broken before the last capital letter."""
+    """Break the name of a task before its last capital letter."""
     last = max((at for at, letter in enumerate(task) if letter.isupper()), default=0)
     return "\n".join(short_name(part, 14) for part in (task[:last], task[last:]) if part)
 
 
 def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
-    """The same for more models than colours: one row a model."""
+    """Draw pass@1 by task as a heat map with a row per model, if there are more models than colours."""
     figure = new_figure(WIDE, 1.3 + 0.16 * len(runs))
     widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -205,43 +195,43 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 
 
 def thresholds(runs: Sequence[JudgedRun]) -> Figure:
-    """The share of prompts by threshold of pass@1, one line a model, down to one completion of a prompt."""
+    """Draw the share of prompts by threshold of pass@1, one line per model."""
     most = most_completions(runs)
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
     means = [run.mean for run in runs]
-    figure = _line_a_model(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
+    figure = _plot_lines(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
     _threshold_axes(figure.axes[0], most)
     _threshold_labels(figure.axes[0], most)
     return figure
 
 
 def most_completions(runs: Sequence[JudgedRun]) -> int:
-    """The most completions that a prompt has; at least 2, since an axis needs two ends."""
+    """The most completions of any prompt; at least 2, since an axis needs two ends."""
     return max(2, *(prompt.n for run in runs for score in run.scores for prompt in score.prompts))
 
 
 def accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
-    """The share of accepted programs by number of retries, one line a model."""
+    """Draw the share of accepted programs by number of retries, one line per model."""
     lines = {name: [*enumerate(those)] for name, those in shares.items()}
-    figure = _line_a_model(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
+    figure = _plot_lines(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
     axes = figure.axes[0]
     axes.set_xscale("symlog", linthresh=1)
     axes.set_xlim(0, LIMITS[-1])
     axes.set_xticks([*LIMITS], [str(limit) for limit in LIMITS])
     axes.minorticks_off()
     share_axis(axes)
-    axes.set_xlabel("retries at most")
-    axes.set_ylabel("programs that are accepted")
+    axes.set_xlabel("retries (at most)")
+    axes.set_ylabel("accepted programs")
     return figure
 
 
-def _line_a_model(
+def _plot_lines(
     lines: Mapping[str, Points],
     quality: Sequence[float],
     height: float,
-    **style: Any,  # noqa: ANN401 - matplotlib's own
+    **style: Any,  # noqa: ANN401 - options of matplotlib
 ) -> Figure:
-    """A line for each model; where there are more than colours, the best have one."""
+    """Draw a line for each model; only the best have colours if there are too many models."""
     is_narrow = len(lines) <= MOST_COLOURS
     columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > SHORT_NAME else 2
     figure = new_figure(NARROW if is_narrow else WIDE, height + 0.13 * math.ceil(len(lines) / columns))
@@ -253,14 +243,14 @@ def _line_a_model(
             continue
         at = number if is_narrow else best.index(number)
         dashes = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
-        shown = {
+        look = {
             "color": COLOURS[at],
             "label": short_name(name),
             "markersize": 3.2,
             "clip_on": False,
             **dashes,
         }
-        axes.plot(*zip(*points, strict=True), **shown)
+        axes.plot(*zip(*points, strict=True), **look)
     if not is_narrow:
         axes.plot([], [], color=FAINT, linewidth=0.7, label=f"{len(lines) - MOST_COLOURS} others")
     figure.legend(loc="outside lower center", ncols=columns, handlelength=3.2)
@@ -268,14 +258,14 @@ def _line_a_model(
 
 
 def _steps(points: Points, most: int) -> Points:
-    """The part of a curve that is on the axis, which ends at one of so many completions."""
+    """The part of a curve down to a threshold of 1 / `most`, the end of the axis."""
     end = 1 / most
     shown = [(threshold, share) for threshold, share in points if threshold >= end]
     return [*shown, (end, shown[-1][1])]
 
 
 def _threshold_axes(axes: Axes, most: int) -> None:
-    """Set what shared axes have in common: once for one of them, since it is slow and sets all."""
+    """Set the scale and labels of shared axes; setting one of them sets all."""
     axes.set_xscale("log")
     axes.set_xlim(1, 1 / most)
     shown = (*(BETWEEN if most <= SHORT_AXIS else ()), *POWERS)
@@ -285,18 +275,18 @@ def _threshold_axes(axes: Axes, most: int) -> None:
 
 
 def _threshold_labels(axes: Axes, most: int) -> None:
-    axes.minorticks_off()  # which matplotlib would draw one by one
+    axes.minorticks_off()  # drawing them as one line is much faster
     marks = (digit * power for power in POWERS for digit in range(2, 10))
     between = [mark for mark in marks if mark > 1 / most]
     small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
     axes.plot(between, [0] * len(between), color=INK, clip_on=False, linestyle="none", **small)
     axes.grid(visible=True, axis="y")
     axes.set_xlabel("threshold of pass@1")
-    axes.set_ylabel("prompts that reach it")
+    axes.set_ylabel("prompts at or above it")
 
 
 def limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
-    """For each model and limit of retries, the share of prompts by threshold."""
+    """Draw the share of prompts by threshold of pass@1, for each model and limit of retries."""
     columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MOST_COLOURS else 5)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(WIDE if columns > 1 else NARROW, 1.75 * rows + 0.55)
@@ -327,7 +317,7 @@ def limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
 
 
 def heat(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) -> None:
-    """Draw a table of shares as a heat map, with numbers where there is room for them."""
+    """Draw a table of shares as a heat map, with numbers if they fit."""
     shown = np.ma.masked_invalid(np.array(cells, dtype=float))
     axes.pcolormesh(shown, cmap=shades(), vmin=0, vmax=1, edgecolors=PAPER, linewidth=0.6)
     axes.invert_yaxis()
@@ -344,22 +334,22 @@ def heat(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) 
             if share is not None:
                 colour = QUIET if share == 0 else INK if share < DARK_FROM else WHITE
                 cell = axes.text(x, y, _percent(share), ha="center", va="center", color=colour, fontsize=6)
-                cell.set_in_layout(False)  # it lies within the axes
+                cell.set_in_layout(False)  # text inside the axes only slows the layout down
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f}" if share == 0 or share >= 0.01 else "<1"  # noqa: PLR2004 - one in a hundred
+    return f"{100 * share:.0f}" if share == 0 or share >= 0.01 else "<1"  # noqa: PLR2004 - one percent
 
 
 def causes(found: Sequence[tuple[str, Causes]]) -> Figure:
-    """How completions end, by class, and by the kinds of each class."""
+    """Draw the outcomes of completions by class, and the kinds of each class."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
     shown = shown_classes(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}
     tallest = max(3, *map(len, kinds.values()))
     many = len(found) > MOST_NUMBERS
     longest = 0 if many else max(len(short_name(name, 18)) for name, _ in found)
-    # Names of models stand aslant below the panels.
+    # Slanted names of models need room below the panels.
     below = 0.95 + (0.13 * len(found) if many else 0.155 * tallest) + 0.04 * max(0, longest - 8)
     columns = len(shown) if many or len(shown) <= MOST_PANELS else 2
     lines = math.ceil(len(shown) / columns)
@@ -380,7 +370,7 @@ def causes(found: Sequence[tuple[str, Causes]]) -> Figure:
 
 
 def _classes(axes: Axes, found: Sequence[tuple[str, Causes]], shown: Sequence[str]) -> None:
-    axes.set_title("(a) how completions end", loc="left")
+    axes.set_title("(a) outcomes of completions", loc="left")
     left = np.zeros(len(found))
     places = range(len(found))
     looks = _looks()
@@ -398,7 +388,7 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]], shown: Sequence[st
 
 
 def _looks() -> dict[str, tuple[str, str]]:
-    """The colour and the hatch of each end; the paper's classes keep theirs whatever else there is."""
+    """The colour and the hatch of each outcome; the paper's classes always have the same ones."""
     others = [name for name in CLASSES if name != NO_PROGRAM]
     colours = cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5))
     hatches = cycle(("", "////", "\\\\\\\\", "....", ""))

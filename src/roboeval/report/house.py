@@ -1,10 +1,10 @@
-"""The section on house rules: how often programs break them, and what they cost."""
+"""The section on house rules: how often programs break them, and their effect on pass@1."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboeval.analysis.broken_rules import BrokenRules, broken_rules
+from roboeval.analysis.broken_rules import BrokenRules, count_broken_rules
 from roboeval.analysis.counts import task_scores
 from roboeval.analysis.metrics import overall
 from roboeval.report.runs import JudgedRun
@@ -12,13 +12,15 @@ from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
 
 
 def house(runs: Sequence[JudgedRun]) -> Section:
-    """What house rules change, for runs that were judged with them, too."""
-    found = [(run, broken_rules(run.house.table, run.results.table)) for run in runs if run.house is not None]
+    """The effect of house rules, for runs judged both with and without them."""
+    found = [
+        (run, count_broken_rules(run.house.table, run.results.table)) for run in runs if run.house is not None
+    ]
     return section("house", rules_sheet(found), broken_sheet(found))
 
 
 def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
-    """How many programs break a rule, and how many tasks are done without and with the rules."""
+    """Share of programs that break a rule, and pass@1 without and with the rules."""
     rows: list[list[Cell]] = []
     notes = []
     for run, one in found:
@@ -26,12 +28,8 @@ def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
         assert one.cost is not None
         broken = one.broken
         scores = overall(run.scores, 1).mean, overall(task_scores(run.house.table), 1).mean
-        rows.append(
-            [
-                *(run.name, broken.mean, broken.low, broken.high),
-                *(*scores, one.cost.mean, one.cost.low, one.cost.high),
-            ]
-        )
+        cost = one.cost.mean, one.cost.low, one.cost.high
+        rows.append([run.name, broken.mean, broken.low, broken.high, *scores, *cost])
         measured = ("share that breaks a rule", broken), ("difference", one.cost)
         notes += [
             f"{run.name}: the interval of the {what} is {estimate.ends()}."
@@ -42,6 +40,6 @@ def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
 
 
 def broken_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
-    """How many programs each rule ends in some world."""
+    """How many programs each rule stops in at least one world."""
     rows = [[rule, run.name, count] for run, one in found for rule, count in one.by_rule.items()]
     return sheet("broken-rules", rows)

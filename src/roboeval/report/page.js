@@ -1,5 +1,5 @@
 "use strict";
-// Tables are sorted by their heads, clusters filtered, and all that is folded opens for printing.
+// Sorts tables by column, filters groups of failures, and unfolds tables for printing.
 for (const table of document.querySelectorAll("table")) {
   const body = table.tBodies[0];
   const value = (row, at) => {
@@ -17,7 +17,7 @@ for (const table of document.querySelectorAll("table")) {
       for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
       head.setAttribute("aria-sort", up ? "ascending" : "descending");
       const rows = [...body.rows].map((row) => [value(row, at), row]);
-      // Where some cells are numbers, those that are none come last, whichever way the others are sorted.
+      // Cells without a number come last in both directions.
       rows.sort(([a], [b]) => typeof a === typeof b ? (up ? 1 : -1) * order(a, b) : typeof a === "number" ? -1 : 1);
       body.append(...rows.map((row) => row[1]));
     });
@@ -28,7 +28,7 @@ for (const list of document.querySelectorAll(".clusters")) {
   const controls = document.createElement("div");
   controls.className = "filters";
   controls.setAttribute("role", "search");
-  const told = document.createElement("output");
+  const summary = document.createElement("output");
   const fields = ["model", "task", "kind"].map((name) => {
     const field = document.createElement("select");
     field.append(new Option("all", ""));
@@ -37,13 +37,13 @@ for (const list of document.querySelectorAll(".clusters")) {
   });
   const search = document.createElement("input");
   search.type = "search";
-  for (const [name, field] of [...fields, ["words in program or reason", search]]) {
+  for (const [name, field] of [...fields, ["text in program or reason", search]]) {
     const label = document.createElement("label");
     label.append(name, field);
     controls.append(label);
     field.addEventListener("input", filter);
   }
-  controls.append(told);
+  controls.append(summary);
   list.before(controls);
   function filter() {
     const words = search.value.toLowerCase();
@@ -55,7 +55,7 @@ for (const list of document.querySelectorAll(".clusters")) {
       shown += fits;
       completions += fits ? Number(item.dataset.size) : 0;
     }
-    told.textContent = `${shown} of ${items.length} groups shown here, ${completions} completion${completions === 1 ? "" : "s"}`;
+    summary.textContent = `${shown} of ${items.length} groups shown, ${completions} completion${completions === 1 ? "" : "s"}`;
   }
   filter();
 }

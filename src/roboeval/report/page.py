@@ -1,4 +1,4 @@
-"""The page of a report: one file that opens without a network and reads without a script."""
+"""The page of a report: one file that opens offline and is readable without JavaScript."""
 
 from __future__ import annotations
 
@@ -21,31 +21,32 @@ from roboeval.report.sheets import (
     Column,
     Groups,
     Part,
-    Picture,
     Prose,
+    ReportFigure,
     Section,
     Sheet,
-    described,
-    told,
+    format_cell,
+    page_text,
 )
 from roboeval.suites.task import check_label
 
-WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
-MOST_ROWS = 1_000  # of a table on the page; its file has all
-LONG = 24  # rows from which a table is folded
-LONG_TEXT = 70  # characters from which a cell takes several lines
+WORDS, CHARACTERS, LINES = 500, 6_000, 80  # limits for text that models wrote
+MOST_ROWS = 1_000  # per table on the page; the CSV file has all
+LONG = 24  # tables with more rows are folded
+LONG_TEXT = 70  # longer cells take several lines
 STYLE = Path(__file__).with_name("page.css")
 SCRIPT = Path(__file__).with_name("page.js")
-GENERATOR = '<meta name="generator" content="RoboEval">'  # marks a page in a folder as a report
-Drawn = tuple[bytes, bytes]  # a figure as SVG, for light pages and for dark ones
+GENERATOR = '<meta name="generator" content="RoboEval">'  # identifies a page as a report
+DrawnFigure = tuple[bytes, bytes]  # SVG for light pages, and for dark ones
+DrawnFigures = Mapping[str, DrawnFigure]
 
 
-def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Mapping[str, Drawn]) -> str:
-    """The page as HTML; it escapes all text, so nothing that a model wrote is obeyed."""
+def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: DrawnFigures) -> str:
+    """Return the page as HTML; all text is escaped, so nothing that a model wrote has an effect."""
     script = SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
-    titles = {_text(section.name): _text(described("sections", section.name)) for section in sections}
+    titles = {_text(section.name): _text(page_text("sections", section.name)) for section in sections}
     links = "".join(f'<li><a href="#{name}">{title}</a></li>' for name, title in titles.items())
     body = "".join(_section(section, drawn) for section in sections)
     paragraphs = "".join(f"<p>{_text(words)}</p>" for words in lead)
@@ -64,14 +65,14 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Ma
 
 
 def _files(sections: Sequence[Section]) -> str:
-    """Links to the tables as files, which lie beside the page."""
+    """Links to the CSV files of all tables."""
     names = [part.name for section in sections for part in section.parts if isinstance(part, Sheet)]
     links = ", ".join(f'<a href="tables/{_text(name)}.csv">{_text(name)}</a>' for name in names)
     return f'<p class="files">Tables as CSV: {links}</p>\n' if names else ""
 
 
 def _text(words: str) -> str:
-    """Escape text for HTML; what cannot be printed, such as half a surrogate pair, is written out."""
+    """Escape text for HTML; write unprintable characters, such as lone surrogates, as escapes."""
     plain = "".join(
         c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in words
     )
@@ -79,23 +80,23 @@ def _text(words: str) -> str:
 
 
 def _prose(words: str) -> str:
-    """Escape a sentence for HTML; commands in it stand between backticks."""
+    """Escape a sentence for HTML and format the commands between backticks."""
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", _text(words))
 
 
-def _section(section: Section, drawn: Mapping[str, Drawn]) -> str:
+def _section(section: Section, drawn: DrawnFigures) -> str:
     parts = "".join(_part(part, drawn) for part in section.parts)
     name = _text(section.name)
-    head = f'<h2 id="{name}-h">{_text(described("sections", section.name))}</h2>'
+    head = f'<h2 id="{name}-h">{_text(page_text("sections", section.name))}</h2>'
     return f'<section id="{name}" aria-labelledby="{name}-h">{head}\n{parts}</section>\n'
 
 
-def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
+def _part(part: Part, drawn: DrawnFigures) -> str:
     match part:
         case Sheet():
             return _table(part)
-        case Picture():
-            return _picture(part, drawn)
+        case ReportFigure():
+            return _figure(part, drawn)
         case Prose(paragraphs):
             return "".join(f"<p>{_prose(words)}</p>\n" for words in paragraphs)
         case Code(text):
@@ -126,13 +127,13 @@ def _card(card: Card) -> str:
 # --- figures
 
 
-def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
-    if picture.name not in drawn:
+def _figure(figure: ReportFigure, drawn: DrawnFigures) -> str:
+    if figure.name not in drawn:
         return ""
-    links = (base64.b64encode(svg).decode() for svg in drawn[picture.name])
+    links = (base64.b64encode(svg).decode() for svg in drawn[figure.name])
     light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
-    caption = _text(" ".join([described("figures", picture.name), *picture.about]))
-    name = _text(picture.name)
+    caption = _text(" ".join([page_text("figures", figure.name), *figure.about]))
+    name = _text(figure.name)
     return (
         f'<figure id="figure-{name}">'
         f'<div class="wide" tabindex="0" role="region" aria-label="Figure: {name}"><picture>'
@@ -151,11 +152,11 @@ def _table(sheet: Sheet) -> str:
     columns = [sheet.columns[n] for n in filled]
     heads = "".join(f'<th scope="col" class="{_css(c)}">{_text(c.head)}</th>' for c in columns)
     rows = "".join(_row([row[n] for n in filled], columns) for row in sheet.rows[:MOST_ROWS])
-    told_of = described("tables", sheet.name)
-    title, about = (_text(told_of.get(name, "")) for name in ("title", "about"))
+    texts = page_text("tables", sheet.name)
+    title, about = (_text(texts.get(name, "")) for name in ("title", "about"))
     about = f"<p>{about}</p>" if about else ""
     left = len(sheet.rows) - MOST_ROWS
-    more = [f"{counted(left, 'more row')} in the file."] if left > 0 else []
+    more = [f"{counted(left, 'more row')} in the CSV file."] if left > 0 else []
     notes = "".join(f'<p class="note">{_prose(note)}</p>' for note in (*sheet.notes, *more))
     table = (
         f'<div class="wide" tabindex="0" role="region" aria-label="{title}"><table>'
@@ -170,7 +171,7 @@ def _table(sheet: Sheet) -> str:
     return f'<div class="sheet" id="table-{name}"><h3>{title}</h3>{inside}</div>\n'
 
 
-BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")  # where a long name may be broken
+BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")  # line breaks allowed in long names
 
 
 def _css(column: Column) -> str:
@@ -181,7 +182,7 @@ def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
     cells = []
     for number, (cell, column) in enumerate(zip(row, columns, strict=True)):
         sort = "" if cell is None or isinstance(cell, str) else f' data-v="{cell!r}"'
-        words = BREAKS.sub("<wbr>", _text(told(cell, column.kind)))
+        words = BREAKS.sub("<wbr>", _text(format_cell(cell, column.kind)))
         is_head = number == 0 and column.kind == "text"
         tag = 'th scope="row"' if is_head else "td"
         long = " long" if isinstance(cell, str) and len(cell) > LONG_TEXT else ""
@@ -208,21 +209,21 @@ def _cluster(model: str, cluster: Cluster) -> str:
 
 def _inside(cluster: Cluster) -> str:
     prompts = f"Prompt{'s' * (len(cluster.prompts) > 1)} {', '.join(map(str, cluster.prompts))}"
-    world = _text(str(cluster.told["world"]))
+    world = _text(str(cluster.reason["world"]))
     name = _text(name_of(cluster.representative))
-    where = "" if cluster.has_no_program else f", in \u201c{world}\u201d"
-    head = f"<p>{prompts}. Such as {name}{where}.</p>"
+    where = "" if cluster.has_no_program else f", world \u201c{world}\u201d"
+    head = f"<p>{prompts}. Example: {name}{where}.</p>"
     if cluster.program is None:
-        return f"{head}<p>The program that was judged is gone.</p>"
+        return f"{head}<p>The judged program was changed or removed.</p>"
     program = f"<pre>{_text(_cut(cluster.program, CHARACTERS))}</pre>"
     fix = cluster.fix
     if fix is None:
-        nothing = "" if cluster.has_no_program else "<p>No program of this task passes.</p>"
+        nothing = "" if cluster.has_no_program else "<p>No program passes this task.</p>"
         return f"{head}{program}{nothing}"
     lines = "".join(_changed(sign, line) for sign, line in fix.changes[:LINES])
     more = f"... {len(fix.changes) - LINES} more lines" if len(fix.changes) > LINES else ""
     count = f"{fix.changed} line{'s' * (fix.changed != 1)}"
-    return f"{head}{program}<p>{_text(fix.name)} passes, and differs in {count}:</p><pre>{lines}{more}</pre>"
+    return f"{head}{program}<p>{_text(fix.name)} passes and differs in {count}:</p><pre>{lines}{more}</pre>"
 
 
 def _changed(sign: str, line: str) -> str:

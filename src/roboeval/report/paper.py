@@ -1,4 +1,4 @@
-"""The paper's published numbers, and beside which runs they may stand."""
+"""The paper's published results, and the runs that they may be compared with."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ SUITE = "paper"
 
 @cache
 def published() -> dict[str, Any]:
-    """The published numbers."""
+    """Read the published results."""
     data: dict[str, Any] = json.loads(Path(__file__).with_name("published.json").read_text())
     return data
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """The model of the paper that a run's recorded model, or else its folder, names; None if unsure."""
+    """The model of the paper that a run used, by its recorded name or its folder; None if unsure."""
     if run.results.head.get("suite") != SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
@@ -32,21 +32,20 @@ def model_of(run: JudgedRun) -> str | None:
     return model
 
 
-def taken_for(runs: Iterable[JudgedRun]) -> list[str]:
-    """A sentence about which models of the paper runs are taken for."""
-    named = [(run.name, model) for run in runs if (model := model_of(run)) is not None]
-    those = ", ".join(f"{name} for {model}" for name, model in named)
-    return [f"Recognised as models of the paper, by name: {those}."] if named else []
+def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
+    """Say which runs are recognised as models of the paper."""
+    pairs = [f"{run.name} is {model}" for run in runs if (model := model_of(run)) is not None]
+    return [f"Recognised by name as models of the paper: {', '.join(pairs)}."] if pairs else []
 
 
-def is_of_authors_prompts(run: JudgedRun) -> bool:
-    """Whether completions were written for the authors' own prompts: imported, and not for the suite's."""
+def uses_authors_prompts(run: JudgedRun) -> bool:
+    """Whether completions answer the authors' prompts: they are imported, and not for the suite's prompts."""
     ours = {prompt for task in run.suite.tasks.values() for prompt in task.prompts}
     return "settings" not in run.results.about and not ours & {*run.instructions.values()}
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:
-    """The published pass@1 of one of the authors' prompts."""
+    """The published pass@1 of a prompt of the authors."""
     rows = published()["pass_at_1"].get(task, [])
     return rows[prompt][_column(model)] if prompt < len(rows) else None
 
@@ -58,7 +57,7 @@ def task_mean(model: str, task: str) -> float | None:
 
 
 def overall_mean(model: str, tasks: Sequence[str]) -> float | None:
-    """The mean of the published pass@1 over some tasks; None if one was not published."""
+    """The mean of the published pass@1 over tasks; None if one of them was not published."""
     means = [mean for task in tasks if (mean := task_mean(model, task)) is not None]
     return sum(means) / len(means) if means and len(means) == len(tasks) else None
 
@@ -78,7 +77,7 @@ def _column(model: str) -> int:
 
 
 def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Means of tasks beside the published ones, of runs that name a model of the paper."""
+    """Means by task and the published ones, for runs of the paper's models."""
     known = [(run, model) for run in runs if (model := model_of(run)) is not None]
     rows: list[list[Cell]] = []
     for run, model in known:
@@ -87,6 +86,6 @@ def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         pairs.append(("all of these", run.mean, overall_mean(model, [*means])))
         for task, ours, theirs in pairs:
             rows.append([task, run.name, ours, theirs, None if theirs is None else ours - theirs])
-    are_theirs = all(is_of_authors_prompts(run) for run, _ in known)
-    notes = [*taken_for(runs), *([] if are_theirs else [note("other-phrasings")]), note("two-sums")]
-    return sheet("published", rows, notes=notes)
+    has_their_prompts = all(uses_authors_prompts(run) for run, _ in known)
+    phrasings = [] if has_their_prompts else [note("other-phrasings")]
+    return sheet("published", rows, notes=[*recognised_models(runs), *phrasings, note("two-sums")])

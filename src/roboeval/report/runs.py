@@ -1,4 +1,4 @@
-"""Judged runs as a report shows them, under names that tell them apart."""
+"""Judged runs as a report shows them, under unique names."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class JudgedRun:
     """A run with its verdicts."""
 
     results: Results
-    table: pl.DataFrame  # `accepted` is null where programs were not checked
-    ablated: Results | None = None  # where common sense only was judged
-    beside: Results | None = None  # as another suite judges it
-    house: Results | None = None  # as the same suite judges it with house rules
-    name: str = ""  # in figures and tables; no two runs of a report share it
+    table: pl.DataFrame  # `accepted` is null for unchecked programs
+    ablated: Results | None = None  # judged by common-sense requirements only
+    other_suite: Results | None = None  # judged by another suite
+    house: Results | None = None  # judged by the same suite with house rules
+    name: str = ""  # unique within a report
 
     @property
     def suite(self) -> Suite:
@@ -51,7 +51,7 @@ class JudgedRun:
 
     @property
     def model(self) -> str | None:
-        """The model that wrote the completions; None if not recorded, or if several did."""
+        """The model that wrote the completions; None if unrecorded or if there are several."""
         return None if self.is_mixed else self.table["model"][0]
 
     @cached_property
@@ -66,7 +66,7 @@ class JudgedRun:
 
     @cached_property
     def ablated_scores(self) -> tuple[TaskScore, ...]:
-        """The scores of tasks by common sense only."""
+        """The scores of tasks by common-sense requirements only."""
         return () if self.ablated is None else task_scores(self.ablated.table, self.suite.tasks)
 
     @cached_property
@@ -76,12 +76,12 @@ class JudgedRun:
 
     @property
     def coverage(self) -> Coverage:
-        """Of how many completions its numbers speak."""
+        """How many completions were judged, are there, and were requested."""
         return self.results.scope.coverage(self.completions.height)
 
     @property
     def coverage_sentence(self) -> str:
-        """The same in words, with the tasks."""
+        """The coverage in words, with prompts and tasks."""
         prompts = counted(len(self.by_prompt), "prompt")
         return f"{self.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
 
@@ -92,13 +92,13 @@ class JudgedRun:
 
     @cached_property
     def instructions(self) -> Mapping[tuple[str, int], str]:
-        """The instruction of each prompt, where it was recorded."""
+        """The recorded instruction of each prompt."""
         completions = self.results.completions.items()
         return {key[:2]: one.instruction for key, one in completions if one.instruction is not None}
 
     @cached_property
     def trials(self) -> tuple[CheckedPrompt, ...]:
-        """The checked completions by prompt; none where not all were checked."""
+        """The checked completions by prompt; empty unless all were checked."""
         return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
 
 
@@ -109,18 +109,18 @@ def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Of how many completions and tasks each run has results, in sentences for captions; equal ones once."""
-    said: dict[str, list[str]] = {}
+    """Sentences for captions: the completions and tasks that each run has results for; equal ones once."""
+    sentences: dict[str, list[str]] = {}
     for run in runs:
-        said.setdefault(run.coverage_sentence, []).append(run.name)
-    if len(said) == 1:
+        sentences.setdefault(run.coverage_sentence, []).append(run.name)
+    if len(sentences) == 1:
         each = "Each run: " if len(runs) > 1 else ""
-        return [f"{each}{next(iter(said))}."]
-    return [f"{', '.join(names)}: {words}." for words, names in said.items()]
+        return [f"{each}{next(iter(sentences))}."]
+    return [f"{', '.join(names)}: {words}." for words, names in sentences.items()]
 
 
 def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
-    """Read `RUN=TEXT`, by the number of the run; a run is named by its folder, as it was given or by name."""
+    """Read labels written as `RUN=TEXT`; return them by the index of the run, which its folder names."""
     labels: dict[int, str] = {}
     names = [{str(path), path.resolve().name} for path in paths]
     for text in texts:
@@ -139,16 +139,20 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
     return labels
 
 
-def named_apart(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
-    """The same runs, each named by its label, or by its model and, where that is not unique, its folder."""
-    told = {at: short_name(label, LONGEST_NAME) for at, label in labels.items()}
-    plain = [told.get(at) or short_name(run.model or run.folder, LONGEST_NAME) for at, run in enumerate(runs)]
-    names = _apart(plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)])
+def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
+    """Name each run by its label or its model; make names unique with the folder or a number."""
+    given = {at: short_name(label, LONGEST_NAME) for at, label in labels.items()}
+    plain = [
+        given.get(at) or short_name(run.model or run.folder, LONGEST_NAME) for at, run in enumerate(runs)
+    ]
+    names = _extend_duplicates(
+        plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]
+    )
     while len({*names}) < len(names):
-        names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
+        names = _extend_duplicates(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
     return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
 
 
-def _apart(names: Sequence[str], longer: Sequence[str]) -> list[str]:
+def _extend_duplicates(names: Sequence[str], longer: Sequence[str]) -> list[str]:
     counts = Counter(names)
     return [long if counts[name] > 1 else name for name, long in zip(names, longer, strict=True)]

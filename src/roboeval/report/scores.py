@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.compare import MOST_PAIRS, compared, pairs_to_compare, unlike, verdict
+from roboeval.analysis.compare import MOST_PAIRS, compare_scores, other_differences, pairs_to_compare, verdict
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
@@ -19,15 +19,15 @@ from roboeval.analysis.metrics import (
 from roboeval.analysis.statistics import FEW, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
-from roboeval.report.sheets import Cell, Picture, Prose, Section, Sheet, note, section, sheet
+from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
 
 def results(runs: Sequence[JudgedRun]) -> Section:
     """pass@1 of each run and task."""
     coverage = coverage_of(runs)
-    overall_picture = Picture("overall", lambda: figures.overall_scores(runs), coverage)
-    picture = Picture("tasks", lambda: figures.bars(runs), coverage)
-    return section("results", overall_picture, overall_sheet(runs), picture, task_sheet(runs))
+    by_run = ReportFigure("overall", lambda: figures.overall_scores(runs), coverage)
+    by_task = ReportFigure("tasks", lambda: figures.bars(runs), coverage)
+    return section("results", by_run, overall_sheet(runs), by_task, task_sheet(runs))
 
 
 def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -58,13 +58,13 @@ def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
     if not few:
         return []
     of_which = "" if len(few) == len(runs) else f" of {', '.join(few)}"
-    few_tasks = f"The bootstrap{of_which} draws from fewer than {FEW} tasks, for which it is too narrow"
-    return [f"{few_tasks}; quote the formula."]
+    few_tasks = f"The bootstrap interval{of_which} is too narrow with fewer than {FEW} tasks"
+    return [f"{few_tasks}; quote the interval over tasks."]
 
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
     return [
-        f"{run.name}: {run.coverage}; only the judged ones count."
+        f"{run.name}: {run.coverage}; only judged completions count."
         for run in runs
         if not run.coverage.is_whole
     ]
@@ -81,8 +81,8 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         if score.task == task
     ]
     without = [run.name for run in runs if run.ablated is None]
-    some = "No run" if len(without) == len(runs) else f"Not {', '.join(without)}:"
-    note = f"{some} was judged with --ablation, which requires common sense only."
+    which = "any run" if len(without) == len(runs) else ", ".join(without)
+    note = f"Common-sense results are missing for {which}; judge with `roboeval evaluate --ablation`."
     return sheet("tasks", rows, notes=[note] if without else [])
 
 
@@ -95,11 +95,13 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
     """The share of prompts that reach each pass@1 (paper, section V.A)."""
-    return section("thresholds", Picture("thresholds", lambda: figures.thresholds(runs)), curve_sheet(runs))
+    return section(
+        "thresholds", ReportFigure("thresholds", lambda: figures.thresholds(runs)), curve_sheet(runs)
+    )
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """The figure of thresholds as numbers."""
+    """The figure of thresholds as a table."""
     curves = [[*run.by_prompt.values()] for run in runs]
     steps = sorted({t for values in curves for t, _ in threshold_curve(values)}, reverse=True)
     rows = [[t, *(share_at_least(values, t) for values in curves)] for t in steps]
@@ -107,53 +109,56 @@ def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def differences(runs: Sequence[JudgedRun]) -> Section:
-    """Which of several runs is better, pair by pair."""
+    """Compare several runs pair by pair."""
     rows: list[list[Cell]] = []
-    said: list[str] = []
+    sentences: list[str] = []
     notes: list[str] = []
     for first, second in pairs_to_compare(runs, lambda run: run.mean):
         try:
-            found = compared(first.by_prompt, second.by_prompt)
+            found = compare_scores(first.by_prompt, second.by_prompt)
         except UserError:  # no prompt in common
             continue
-        if len(said) < MOST_PAIRS:
-            said.append(verdict(found, (first.name, second.name)))
+        if len(sentences) < MOST_PAIRS:
+            sentences.append(verdict(found, (first.name, second.name)))
             pair, over_prompts = f"{first.name} and {second.name}", found.over_prompts
             if not over_prompts.is_known:
                 notes.append(f"{pair}: the interval over prompts is {over_prompts.ends()}.")
-            if apart := unlike(first.results, second.results):
-                notes.append(f"{pair}: {'; '.join(apart)}.")
+            if others := other_differences(first.results, second.results):
+                notes.append(f"{pair}: {'; '.join(others)}.")
         over = found.over_prompts, found.over_tasks
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]
-        ps, much = (found.p_prompts, found.p_tasks), (found.needed.completions, found.needed.prompts)
-        rows.append([f"{second.name} minus {first.name}", found.prompts, over[0].mean, *ends, *ps, *much])
+        ps, sizes = (
+            (found.p_prompts, found.p_tasks),
+            (found.sample_sizes.completions, found.sample_sizes.prompts),
+        )
+        rows.append([f"{second.name} minus {first.name}", found.prompts, over[0].mean, *ends, *ps, *sizes])
     notes = [*([note("many-pairs")] if len(rows) > 1 else []), *notes]
-    return section("differences", Prose(said), sheet("differences", rows, notes=notes))
+    return section("differences", Prose(sentences), sheet("differences", rows, notes=notes))
 
 
 def leader(runs: Sequence[JudgedRun]) -> list[str]:
-    """Who is ahead of the next, and how sure that is, in a sentence; nothing for one run."""
+    """Compare the two best runs in a sentence; nothing for a single run."""
     if len(runs) == 1:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
     try:
-        return [verdict(compared(second.by_prompt, best.by_prompt), (second.name, best.name))]
+        return [verdict(compare_scores(second.by_prompt, best.by_prompt), (second.name, best.name))]
     except UserError:  # no prompt in common
         return []
 
 
 def prompts(runs: Sequence[JudgedRun]) -> Section:
-    """pass@1 of each prompt, and the published numbers."""
+    """pass@1 of each prompt, and the published results."""
     unknown = ", ".join(run.name for run in runs if paper.model_of(run) is None)
     published = paper.published_sheet(runs)
-    nothing = f"No published numbers for {unknown}: the paper has no model of that name."
+    nothing = f"The paper has no results for {unknown}."
     prose = Prose([nothing] if unknown and published.rows else [])
     return section("prompts", prompt_sheet(runs), published, prose)
 
 
 def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """pass@1 by task and prompt, with the published cell where it was written for the same prompt."""
-    imported = [run for run in runs if paper.is_of_authors_prompts(run)]
+    """pass@1 by task and prompt, with the published value if it is for the same prompt."""
+    imported = [run for run in runs if paper.uses_authors_prompts(run)]
     theirs = {run.name: model for run in imported if (model := paper.model_of(run)) is not None}
     heads = [[run.name, *([f"{run.name}, published"] if run.name in theirs else [])] for run in runs]
     order = {task: at for at, task in enumerate(tasks_of(runs))}

@@ -1,4 +1,4 @@
-"""The building blocks of a report: tables (also written as CSV), figures and text."""
+"""The building blocks of a report: tables (also written as CSV files), figures and text."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ Cell: TypeAlias = str | int | float | None
 
 @cache
 def page_words() -> dict[str, dict[str, Any]]:
-    """The content of page.yaml: words for sections, figures, tables and notes, by name."""
+    """Read page.yaml: the text of sections, figures, tables and notes, by name."""
     text = Path(__file__).with_name("page.yaml").read_text()
-    return yaml.load(text, Loader)  # type: ignore[no-any-return]  # noqa: S506 - a safe one
+    return yaml.load(text, Loader)  # type: ignore[no-any-return]  # noqa: S506 - a safe loader; YAML is untyped
 
 
-def described(kind: str, name: str) -> Any:  # noqa: ANN401 - a text, or several
-    """The words of page.yaml for one of them."""
+def page_text(kind: str, name: str) -> Any:  # noqa: ANN401 - a string, or a mapping for a table
+    """The text in page.yaml for a section, figure, table or note."""
     return page_words()[kind][name]
 
 
 def note(name: str) -> str:
-    """A note of page.yaml."""
-    return str(described("notes", name))
+    """A note from page.yaml."""
+    return str(page_text("notes", name))
 
 
 class Column(NamedTuple):
     """A column of a table."""
 
     head: str
-    kind: Kind = "text"  # "class" is one of failures; a share is from 0 to 1
+    kind: Kind = "text"  # "class": of failures; "share": from 0 to 1
 
 
 class Sheet(NamedTuple):
     """A table."""
 
-    name: str  # in page.yaml, and of its CSV file
+    name: str  # the key in page.yaml and the name of the CSV file
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]]
     notes: Sequence[str] = ()
@@ -59,18 +59,18 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """A table that page.yaml describes, with further columns of shares, such as one a model."""
-    kinds = described("tables", name)["columns"]
+    """Create a table that page.yaml describes, with additional columns of shares, such as one per model."""
+    kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
 
 
-class Picture(NamedTuple):
+class ReportFigure(NamedTuple):
     """A figure."""
 
-    name: str  # in page.yaml, and of its files
+    name: str  # the key in page.yaml and the name of the files
     draw: Callable[[], Figure]
-    about: Sequence[str] = ()  # sentences of the caption that are about these runs
+    about: Sequence[str] = ()  # sentences about the runs, added to the caption
 
 
 class Prose(NamedTuple):
@@ -86,7 +86,7 @@ class Code(NamedTuple):
 
 
 class Groups(NamedTuple):
-    """Groups of failures, each with the name of its run."""
+    """Groups of similar failures, each with the name of its run."""
 
     shown: Sequence[tuple[str, Cluster]]
 
@@ -96,9 +96,9 @@ class Card(NamedTuple):
 
     name: str
     passed: Estimate  # pass@1
-    coverage: str  # of how many completions and tasks it speaks
-    failure: str  # the most frequent one, in words; empty where none failed
-    cost: str  # in words; empty where it is not known
+    coverage: str  # judged completions and tasks, in words
+    failure: str  # the most frequent one, in words; empty if none failed
+    cost: str  # in words; empty if unknown
     warnings: Sequence[str] = ()
 
 
@@ -108,18 +108,18 @@ class Cards(NamedTuple):
     cards: Sequence[Card]
 
 
-Part: TypeAlias = Sheet | Picture | Prose | Code | Groups | Cards
+Part: TypeAlias = Sheet | ReportFigure | Prose | Code | Groups | Cards
 
 
 class Section(NamedTuple):
     """A section of the page."""
 
-    name: str  # in page.yaml, and of its anchor
+    name: str  # the key in page.yaml and the anchor
     parts: Sequence[Part]
 
 
 def section(name: str, *parts: Part) -> Section:
-    """A section of those parts that are not empty."""
+    """Create a section of the parts that are not empty."""
     return Section(name, [part for part in parts if not _is_empty(part)])
 
 
@@ -131,7 +131,7 @@ def _is_empty(part: Part) -> bool:
 
 
 def write_csv(table: Sheet, folder: Path) -> None:
-    """Write a table as CSV, with all digits."""
+    """Write a table as a CSV file, with all digits."""
     types = {"text": pl.String, "class": pl.String, "count": pl.Int64}
     kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))
@@ -141,21 +141,19 @@ def write_csv(table: Sheet, folder: Path) -> None:
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:
-    """The heads of columns, made unique by numbers: a model may be named `task`."""
+    """The heads of columns, made unique by numbers, since a model may be named `task`."""
     heads: list[str] = []
     for column in columns:
         plain = storable(column.head)
-        if plain.startswith(
-            ("=", "+", "-", "@", "\t", "\r", "\n")
-        ):  # lest a spreadsheet takes it for a formula
-            plain = f"'{plain}"
+        if plain.startswith(("=", "+", "-", "@", "\t", "\r", "\n")):
+            plain = f"'{plain}"  # otherwise a spreadsheet reads it as a formula
         others = (f"{plain} #{number}" for number in count(2))
         heads.append(plain if plain not in heads else next(head for head in others if head not in heads))
     return heads
 
 
-def told(cell: Cell, kind: Kind) -> str:
-    """A cell as text for people."""
+def format_cell(cell: Cell, kind: Kind) -> str:
+    """Format a cell for people."""
     if cell is None or isinstance(cell, str):
         return "-" if cell is None else label_of(cell) if kind == "class" else cell
     match kind:

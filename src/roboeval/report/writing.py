@@ -1,4 +1,4 @@
-"""Puts a report together and writes it: figures as PNG and PDF, tables as CSV, and the page."""
+"""Assembles a report and writes it: figures as PNG and PDF, tables as CSV, and the page."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
 from roboeval.report import breakdown, cost, failures, house, scores
-from roboeval.report.drawing import darkened, styled, written
-from roboeval.report.page import GENERATOR, Drawn, page
+from roboeval.report.drawing import darken, render, use_style
+from roboeval.report.page import GENERATOR, DrawnFigure, page
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import (
     Card,
     Cards,
     Cell,
     Code,
-    Picture,
     Prose,
+    ReportFigure,
     Section,
     Sheet,
     page_words,
@@ -34,8 +34,8 @@ from roboeval.report.sheets import (
 
 FORMATS = ("png", "pdf")
 PAGE = "index.html"
-UNFINISHED = ("This report is not finished; run its command again.",)
-HEAD = 4_000  # characters at the beginning of a page, among which is its generator
+UNFINISHED = ("This report is not finished. Run its command again.",)
+HEAD = 4_000  # characters; the start of a page contains its generator
 
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
@@ -47,9 +47,9 @@ def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     )
     by_hand = [run.name for run in runs if (run.model or "").startswith("recorded:")]
     suite = runs[0].suite
-    lead = [f"{count}, judged by the suite \u201c{suite.name}\u201d: {suite.about}."]
+    lead = [f"{count}, judged with the suite \u201c{suite.name}\u201d: {suite.about}."]
     if by_hand:
-        lead.append(f"Programs of {', '.join(by_hand)} were written by hand, and represent no model.")
+        lead.append(f"The programs of {', '.join(by_hand)} were written by hand and represent no model.")
     return f"Robot programs by {title}", lead
 
 
@@ -60,16 +60,16 @@ def sections(
     prices: Mapping[str, Price] = {},
     command: str = "",
 ) -> list[Section]:
-    """All sections of a report about runs that the same suite judged."""
+    """All sections of a report on runs that the same suite judged."""
     found = [
         glance(runs, prices),
         scores.results(runs),
         scores.differences(runs),
-        failures.beside(runs),
+        failures.other_suite(runs),
         house.house(runs),
         scores.thresholds(runs),
         failures.why(runs, with_published=with_published),
-        failures.alike(runs),
+        failures.similar_failures(runs),
         breakdown.abilities(runs),
         breakdown.phrasings(runs),
         cost.rejection_sampling(runs),
@@ -81,14 +81,14 @@ def sections(
 
 
 def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
-    """Each run in a few lines, who is ahead, and how sure that is."""
+    """A card for each run, and a comparison of the two best."""
     cards = [
         Card(
             name=run.name,
             passed=overall(run.scores, 1),
             coverage=run.coverage_sentence,
             failure=failures.most_frequent(run),
-            cost=cost.in_words(run, prices),
+            cost=cost.cost_sentence(run, prices),
             warnings=failures.warnings(run),
         )
         for run in runs
@@ -102,23 +102,23 @@ def _models(runs: Sequence[JudgedRun]) -> str:
 
 
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:
-    """What was judged, by what, and the command that makes the report again."""
+    """The runs, the suite, and the command that reproduces the report."""
     return section("origin", origin_sheet(runs), Prose(about_suite(runs)), Code(command))
 
 
 def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """How each run came about."""
+    """How each run was generated and judged."""
     rows: list[list[Cell]] = []
     for run in runs:
         about, head = run.results.about, run.results.head
         settings = about.get("settings")
-        told = None
+        shown = None
         if isinstance(settings, dict):
-            told = ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
+            shown = ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
         versions = dict.fromkeys(
             str(batch["codebotler"]) for batch in batches(about) if "codebotler" in batch
         )
-        asked = (told, about.get("template"), ", ".join(versions) or None)
+        asked = (shown, about.get("template"), ", ".join(versions) or None)
         judged = (head.get(name) for name in ("codebotler", "python", "digest"))
         origin = ["not recorded" if value is None else str(value) for value in (*asked, *judged)]
         rows.append([run.name, run.folder, run.completions.height, *origin])
@@ -130,9 +130,9 @@ def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
     head = runs[0].results.head
     version, digest = head.get("version"), head.get("digest")
     return (
-        f'Judged by the suite "{runs[0].suite.name}", version {version}, content {digest}.',
-        f"Its rules: {json.dumps(head.get('rules'), ensure_ascii=False)}.",
-        "The same runs give the same bytes with the same versions of codebotler and matplotlib:",
+        f'Judged with the suite "{runs[0].suite.name}", version {version}, hash {digest}.',
+        f"Simulation settings: {json.dumps(head.get('rules'), ensure_ascii=False)}.",
+        "With the same versions of codebotler and matplotlib, this command reproduces the report:",
     )
 
 
@@ -140,26 +140,26 @@ def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
-    """Write a report into a folder, and yield the name of each piece; the whole page comes last."""
+    """Write a report into a folder and yield the name of each piece; the page comes last."""
     parts = [part for section in sections for part in section.parts]
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE).exists():
         write_whole(out / PAGE, page(title, UNFINISHED, [], {}).encode())
-    drawn: dict[str, Drawn] = {}
+    drawn: dict[str, DrawnFigure] = {}
     for part in parts:
         if isinstance(part, Sheet):
             write_csv(part, out / "tables")
             yield part.name
-        elif isinstance(part, Picture):
+        elif isinstance(part, ReportFigure):
             drawn[part.name] = _draw(part, out / "figures")
             yield part.name
     write_whole(out / PAGE, page(title, lead, sections, drawn).encode())
-    _forget_others(out, {part.name for part in parts if isinstance(part, Sheet | Picture)})
+    _remove_others(out, {part.name for part in parts if isinstance(part, Sheet | ReportFigure)})
     yield "page"
 
 
 def expect_no_others(out: Path) -> None:
-    """Refuse a folder with files that would be lost: any folder but a report's or an empty one."""
+    """Raise a UserError for a folder that is neither empty nor a report."""
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
@@ -176,8 +176,8 @@ def _is_report(page_file: Path) -> bool:
         return GENERATOR in file.read(HEAD)
 
 
-def _forget_others(out: Path, names: AbstractSet[str]) -> None:
-    """Remove files of an earlier report that this one does not have, such as rejection sampling."""
+def _remove_others(out: Path, names: AbstractSet[str]) -> None:
+    """Remove files of an earlier report that this one lacks, such as rejection sampling."""
     for name in {*page_words()["figures"], *page_words()["tables"]} - names:
         for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
             (out / file).unlink(missing_ok=True)
@@ -185,13 +185,13 @@ def _forget_others(out: Path, names: AbstractSet[str]) -> None:
 
 def pieces(sections: Sequence[Section]) -> int:
     """The number of pieces that `write_report` yields."""
-    return 1 + sum(isinstance(part, Sheet | Picture) for section in sections for part in section.parts)
+    return 1 + sum(isinstance(part, Sheet | ReportFigure) for section in sections for part in section.parts)
 
 
-def _draw(picture: Picture, folder: Path) -> Drawn:
+def _draw(figure: ReportFigure, folder: Path) -> DrawnFigure:
     """Draw a figure, write its files, and return it for the page."""
-    with styled():
-        found = written(picture.draw())
+    with use_style():
+        files = render(figure.draw())
     for kind in FORMATS:
-        write_whole(folder / f"{picture.name}.{kind}", found[kind])
-    return found["svg"], darkened(found["svg"])
+        write_whole(folder / f"{figure.name}.{kind}", files[kind])
+    return files["svg"], darken(files["svg"])

@@ -1,4 +1,4 @@
-"""Suites of tasks: how they are read, and the three that ship, `paper`, `plus` and `rules`.
+"""Suites of tasks, and the three that ship with RoboEval: `paper`, `plus` and `rules`.
 
-Start with `load.py`; `schema.py` says what a task file may contain.
+Start with `load.py`; `schema.py` defines the content of task files.
 """

@@ -1,4 +1,4 @@
-"""Expressions in task files: a small part of Python's, interpreted here and never run."""
+"""Expressions in task files: a small subset of Python's, interpreted and never executed."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from typing import Any
 
 from codebotler.core.program import parse_expression
 
-MOST = 10_000  # letters, digits or entries of a value
-Names = Mapping[str, Any]  # texts, numbers, lists, and people and things as namespaces
+MOST = 10_000  # characters, digits or entries of a value
+Names = Mapping[str, Any]  # strings, numbers, lists, and namespaces for people and things
 
 
 class ExpressionError(ValueError):
-    """A text is not an expression, or names what does not exist."""
+    """The expression is not valid, or refers to an unknown name."""
 
 
 def _product(one: object, other: object) -> int:
@@ -52,19 +52,19 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-@cache  # the same few for each of many worlds
-def parsed(text: str) -> ast.expr:
-    """The syntax tree of an expression."""
+@cache  # many worlds use the same few expressions
+def parse_cached(text: str) -> ast.expr:
+    """Parse an expression."""
     try:
         return parse_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ExpressionError(f'"{text}" cannot be read as an expression') from None
+        raise ExpressionError(f'"{text}" is not an expression; check its syntax') from None
 
 
-def value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
-    """The value of an expression."""
+def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, numbers, lists of them
+    """Compute the value of an expression."""
     try:
-        return _value(node, names)
+        return _checked_value(node, names)
     except ExpressionError:
         raise
     except RecursionError:
@@ -73,15 +73,17 @@ def value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - texts, numbers
         raise ExpressionError(f'"{ast.unparse(node)}" cannot be computed ({error})') from None
 
 
-def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - the same
-    found = _computed(node, names)
+def _checked_value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - as `evaluate`
+    found = _compute(node, names)
     if _size(found) > MOST:
-        raise ExpressionError(f'"{ast.unparse(node)}" comes to more than {MOST:,} letters, digits or entries')
+        raise ExpressionError(
+            f'"{ast.unparse(node)}" exceeds {MOST:,} characters, digits or entries; simplify it'
+        )
     return found
 
 
 def _size(found: object) -> int:
-    """How many letters, digits or entries a value has; one that has too many is not counted to its end."""
+    """Count the characters, digits or entries of a value, but only until there are too many."""
     if isinstance(found, int):
         return found.bit_length() // 4
     if not isinstance(found, list | tuple):
@@ -94,7 +96,7 @@ def _size(found: object) -> int:
     return size
 
 
-def _computed(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911, PLR0912 - one for each node
+def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911, PLR0912 - a case per node
     match node:
         case ast.Constant(str() | int() as constant):
             return constant
@@ -103,51 +105,51 @@ def _computed(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR09
                 raise ExpressionError(f'there is no name "{name}"; known are {", ".join(names)}')
             return names[name]
         case ast.Attribute(inner, name):
-            return _part(_value(inner, names), name)
+            return _attribute(_checked_value(inner, names), name)
         case ast.Subscript(inner, key):
-            return _value(inner, names)[_value(key, names)]
+            return _checked_value(inner, names)[_checked_value(key, names)]
         case ast.List(items) | ast.Tuple(items):
-            return [_value(item, names) for item in items]
+            return [_checked_value(item, names) for item in items]
         case ast.JoinedStr(parts):
-            return "".join(str(_value(part, names)) for part in parts)
+            return "".join(str(_checked_value(part, names)) for part in parts)
         case ast.FormattedValue(inner, -1, None):
-            return _value(inner, names)
+            return _checked_value(inner, names)
         case ast.BoolOp(op, parts):
-            each = (bool(_value(part, names)) for part in parts)
+            each = (bool(_checked_value(part, names)) for part in parts)
             return all(each) if isinstance(op, ast.And) else any(each)
         case ast.UnaryOp(ast.Not(), inner):
-            return not _value(inner, names)
+            return not _checked_value(inner, names)
         case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
-            return _OPERATORS[type(op)](_value(left, names), _value(right, names))
+            return _OPERATORS[type(op)](_checked_value(left, names), _checked_value(right, names))
         case ast.Compare(left, ops, others):
-            values = [_value(one, names) for one in (left, *others)]
+            values = [_checked_value(one, names) for one in (left, *others)]
             return all(_OPERATORS[type(op)](*two) for op, two in zip(ops, pairwise(values), strict=True))
         case ast.IfExp(test, body, orelse):
-            return _value(body if _value(test, names) else orelse, names)
+            return _checked_value(body if _checked_value(test, names) else orelse, names)
         case ast.ListComp(element, [loop]) | ast.GeneratorExp(element, [loop]):
-            return [_value(element, each) for each in each_of(loop, names)]
+            return [_checked_value(element, each) for each in each_of(loop, names)]
         case ast.Call(ast.Name(name), [argument], []) if name in _FUNCTIONS:
-            return _FUNCTIONS[name](_value(argument, names))
+            return _FUNCTIONS[name](_checked_value(argument, names))
     known = ""
     if isinstance(node, ast.Call):
         known = f"; the functions are {', '.join(_FUNCTIONS)}, with one argument"
     raise ExpressionError(f'"{ast.unparse(node)}" is not allowed in an expression here{known}')
 
 
-def _part(whole: Any, name: str) -> Any:  # noqa: ANN401 - of a fact
+def _attribute(whole: Any, name: str) -> Any:  # noqa: ANN401 - as `evaluate`
     if isinstance(whole, SimpleNamespace) and name in vars(whole):
         return getattr(whole, name)
     raise ExpressionError(f'".{name}" is not an attribute; people and things have a name and a room')
 
 
 def each_of(loop: ast.comprehension, names: Names) -> Iterator[Names]:
-    """The names in each turn of a loop such as `for person in people if person.room`."""
+    """Yield the names for each iteration of a loop such as `for person in people if person.room`."""
     if not isinstance(loop.target, ast.Name) or loop.is_async:
         raise ExpressionError(f'"{ast.unparse(loop.target)}" is not a single name; write for NAME in ...')
-    items = _value(loop.iter, names)
+    items = _checked_value(loop.iter, names)
     if isinstance(items, str) or not isinstance(items, Iterable):
         raise ExpressionError(f'"{ast.unparse(loop.iter)}" is not a list')
     for item in items:
         each = {**names, loop.target.id: item}
-        if all(_value(test, each) for test in loop.ifs):
+        if all(_checked_value(test, each) for test in loop.ifs):
             yield each

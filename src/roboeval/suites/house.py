@@ -1,4 +1,4 @@
-"""House rules beside a suite: programs are judged by what was asked, and stopped where they break a rule."""
+"""House rules of an evaluation: a program that breaks one is stopped and fails."""
 
 from __future__ import annotations
 
@@ -17,35 +17,30 @@ from codebotler.simulator.rule_guard import Rule
 
 @dataclass(frozen=True)
 class HouseRules:
-    """The rules of a file.
+    """The house rules of a file."""
 
-    Args:
-        name: by which evaluations with them are kept: the file's name without its ending. It is empty where
-            a suite brings the rules itself.
-        rules: in the order of the file.
-        digest: the SHA-256 of the file, in hexadecimal.
-    """
-
-    name: str
-    rules: tuple[Rule, ...]
-    digest: str
+    name: str  # the file's name without its ending, part of an evaluation's name; empty for rules of a suite
+    rules: tuple[Rule, ...]  # the rules in the order of the file
+    digest: str  # the SHA-256 of the file, in hexadecimal
 
     def __post_init__(self) -> None:
         for rule in self.rules:
             if rule.inside:
-                raise UserError(f'the rule "{rule.name}" uses inside, which the benchmark cannot judge')
+                raise UserError(
+                    f'the rule "{rule.name}" uses "inside", which benchmarks do not support; remove it'
+                )
 
     @classmethod
     def of_suite(cls, path: Path, skills: SkillTable, rooms: Sequence[str]) -> HouseRules:
-        """Read the rules that a suite with these rooms brings."""
+        """Read the rules of a suite with these rooms."""
         return cls("", read_rules(path, skills, rooms), hashlib.sha256(path.read_bytes()).hexdigest())
 
     @classmethod
     def read(cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = ()) -> HouseRules:
-        """Read a file of rules, for these rooms if they are known; a UserError if it cannot be used."""
+        """Read a file of rules, for these rooms if they are known; raises UserError if it is not valid."""
         rules = read_rules(path, skills, rooms)
         if not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(
-                "its name is used for files; write it in small letters, digits and dashes", file=path
+                "is not a valid file name for rules; use lower-case letters, digits and dashes", file=path
             )
         return cls(path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())

@@ -1,4 +1,4 @@
-"""Suites that other packages bring, by an entry point in the group `roboeval.suites`."""
+"""Suites of other packages, found by entry points in the group `roboeval.suites`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class InstalledSuite(NamedTuple):
     place: str  # `package` or `package.folder.folder`
 
     def folder(self) -> Path:
-        """The folder of its suite.yaml; no code of the package is run to find it."""
+        """Find the folder of its suite.yaml without running code of the package."""
         top, *below = self.place.split(".")
         try:
             spec = find_spec(top)
@@ -30,13 +30,13 @@ class InstalledSuite(NamedTuple):
                 return folder
         missing = f"there is no suite.yaml in {found[0]}" if found else f'there is no package "{top}"'
         raise UserError(
-            f'the package {self.package} says that its suite "{self.name}" is {self.place}, but {missing}; '
-            "install it again, or name a folder with --suite"
+            f'the package {self.package} declares its suite "{self.name}" at {self.place}, but {missing}; '
+            "reinstall it, or name a folder with --suite"
         )
 
 
 def installed_suites() -> list[InstalledSuite]:
-    """The suites of installed packages, sorted by name; two may have the same one."""
+    """The suites of installed packages, sorted by name; names need not be unique."""
     suites = []
     for point in entry_points(group="roboeval.suites"):
         package = "of unknown name" if point.dist is None else f"{point.dist.name} {point.dist.version}"
@@ -45,9 +45,9 @@ def installed_suites() -> list[InstalledSuite]:
 
 
 def installed_folder(name: str) -> Path | None:
-    """The folder of a suite that a package brings; None if no package does.
+    """Find the folder of a suite in an installed package; None if no package has it.
 
-    Raises UserError if several packages bring one, or a folder here has the same name.
+    Raises UserError if several packages have it, or if a local folder has the same name.
     """
     suites = [suite for suite in installed_suites() if suite.name == name]
     if not suites:
@@ -55,12 +55,12 @@ def installed_folder(name: str) -> Path | None:
     if len(suites) > 1:
         packages = " and ".join(f"{suite.package} ({suite.place})" for suite in suites)
         raise UserError(
-            f'several packages have a suite "{name}": {packages}; uninstall all but one, '
+            f'several packages have a suite "{name}": {packages}; keep only one installed, '
             "or name a folder with --suite"
         )
     if (Path(name) / "suite.yaml").is_file():
         raise UserError(
-            f'"{name}" is a suite of the package {suites[0].package} and a folder here; '
-            f"write ./{name} for the folder, or change the directory for the package"
+            f'"{name}" is a suite of the package {suites[0].package} and a local folder; '
+            f"write ./{name} for the folder, or change the directory to use the package"
         )
     return suites[0].folder()

@@ -10,7 +10,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.families.suite import family_tasks_named
 from roboeval.suites.installed import installed_suites
-from roboeval.suites.schema import Accepted, Fact
+from roboeval.suites.schema import AcceptedFinding, TaskFact
 from roboeval.suites.suite import (
     ABLATED,
     SUITES,
@@ -21,19 +21,19 @@ from roboeval.suites.suite import (
     suite_folder,
     task_files,
 )
-from roboeval.suites.task import Check, Requirement, Scenario, Task
+from roboeval.suites.task import Requirement, Scenario, Task, TaskCheck
 from roboeval.suites.taskfile import read_task
 
 __all__ = [
     "ABLATED",
     "SUITES",
-    "Accepted",
-    "Check",
-    "Fact",
+    "AcceptedFinding",
     "Requirement",
     "Scenario",
     "Suite",
     "Task",
+    "TaskCheck",
+    "TaskFact",
     "has_suite",
     "load_suite",
     "read_task",
@@ -48,13 +48,13 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     """Read a suite.
 
     Args:
-        name: of a suite that ships with RoboEval, or that an installed package brings, or its folder; or
-            `families-SPLIT-SEED`, such as `families-test-7`: a fresh task of each family, and with `-N` at
-            the end N tasks.
-        skills: what can stand in formulas, besides those of files that the suite names.
+        name: a suite that ships with RoboEval or with an installed package, or a folder; or
+            `families-SPLIT-SEED`, such as `families-test-7`: a new task of each family, or N tasks with `-N`
+            at the end.
+        skills: the skills that formulas may use, in addition to those in files of the suite.
 
     Raises:
-        UserError: there is no such suite, or one of its files is wrong.
+        UserError: the suite does not exist, or one of its files is not valid.
     """
     name = str(name)
     if (which := family_tasks_named(name)) is not None:
@@ -62,12 +62,12 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     folder = suite_folder(name)
     suite = read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():
-        sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"; use the same name'
+        sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"; use one name'
         raise YamlFile.read(folder / "suite.yaml").wrong(sentence, "name")
     return suite
 
 
 def has_suite(name: str) -> bool:
-    """Whether a suite ships, is installed, or is made of families; no folder is looked for."""
+    """Whether a suite ships with RoboEval, is installed, or consists of families; folders do not count."""
     known = {*shipped_suites(), *(suite.name for suite in installed_suites())}
     return name in known or family_tasks_named(name) is not None

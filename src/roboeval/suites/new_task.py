@@ -1,4 +1,4 @@
-"""Templates for a new task, and for its suite if there is none."""
+"""Templates for a new task and its suite."""
 
 from __future__ import annotations
 
@@ -13,16 +13,14 @@ _TEMPLATE = Path(__file__).parent / "template"
 
 
 def new_task(folder: Path, name: str) -> Path:
-    """Write the files of a new task, and of the suite if there is none; existing solutions stay."""
+    """Write the files of a new task, and of a new suite if needed; existing files stay."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
-        raise UserError(
-            f'"{name}" is not a task name; write it in capitalised words without spaces, such as WaterPlants'
-        )
+        raise UserError(f'"{name}" is not a task name; join capitalised words, as in WaterPlants')
     if (folder.resolve().parent / "suite.yaml").exists():
-        raise UserError("is inside a suite; name the folder around it", file=folder)
+        raise UserError("is inside a suite; name the suite's own folder", file=folder)
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
-        raise UserError("already exists; choose another name, or edit it", file=path)
+        raise UserError("already exists; choose another name or edit it", file=path)
     files = {
         folder / "suite.yaml": ("new-suite.yaml", _suite_name(folder)),
         folder / "solutions" / path.name: ("new-solutions.yaml", ""),
@@ -35,7 +33,7 @@ def new_task(folder: Path, name: str) -> Path:
 
 
 def _suite_name(folder: Path) -> str:
-    """The folder's name, as far as it can be a suite's."""
+    """Turn the name of a folder into a valid name of a suite."""
     plain = re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower())
     name = plain.lstrip("-0123456789").removesuffix(ABLATED)
     return f"my-{name}" if name in shipped_suites() else name or "mine"

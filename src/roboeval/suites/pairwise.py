@@ -8,14 +8,14 @@ from itertools import combinations
 from random import Random
 from typing import TypeAlias
 
-LevelRow: TypeAlias = dict[str, int]  # for each factor the position of its value
-Pair: TypeAlias = tuple[int, int]  # the numbers of two values, the smaller one first
+Combination: TypeAlias = dict[str, int]  # the index of the value of each factor
+Pair: TypeAlias = tuple[int, int]  # the numbers of two values, in ascending order
 
-_TRIES = 12  # candidates for each row
+_TRIES = 12  # candidates for each combination
 
 
-def numbered(sizes: Mapping[str, int]) -> dict[str, range]:
-    """A number for each value of each factor, of all factors by name."""
+def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
+    """Number the values of all factors consecutively; return the numbers of each factor."""
     numbers: dict[str, range] = {}
     start = 0
     for factor in sorted(sizes):
@@ -24,38 +24,38 @@ def numbered(sizes: Mapping[str, int]) -> dict[str, range]:
     return numbers
 
 
-def spread(sizes: Mapping[str, int], count: int, random: Random) -> list[LevelRow]:
-    """A covering array, filled up to `count` rows with random ones."""
-    rows = covering(sizes, random)
+def sample_combinations(sizes: Mapping[str, int], count: int, random: Random) -> list[Combination]:
+    """Cover all pairs, then add random combinations until there are `count`."""
+    rows = cover_pairs(sizes, random)
     rows += [{name: random.randrange(size) for name, size in sizes.items()} for _ in range(count - len(rows))]
     return rows
 
 
-def covering(sizes: Mapping[str, int], random: Random) -> list[LevelRow]:
-    """Rows in which every pair of values meets; greedy, so that they are few but not the fewest."""
+def cover_pairs(sizes: Mapping[str, int], random: Random) -> list[Combination]:
+    """Combinations that contain every pair of values; greedy, so their number is small but not minimal."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
-    numbers = numbered(sizes)
+    numbers = number_values(sizes)
     owner = {number: factor for factor, those in numbers.items() for number in those}
     left = {(a, b) for one, other in combinations(numbers.values(), 2) for a in one for b in other}
-    rows: list[LevelRow] = []
+    rows: list[Combination] = []
     while left:
         seeds = random.sample(sorted(left), min(_TRIES, len(left)))
         partners = partners_of(left)
-        candidates = [_row(numbers, {owner[a]: a, owner[b]: b}, partners, random) for a, b in seeds]
-        best = max(candidates, key=lambda row: len(met(row) & left))
-        left -= met(best)
+        candidates = [_complete(numbers, {owner[a]: a, owner[b]: b}, partners, random) for a, b in seeds]
+        best = max(candidates, key=lambda row: len(pairs_in(row) & left))
+        left -= pairs_in(best)
         rows.append({factor: best[factor] - numbers[factor].start for factor in sizes})
     return rows
 
 
-def met(row: Mapping[str, int]) -> set[Pair]:
-    """The pairs of numbers that meet in a row of them."""
+def pairs_in(row: Mapping[str, int]) -> set[Pair]:
+    """The pairs of numbers in a combination."""
     return set(combinations(sorted(row.values()), 2))
 
 
 def partners_of(pairs: Iterable[Pair]) -> Mapping[int, int]:
-    """For each number those that it makes a pair with, as the bits of an integer."""
+    """For each number, the numbers that it forms a pair with, as bits of an integer."""
     partners: dict[int, int] = defaultdict(int)
     for a, b in pairs:
         partners[a] |= 1 << b
@@ -63,9 +63,9 @@ def partners_of(pairs: Iterable[Pair]) -> Mapping[int, int]:
     return partners
 
 
-def _row(
-    numbers: Mapping[str, range], seed: LevelRow, partners: Mapping[int, int], random: Random
-) -> LevelRow:
+def _complete(
+    numbers: Mapping[str, range], seed: Combination, partners: Mapping[int, int], random: Random
+) -> Combination:
     row = dict(seed)
     chosen = sum(1 << number for number in row.values())
     factors = [factor for factor in numbers if factor not in row]

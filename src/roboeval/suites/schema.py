@@ -1,4 +1,4 @@
-"""What a suite.yaml and a task file may say."""
+"""The schema of suite.yaml and of task files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from codebotler.core.labels import check_regex
 from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
 from codebotler.simulator.settings import WORDS_FOR_PEOPLE, Limits, SimulationSettings
 
-MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
+MOST_WORLDS = 10_000  # per task; a suite then takes a gigabyte of memory, and minutes to sample
 
 Category = Literal[
     "SayAtLocation",
@@ -40,49 +40,43 @@ class _Form(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def _of_what_is_said(means: object) -> object:
+def _default_to_say(means: object) -> object:
     return {"say": means} if isinstance(means, str) else means
 
 
 class CheckFile(_Form):
-    """A check as a task file writes it.
+    """A check in a task file.
 
     Args:
-        category: the class of failure.
-        commonsense: whether it tests what no prompt says.
-        rtl: the constraint.
-        means: by the kind of event, what its texts come to in a sentence; a single text is what is said.
+        means: descriptions of its texts for explanations, by kind of event; a single one is for `say`.
     """
 
-    category: Category
-    commonsense: bool = False
-    rtl: YamlText
-    means: Annotated[dict[str, Name], BeforeValidator(_of_what_is_said)] = {}
+    category: Category  # the kind of failure
+    commonsense: bool = False  # whether it tests something that no prompt mentions
+    rtl: YamlText  # the formula
+    means: Annotated[dict[str, Name], BeforeValidator(_default_to_say)] = {}
 
 
-class Fact(_Form):
-    """Something the requirements of a task rest on.
+class TaskFact(_Form):
+    """A fact that the requirements of a task depend on.
 
     Args:
-        fact: what it is, in a sentence.
-        words: regexes; at least one is found in every prompt, or none in any if it is common sense.
-        commonsense: whether the model must know it without being told.
+        words: regexes; every prompt matches at least one, or none if it is common sense.
     """
 
-    fact: YamlText
+    fact: YamlText  # the fact in a sentence
     words: Annotated[tuple[Annotated[YamlText, AfterValidator(check_regex)], ...], Field(min_length=1)]
-    commonsense: bool = False
+    commonsense: bool = False  # whether the model must know it although no prompt mentions it
 
 
 class RequirementFile(_Form):
-    """A requirement as a task file writes it: a text, or a mapping if only some prompts ask for it.
+    """A requirement in a task file: a string, or a mapping if only some prompts ask for it.
 
     Args:
-        check: the check, perhaps with `not`, and in drawn worlds with `for` or `if`.
-        prompts: by the number of each prompt that asks for it, counted from 0, the words that do.
+        prompts: the words that ask for it, by the number of the prompt, from 0.
     """
 
-    check: YamlText
+    check: YamlText  # the check, optionally with `not`, and for sampled worlds with `for` or `if`
     prompts: Annotated[dict[Annotated[int, Field(ge=0, lt=10_000)], Name], Field(min_length=1)] | None = None
 
     @model_validator(mode="before")
@@ -94,15 +88,15 @@ class RequirementFile(_Form):
 Require = Annotated[list[RequirementFile], Field(min_length=1)]
 
 
-class Accepted(_Form):
-    """A finding of the linter that is there on purpose, and why."""
+class AcceptedFinding(_Form):
+    """A finding of the linter that is intended, and the reason."""
 
     finding: YamlText
     because: YamlText
 
 
 class ScenarioFile(WorldFile):
-    """A world with its requirements as a task file writes it."""
+    """A world with its requirements in a task file."""
 
     about: Name
     require: Require
@@ -116,8 +110,8 @@ Answers = AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]
 Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
 
-class DrawnPersonFile(_Form):
-    """A person who may be in the worlds of a task; where there is a choice, it is drawn for each world."""
+class SampledPersonFile(_Form):
+    """A person who may be in sampled worlds; each list is sampled for each world."""
 
     name: NamePattern | None = None
     where: Levels = Field(alias="in")
@@ -127,27 +121,27 @@ class DrawnPersonFile(_Form):
     leaves: Annotated[bool, Field(strict=True)] = False
 
 
-class DrawnThingFile(_Form):
-    """A thing that may lie in the worlds of a task."""
+class SampledThingFile(_Form):
+    """A thing that may be in sampled worlds."""
 
     label: NamePattern | None = None
     where: Levels = Field(alias="in")
 
 
 class CornerFile(_Form):
-    """A world that a task sets by hand; what it leaves out is the first of the choices."""
+    """A world with values set by hand; the others default to the first entry of their list."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
 
 
-class DrawnWorldsFile(_Form):
-    """What the worlds of a task have in common, and what may differ."""
+class SampledWorldsFile(_Form):
+    """The description from which the worlds of a task are sampled."""
 
     robot: Levels
     rooms: Annotated[list[NamePattern], Field(min_length=1)]
-    people: dict[NamePattern, DrawnPersonFile] = {}
-    things: dict[NamePattern, DrawnThingFile] = {}
+    people: dict[NamePattern, SampledPersonFile] = {}
+    things: dict[NamePattern, SampledThingFile] = {}
     may_wait_forever: YamlText | Annotated[bool, Field(strict=True)] = False
     corners: list[CornerFile] = []
 
@@ -157,29 +151,29 @@ class _AnyTaskFile(_Form):
     summary: Name
     abilities: tuple[Ability, ...] = ()
     prompts: Annotated[list[Name], Field(min_length=1)]
-    facts: tuple[Fact, ...] = ()
+    facts: tuple[TaskFact, ...] = ()
     covered_by: dict[Name, Annotated[list[Name], Field(min_length=1)] | Name] = {}
     checks: dict[str, CheckFile]
-    accepted: tuple[Accepted, ...] = ()
+    accepted: tuple[AcceptedFinding, ...] = ()
 
 
 class TaskFile(_AnyTaskFile):
-    """A task file that lists its worlds."""
+    """A task file with listed worlds."""
 
     worlds: Annotated[list[ScenarioFile], Field(min_length=1)]
 
 
-class DrawnTaskFile(_AnyTaskFile):
-    """A task file that describes its worlds."""
+class SampledTaskFile(_AnyTaskFile):
+    """A task file with sampled worlds."""
 
-    worlds: DrawnWorldsFile
+    worlds: SampledWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
     phrases: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = {}
     require: Require
 
 
 class LimitsFile(_Form):
-    """The limits as a suite file writes them."""
+    """The limits in a suite file."""
 
     seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0
     calls: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 1_000
@@ -187,15 +181,15 @@ class LimitsFile(_Form):
 
 
 def _moment(value: object) -> object:
-    if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - years
+    if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - the years in the message
         return value
     raise ValueError(
-        "it should be a time from 1970 to 2099 with its offset, such as 2024-01-01T12:00:00+00:00"
+        "it should be a time from 1970 to 2099 with an offset, such as 2024-01-01T12:00:00+00:00"
     )
 
 
-class RulesFile(_Form):
-    """The rules as a suite file writes them."""
+class SimulationFile(_Form):
+    """The simulation settings in a suite file."""
 
     literals: Literal["lowercase", "as-written"] = "lowercase"
     matching: Literal["label-in-request", "whole-words"] = "label-in-request"
@@ -216,13 +210,13 @@ class RulesFile(_Form):
         return data
 
     def rules(self) -> SimulationSettings:
-        """The rules it describes."""
+        """Convert to simulation settings."""
         values = {name: value for name, value in self if name != "skill_seconds"}
         return SimulationSettings(**values | {"limits": Limits(**dict(self.limits))})
 
 
 class SuiteFile(_Form):
-    """A suite.yaml."""
+    """The content of suite.yaml."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
     version: Annotated[int, Field(strict=True, ge=0)]
@@ -230,6 +224,6 @@ class SuiteFile(_Form):
     instructions: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")] | None = None
     worlds: Annotated[int, Field(strict=True, ge=1, le=MOST_WORLDS)] = 30
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
-    rules: RulesFile = RulesFile()
-    house_rules: Name | None = None  # a file of the suite: no program may break its rules
-    skills: list[Name] = []  # files of the suite that declare further skills
+    rules: SimulationFile = SimulationFile()
+    house_rules: Name | None = None  # a file of the suite with rules that stop programs
+    skills: list[Name] = []  # files of the suite that declare additional skills

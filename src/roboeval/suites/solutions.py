@@ -1,4 +1,4 @@
-"""Reference solutions in `solutions/TASK.yaml`: right and wrong programs, and mutants that are right, too."""
+"""Reference solutions in `solutions/TASK.yaml`: right and wrong programs, and equivalent mutants."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.models.recorded import NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task
 
-LENDER = Path(__file__).with_name("paper")  # the suite whose instructions others take
+LENDER = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
 
 
 class EquivalentMutantFile(BaseModel):
-    """A mutant that does what was asked."""
+    """A mutant that behaves differently but is still right."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     operator: Name
-    diff: YamlText  # as `roboeval mutate` prints it
+    diff: YamlText  # printed by `roboeval mutate`
     because: Name
 
 
@@ -36,7 +36,7 @@ class SolutionsFile(BaseModel):
 
 
 def solutions(task: Task) -> tuple[Solution, ...]:
-    """The distinct solutions of a task, also those of the suite from which it takes its instruction."""
+    """The distinct solutions of a task, including those of the suite whose instruction it borrows."""
     folders = [task.path.parents[1], *([LENDER] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
@@ -47,7 +47,7 @@ def solutions(task: Task) -> tuple[Solution, ...]:
 
 
 def place_of(task: Task, solution: Solution) -> tuple[Path, int | None]:
-    """The file of a solution and its line there, or the task's file if its own suite does not have it."""
+    """The file and line of a solution; the task file if another suite has it."""
     path = task.path.parents[1] / "solutions" / task.path.name
     programs = _read(task.path.parents[1], task).programs
     if solution not in programs:
@@ -56,13 +56,13 @@ def place_of(task: Task, solution: Solution) -> tuple[Path, int | None]:
 
 
 def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
-    """Why a mutant of a task is right, by its operator and its diff."""
+    """The reasons why mutants of a task are right, by operator and diff."""
     listed = _read(task.path.parents[1], task).equivalent_mutants
     return {(one.operator, bare_diff(one.diff)): one.because.strip() for one in listed}
 
 
 def bare_diff(diff: str) -> str:
-    """A diff without line numbers."""
+    """Remove line numbers from a diff."""
     return "\n".join("@@" if line.startswith("@@") else line.rstrip() for line in diff.strip().splitlines())
 
 

@@ -1,4 +1,4 @@
-"""A suite: tasks and the rules by which they are judged, read from a folder."""
+"""A suite: tasks with the settings by which they are judged, read from a folder."""
 
 from __future__ import annotations
 
@@ -27,88 +27,76 @@ from roboeval.suites.taskfile import read_task
 if TYPE_CHECKING:
     from codebotler.models.recorded import InstructionSolutions
 
-ABLATED = "-ablation"  # at the end of the name of an evaluation's files, and so of no suite's
+ABLATED = "-ablation"  # suffix of the files of an ablation, forbidden in names of suites
 SUITES = Path(__file__).parent
 SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 @dataclass(frozen=True)
 class Suite:
-    """Tasks and the rules by which they are judged.
+    """Tasks with the settings by which they are judged.
 
     Args:
-        name: as evaluations call it.
-        version: counted up when a verdict may change.
-        about: what it is, in a sentence.
-        rules: how worlds are simulated.
-        tasks: by name, sorted.
-        digest: a hash of all that verdicts and prompts depend on.
-        folder: where it was read from.
-        worlds: how many worlds a task has at least, where they are drawn; None if they are written by hand.
-        seed: from which they are drawn.
-        skills: what can stand in its formulas.
-        families: the split, seed and number of its tasks, if families make them.
-        recorded: what the recorded models write for it, if that stands in no file.
+        worlds: the least number of worlds per task, if they are sampled; None if written by hand.
+        recorded: the programs of the recorded models, if they are not in files.
     """
 
-    name: str
-    version: int
-    about: str
-    rules: SimulationSettings
-    tasks: Mapping[str, Task]
-    digest: str
-    folder: Path | None = None
+    name: str  # the name in evaluations
+    version: int  # increases when a verdict may change
+    about: str  # a description in a sentence
+    rules: SimulationSettings  # how worlds are simulated
+    tasks: Mapping[str, Task]  # the tasks by name, sorted
+    digest: str  # a hash of everything that verdicts and prompts depend on
+    folder: Path | None = None  # the folder of its files
     worlds: int | None = None
-    seed: int | None = None
-    skills: SkillTable = SKILLS
-    house: HouseRules | None = None  # what stops a program besides
-    families: Mapping[str, object] | None = None
+    seed: int | None = None  # the random seed of sampled worlds
+    skills: SkillTable = SKILLS  # the skills that formulas may use
+    house: HouseRules | None = None  # rules that stop a program
+    families: Mapping[str, object] | None = (
+        None  # the split, seed and number of its tasks, if families make them
+    )
     recorded: tuple[InstructionSolutions, ...] = field(default=(), repr=False)
 
     def __hash__(self) -> int:
-        return hash(self.digest)  # tasks lie in a dictionary, which has no hash
+        return hash(self.digest)  # a dictionary such as `tasks` has no hash
 
     def __repr__(self) -> str:
         return f"Suite({self.name!r}, {counted(len(self.tasks), 'task')})"
 
     @property
     def house_sentences(self) -> list[str]:
-        """The house rules, in the words of the prompt."""
+        """The sentences of the house rules, for the prompt."""
         return [] if self.house is None else [rule.says for rule in self.house.rules]
 
     def with_house_rules(self, house: HouseRules | None) -> Suite:
-        """The same suite with these house rules in the place of its own, or without any."""
+        """Return the suite with these house rules instead of its own, or without any."""
         return replace(self, house=house)
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
-        """The same suite with other worlds, drawn from the same descriptions.
+        """Return the suite with other worlds, sampled from the same descriptions.
 
         Args:
-            count: how many a task, 1 to 10,000; as many as now by default.
-            seed: from which to draw them; the same as now by default.
+            count: worlds per task, 1 to 10,000; by default, the current number.
+            seed: the random seed; by default, the current one.
 
         Raises:
-            UserError: its worlds are written by hand or follow from its name, or there are too many.
+            UserError: the worlds are not sampled or follow from the suite's name, or there are too many.
         """
         if self.worlds is None or self.folder is None:
             why = "are written by hand" if self.families is None else "follow from its name"
-            raise UserError(f'the worlds of the suite "{self.name}" {why}; it draws no others')
+            raise UserError(f'the worlds of the suite "{self.name}" {why}; omit --worlds and --seed')
         if count is not None and not 1 <= count <= MOST_WORLDS:
             raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MOST_WORLDS:,}")
         return read_suite(self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed)
 
     def with_own_worlds(self) -> Suite:
-        """The same suite with the worlds that its file asks for."""
+        """Return the suite with the worlds that its file specifies."""
         if self.worlds is None or self.folder is None:
             return self
         return read_suite(self.folder, self.skills)
 
     def task(self, name: str) -> Task:
-        """A task by name.
-
-        Raises:
-            UserError: there is none.
-        """
+        """Return a task by name; raises UserError if there is none."""
         if name not in self.tasks:
             known = ", ".join(self.tasks)
             raise UserError(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
@@ -121,15 +109,15 @@ def shipped_suites() -> tuple[str, ...]:
 
 
 def suite_folder(name: str) -> Path:
-    """The folder of a suite: one that ships with RoboEval, one that a package brings, or a folder."""
+    """Find the folder of a suite that ships with RoboEval or with a package; or check that it is a folder."""
     if name in shipped_suites():
         return SUITES / name
-    if SUITE_NAME.fullmatch(name) and (brought := installed_folder(name)) is not None:
-        return brought.resolve()
+    if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:
+        return installed.resolve()
     folder = Path(name)
     if not (folder / "suite.yaml").is_file():
         known = ", ".join(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
-        raise UserError(f'there is no suite "{name}": neither one of {known} nor a folder with a suite.yaml')
+        raise UserError(f'there is no suite "{name}"; name one of {known}, or a folder with a suite.yaml')
     return folder.resolve()
 
 
@@ -142,15 +130,15 @@ def task_files(folder: Path) -> list[Path]:
 
 
 def read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
-    """Read the suite in a folder; its files are read again only if they have changed."""
+    """Read the suite in a folder, or reuse it if no file has changed."""
     files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("*.py")), *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
-    return _suite_of(folder, skills, count, seed, versions)
+    return _build_suite(folder, skills, count, seed, versions)
 
 
-@lru_cache(maxsize=8)  # a training loop may draw other worlds for each step
-def _suite_of(
+@lru_cache(maxsize=8)  # limited, since a training loop may sample new worlds at each step
+def _build_suite(
     folder: Path,
     skills: SkillTable,
     count: int | None,
@@ -160,11 +148,11 @@ def _suite_of(
     file = YamlFile.read(folder / "suite.yaml")
     head = file.validate(SuiteFile)
     if head.name.endswith(ABLATED):
-        sentence = f'"{head.name}" ends like the files of an ablation; choose a name without "{ABLATED}"'
+        sentence = f'the name "{head.name}" ends in "{ABLATED}", which is reserved; choose another'
         raise file.wrong(sentence, "name")
     paths = task_files(folder)
     if not paths:
-        raise UserError("the suite has no tasks; add one file for each task", file=folder / "tasks")
+        raise UserError("contains no tasks; add a file for each task", file=folder / "tasks")
     count, seed = count or head.worlds, head.seed if seed is None else seed
     documents = [YamlFile.read(path) for path in paths]
     words = head.rules.words_for_people
@@ -178,7 +166,7 @@ def _suite_of(
     house = None
     if head.house_rules is not None:
         house = HouseRules.of_suite(folder / head.house_rules, skills, rooms_in(tasks))
-    drawn = any(task.drawn for task in tasks)
+    is_sampled = any(task.is_sampled for task in tasks)
     return Suite(
         name=head.name,
         version=head.version,
@@ -190,29 +178,29 @@ def _suite_of(
         ),
         house=house,
         folder=folder,
-        worlds=count if drawn else None,
-        seed=seed if drawn else None,
+        worlds=count if is_sampled else None,
+        seed=seed if is_sampled else None,
         skills=skills,
     )
 
 
 def rooms_in(tasks: Iterable[Task]) -> list[str]:
-    """The names of all rooms in the worlds of tasks."""
+    """The names of all rooms in the worlds of the tasks."""
     worlds = (scenario.world for task in tasks for scenario in task.scenarios)
     return list(dict.fromkeys(room.name for world in worlds for room in world.rooms))
 
 
 def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
-    """The task file of another suite from which a task has its instruction."""
+    """Read the task file of the suite that a task borrows its instruction from."""
     lender = SUITES / suite / "tasks" / path.name
     if not lender.is_file():
-        sentence = f'the suite "{suite}" has no task "{path.stem}" to take instructions from'
+        sentence = f'the suite "{suite}" has no task "{path.stem}" to borrow instructions from'
         raise file.wrong(sentence, "instructions")
     return YamlFile.read(lender)
 
 
 def _without_meanings(data: object) -> object:
-    """The content of a file without the words for explanations, on which no verdict depends."""
+    """Remove the texts for explanations from the content of a file: no verdict depends on them."""
     if not isinstance(data, dict) or not isinstance(data.get("checks"), dict):
         return data
     checks = {
@@ -225,12 +213,12 @@ def _without_meanings(data: object) -> object:
 def _digest(
     files: list[YamlFile], tasks: list[Task], house: HouseRules | None, skills: Sequence[Path]
 ) -> str:
-    """A hash of what the files say, and of the worlds that were drawn."""
+    """Hash the content of the files and the sampled worlds."""
     content: list[object] = [_without_meanings(file.data) for file in files]
     content += [hashlib.sha256(path.read_bytes()).hexdigest() for path in skills]
     if house is not None:
         content.append(house.digest)
-    drawn = (scenario for task in tasks if task.drawn for scenario in task.scenarios)
-    content += [[one.world.to_data(), *(requirement.text for requirement in one.require)] for one in drawn]
+    sampled = (scenario for task in tasks if task.is_sampled for scenario in task.scenarios)
+    content += [[one.world.to_data(), *(requirement.text for requirement in one.require)] for one in sampled]
     canonical = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(canonical.encode()).hexdigest()

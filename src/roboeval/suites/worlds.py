@@ -1,4 +1,4 @@
-"""Worlds drawn from the description in a task file, and what each of them requires."""
+"""Samples worlds from the description in a task file, with the requirements of each."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.regex_words import first_choice
-from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
-from roboeval.suites.pairwise import LevelRow, spread
-from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile
+from roboeval.suites.expression import ExpressionError, Names, each_of, evaluate, parse_cached
+from roboeval.suites.pairwise import Combination, sample_combinations
+from roboeval.suites.schema import NOWHERE, CornerFile, SampledTaskFile, SampledWorldsFile
 
-Level: TypeAlias = str | int  # a room, an answer, a position among options, a number of looks
+Level: TypeAlias = str | int  # a room, an answer, an index of an option, or a number of looks
 
-ROBOT = "robot"  # the factor that is the room in which it starts
-_TRIES = 50  # draws for a world that is not there yet
+ROBOT = "robot"  # the factor for the starting room
+_TRIES = 50  # attempts to sample a new world
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One world: the level of each factor."""
+    """The levels of all factors of one world."""
 
     about: str
     chosen: Mapping[str, Level]
-    rooms: tuple[str, ...]  # in the order in which the robot knows them
+    rooms: tuple[str, ...]  # in the order of the robot's list
 
     def room(self, name: str) -> str:
         """The room of a person or thing; empty if nowhere."""
@@ -49,7 +49,7 @@ class Setting:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """What tells the world from others; answers of people who are nowhere do not count."""
+        """The part that makes a world distinct; answers of absent people do not count."""
         absent = {_owner(factor) for factor, level in self.chosen.items() if level == NOWHERE}
         chosen = self.chosen.items()
         return self.rooms, *(one for one in chosen if one[1] == NOWHERE or _owner(one[0]) not in absent)
@@ -57,13 +57,13 @@ class Setting:
 
 @dataclass(frozen=True)
 class WorldSampler:
-    """Draws worlds from the description in a task file."""
+    """Samples worlds from the description in a task file."""
 
-    form: DrawnTaskFile
+    form: SampledTaskFile
     file: YamlFile
 
     @property
-    def described(self) -> DrawnWorldsFile:
+    def described(self) -> SampledWorldsFile:
         """The description of the worlds."""
         return self.form.worlds
 
@@ -90,32 +90,32 @@ class WorldSampler:
         known = self.described.rooms if place == (ROBOT,) else [*self.described.rooms, NOWHERE]
         for room in _levels(where):
             if room not in known:
-                sentence = f'there is no room "{room}"; there is {listed(known)}'
+                sentence = f'there is no room "{room}"; use {listed(known)}'
                 raise self.file.wrong(sentence, "worlds", *place)
         return _levels(where)
 
-    # --- drawing
+    # --- sampling
 
     def settings(self, count: int, seed: int) -> Iterator[Setting]:
-        """The corners, and behind them worlds in which every two levels of two factors meet.
+        """Yield the corners, then worlds that cover all pairs of levels.
 
-        They are `count` at least, or fewer where there are no more.
+        There are at least `count`, unless fewer exist.
         """
-        random = Random(f"{self.form.name} {seed}")  # noqa: S311 - no secret
+        random = Random(f"{self.form.name} {seed}")  # noqa: S311 - not for cryptography
         corners = [self._corner(corner, number) for number, corner in enumerate(self.described.corners)]
         yield from corners
         seen = {corner.identity for corner in corners}
         left = count - len(corners)
-        rows = spread(self._free, max(1, left), random) if self._free else [{}] * left
+        rows = sample_combinations(self._free, max(1, left), random) if self._free else [{}] * left
         for number, row in enumerate(rows, len(corners) + 1):
             for _ in range(_TRIES):
-                setting = self._drawn(row, number, random)
+                setting = self._sample(row, number, random)
                 if setting.identity not in seen:
                     seen.add(setting.identity)
                     yield setting
                     break
 
-    def _drawn(self, row: LevelRow, number: int, random: Random) -> Setting:
+    def _sample(self, row: Combination, number: int, random: Random) -> Setting:
         chosen = {factor: levels[row.get(factor, 0)] for factor, levels in self.factors.items()}
         rooms = random.sample(self.described.rooms, len(self.described.rooms))
         return Setting(f"{number}: {self._about(chosen)}", chosen, tuple(rooms))
@@ -126,13 +126,13 @@ class WorldSampler:
             level = wanted.option if isinstance(wanted, OptionFile) else wanted
             named = fnmatch.filter(self.factors, pattern)
             anywhere = level in (*self.described.rooms, NOWHERE)
-            alone = len(named) == 1 or level == NOWHERE  # who is named may be put into any room
+            may_be_anywhere = anywhere and (len(named) == 1 or level == NOWHERE)
             fitting = [
-                f for f in named if level in self.factors[f] or (anywhere and alone and f.endswith(".in"))
+                f for f in named if level in self.factors[f] or (may_be_anywhere and f.endswith(".in"))
             ]
             if not fitting:
                 known = ", ".join(self._free)
-                sentence = f'nothing that "{pattern}" names can be "{level}"; there is {known}'
+                sentence = f'nothing that "{pattern}" matches can be "{level}"; choose from {known}'
                 raise self.file.wrong(sentence, "worlds", "corners", number, "set")
             chosen.update(dict.fromkeys(fitting, level))
         return Setting(corner.about, chosen, tuple(self.described.rooms))
@@ -151,12 +151,12 @@ class WorldSampler:
                 parts.append(f"{name} {', '.join(details) or 'in'}")
         if ROBOT in self._free:
             parts.append(f"robot in {chosen[ROBOT]}")
-        return "; ".join(parts) or "rooms in another order"
+        return "; ".join(parts) or "different order of rooms"
 
-    # --- what follows from a setting
+    # --- worlds and requirements
 
     def world(self, setting: Setting) -> World:
-        """The world of a setting."""
+        """Build the world of a setting."""
         things = self._things(setting)
         rooms = []
         for room in setting.rooms:
@@ -166,15 +166,15 @@ class WorldSampler:
         wait = self.described.may_wait_forever
         if isinstance(wait, str):
             with self._located("worlds", "may_wait_forever"):
-                wait = bool(value(parsed(wait), self._names(setting)))
+                wait = bool(evaluate(parse_cached(wait), self._names(setting)))
         return World(tuple(rooms), setting.start, setting.about, wait)
 
     def requirements(self, setting: Setting) -> Iterator[tuple[str, int]]:
-        """The requirements of a world, as a task that lists its worlds would write them, with their entry."""
+        """Yield the requirements of a world as text, each with the index of its entry in the file."""
         names = self._names(setting)
         for number, form in enumerate(self.form.require):
             with self._located("require", number):
-                yield from ((one, number) for one in _required(form.check, names))
+                yield from ((one, number) for one in _expand(form.check, names))
 
     def _person(self, name: str, setting: Setting) -> Person:
         form, chosen = self.described.people[name], setting.chosen
@@ -196,7 +196,7 @@ class WorldSampler:
         names["start"] = setting.start
         for name, text in self.form.let.items():
             with self._located("let", name):
-                names[name] = value(parsed(text), names)
+                names[name] = evaluate(parse_cached(text), names)
         return names
 
     @contextmanager
@@ -225,41 +225,43 @@ def _detail(factor: str, level: Level) -> str:
     return f"after looks {level}" if "looks" in factor else first_choice(str(level))
 
 
-def _required(text: str, names: Names) -> Iterator[str]:
-    """The requirements that an entry stands for: `check(x)`, `... if CONDITION`, `... for NAME in LIST`."""
+def _expand(text: str, names: Names) -> Iterator[str]:
+    """Expand an entry: `check(x)`, `... if CONDITION` or `... for NAME in LIST`."""
     match _entry(text):
         case ast.IfExp(test, body, ast.Constant(None)):
-            if value(test, names):
-                yield _called(body, names)
+            if evaluate(test, names):
+                yield _format_call(body, names)
         case ast.GeneratorExp(body, [loop]):
             for each in each_of(loop, names):
-                yield _called(body, each)
+                yield _format_call(body, each)
         case _:
-            yield _called(_entry(text), names)
+            yield _format_call(_entry(text), names)
 
 
-@cache  # the same few for each of many worlds
+@cache  # many worlds use the same few entries
 def _entry(text: str) -> ast.expr:
     try:
-        return parsed(f"({text})")
+        return parse_cached(f"({text})")
     except ExpressionError:
         with suppress(ExpressionError):
-            return parsed(f"({text} else None)")
+            return parse_cached(f"({text} else None)")
         raise
 
 
-def _called(node: ast.expr, names: Names) -> str:
+def _format_call(node: ast.expr, names: Names) -> str:
     match node:
         case ast.UnaryOp(ast.Not(), inner):
-            return f"not {_called(inner, names)}"
+            return f"not {_format_call(inner, names)}"
         case ast.Name(name):
             return name
         case ast.Call(ast.Name(name), arguments, []):
-            return f"{name}({', '.join(_written(value(argument, names)) for argument in arguments)})"
+            return (
+                f"{name}({', '.join(_format_argument(evaluate(argument, names)) for argument in arguments)})"
+            )
     raise ExpressionError(f'"{ast.unparse(node)}" is not a requirement; write check(x) or not check(x)')
 
 
-def _written(argument: object) -> str:
+def _format_argument(argument: object) -> str:
     if isinstance(argument, str | int) and not isinstance(argument, bool):
         return json.dumps(argument, ensure_ascii=False)
-    raise ExpressionError(f"an argument of a check is a string or a number, not {argument}")
+    raise ExpressionError(f"an argument of a check must be a string or a number, not {argument}")

@@ -1,4 +1,4 @@
-"""Tasks to train on, in families, with prompts, and rewards in parts.
+"""Training: prompts, and rewards with their components.
 
-Start with `families.py`. The tasks of the suites that ship with RoboEval never train.
+Start with `prompts.py`. Tasks come from families, never from the suites that ship with RoboEval.
 """

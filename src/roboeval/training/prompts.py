@@ -1,4 +1,4 @@
-"""Prompts to train on: rows of a data set, and the program in what a policy writes for one."""
+"""Training prompts as rows of a data set, and the program in a policy's completion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roboeval.suites.families.tasks import family_file, family_names, trained_pr
 
 Form: TypeAlias = Literal["chat", "text"]
 Completion: TypeAlias = str | Sequence[Mapping[str, Any]]
-"""What a policy wrote: a text, or the messages of a conversation."""
+"""The output of a policy: a string, or the messages of a conversation."""
 
 
 def load_prompts(
@@ -25,23 +25,22 @@ def load_prompts(
     form: Form = "chat",
     progress: Callable[[int], object] | None = None,
 ) -> list[dict[str, Any]]:
-    """Prompts for programs, the same on every machine; as many as are wanted.
+    """Generate any number of prompts for programs; the result is reproducible.
 
     Args:
         split: `train`, `validation` or `test`, which share no task.
-        count: how many prompts.
-        seed: for others: with the next number, all tasks are new.
-        only: the families to draw from, also files of your own; all that are here by default.
-        form: `chat` for messages, `text` for one text that base models go on from.
-        progress: called with the number of prompts that are made, each time that it has grown.
+        count: the number of prompts.
+        seed: another seed gives entirely different tasks.
+        only: families or `.yaml` files of families; by default, all families that ship with RoboEval.
+        form: `chat` for messages, `text` for a single text that base models continue.
+        progress: called with the number of prompts so far.
 
     Returns:
-        rows with `prompt` (messages with `role` and `content`, or a text), `family`, `seed` and
-        `prompt_index`, which say what it asks for, and `opening`: the first line of the program if the
-        prompt ends with it, else nothing.
+        rows with `prompt` (messages with `role` and `content`, or a text); `family`, `seed` and
+        `prompt_index` of its task; and `opening`, the first line of the program if the prompt ends with it.
 
     Raises:
-        UserError: there is no such split or family, or the count or the seed is out of range.
+        UserError: the split or a family does not exist, or the count or the seed is out of range.
     """
     first = first_seed(split, seed, count, "prompt")
     expect_list(only, "the families")
@@ -50,7 +49,7 @@ def load_prompts(
     names = tuple(only) or family_names()
     rows: list[dict[str, Any]] = []
     for number in range(first, first + count):
-        if len(rows) < len(names):  # once for each family, whose file may be wrong
+        if len(rows) < len(names):  # validates the file of each family once
             trained_task(names[number % len(names)], number)
         rows.append(_row(names, number, form))
         if progress is not None:
@@ -59,7 +58,7 @@ def load_prompts(
 
 
 def _row(families: Sequence[str], seed: int, form: Form) -> dict[str, Any]:
-    """The row of a seed: in turn of each family, and of each of its phrasings."""
+    """The row of a seed; families and their prompts take turns."""
     turn, number = divmod(seed, len(families))
     family = families[number]
     prompts = trained_prompts(family, seed)
@@ -76,25 +75,25 @@ def _row(families: Sequence[str], seed: int, form: Form) -> dict[str, Any]:
 
 
 def program_in(completion: Completion, opening: str = "") -> str:
-    """The program in what a policy wrote.
+    """Extract the program from a policy's completion.
 
     Args:
-        completion: a text, or messages, of which the last is the policy's.
-        opening: what the prompt ended with, if a text was to go on from it.
+        completion: a string, or messages, of which the last is the policy's.
+        opening: the last line of the prompt, if the completion continues it.
 
     Raises:
-        UserError: there is no message, or one without content.
+        UserError: there is no message, or the last one has no content.
     """
-    text = completion if isinstance(completion, str) else _said(completion)
+    text = completion if isinstance(completion, str) else _last_text(completion)
     if not opening:
         return program_of(text).source
     return program_of(prompt_for("go on").program_from(text), continues=True).source
 
 
-def _said(messages: Sequence[Mapping[str, Any]]) -> str:
-    """The text of the last message, which may come in parts."""
+def _last_text(messages: Sequence[Mapping[str, Any]]) -> str:
+    """The text of the last message, whose content may be a list of parts."""
     if not messages or "content" not in messages[-1]:
-        raise UserError("a completion has no message with content")
+        raise UserError("a completion has no message with content; pass a string or messages")
     content = messages[-1]["content"]
     if isinstance(content, str) or content is None:
         return content or ""

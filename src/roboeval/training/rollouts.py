@@ -1,4 +1,4 @@
-"""Judges rollouts of a policy: the reward of each program, and the parts that it comes from."""
+"""Judges rollouts of a policy: the reward of each program and its components."""
 
 from __future__ import annotations
 
@@ -21,38 +21,31 @@ from roboeval.suites.families.tasks import WORLDS, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.suites.task import Scenario
 
-TOGETHER = 16  # programs for the same task that are run together
+TOGETHER = 16  # programs per batch, all for the same task
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """A program that a policy wrote for a prompt of `load_prompts`.
+    """A program that a policy wrote for a prompt of `load_prompts`."""
 
-    Args:
-        family: of the task.
-        seed: of the task.
-        prompt_index: which phrasing, counted from 0.
-        program: its source, which need not even parse.
-    """
-
-    family: str
-    seed: int
-    prompt_index: int
-    program: str
+    family: str  # the family of the task
+    seed: int  # the seed of the task
+    prompt_index: int  # the phrasing, from 0
+    program: str  # the source, which need not parse
 
 
 @dataclass(frozen=True)
 class Components:
-    """What a program did, in parts from 0 to 1.
+    """The reward of a program and its components, each from 0 to 1.
 
     Args:
-        reward: as of `roboeval.reward`: 1 exactly if the program passes, 0 if it does nothing.
+        reward: the value of `roboeval.reward`: 1 if and only if the program passes, 0 if it does nothing.
         passed: 1 if all requirements hold in all worlds.
-        requirements: the share of the requirements that hold, the mean over worlds; some hold if nothing is
-            done, so that this part alone is no reward.
-        without_errors: the share of the worlds in which the program ends by itself.
-        parses: 1 if it is Python.
-        rules_kept: the share of the worlds in which it breaks no rule of the house.
+        requirements: the share of requirements that hold, averaged over worlds. It is no reward by itself,
+            since some requirements hold for a program that does nothing.
+        without_errors: the share of worlds in which the program ends without an error.
+        parses: 1 if the program is valid Python.
+        rules_kept: the share of worlds in which it breaks no house rule.
     """
 
     reward: float
@@ -70,39 +63,37 @@ def judge(
     house: HouseRules | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> list[Components]:
-    """Judge programs of a policy, each in the worlds of its task.
-
-    Only a few batches are under way at a time, however many rollouts there are.
+    """Judge programs of a policy in the worlds of their tasks, a few batches at a time.
 
     Args:
         rollouts: the programs; equal ones are judged once.
-        worlds: how many a task has at least, 1 to 10,000.
-        house: rules that no program may break; one that does is stopped there.
-        progress: called with the number of distinct rollouts that are judged, each time that it has grown.
+        worlds: the least number of worlds per task, 1 to 10,000.
+        house: rules that stop a program that breaks one.
+        progress: called with the number of distinct rollouts judged so far.
 
     Raises:
-        UserError: there is no such family or prompt.
-        EngineError: the engine failed; no program is to blame for that.
+        UserError: a family or prompt does not exist.
+        EngineError: the engine failed, which is not the fault of a program.
     """
-    names = {one: _name(one, worlds, house) for one in rollouts}
-    known = KNOWN.among(names.values())
+    names = {one: _key(one, worlds, house) for one in rollouts}
+    known = COMPONENT_CACHE.among(names.values())
     groups: dict[tuple[str, int, int], list[Rollout]] = {}
     for one, name in names.items():
         if name not in known:
             groups.setdefault((one.family, one.seed, one.prompt_index), []).append(one)
-    for batch, found in _under_way(_batches(groups.values()), partial(_judged, worlds, house)):
+    for batch, found in _judge_ahead(_batches(groups.values()), partial(_judge_batch, worlds, house)):
         known.update(zip((names[one] for one in batch), found, strict=True))
         if progress is not None:
             progress(len(known))
-    KNOWN.add(known)
+    COMPONENT_CACHE.add(known)
     return [known[names[one]] for one in rollouts]
 
 
-KNOWN: Remembered[Components] = Remembered()
+COMPONENT_CACHE: Remembered[Components] = Remembered()
 
 
-def _name(one: Rollout, worlds: int, house: HouseRules | None) -> bytes:
-    """What a rollout is remembered by."""
+def _key(one: Rollout, worlds: int, house: HouseRules | None) -> bytes:
+    """The key of a rollout in the cache."""
     rules = "" if house is None else house.digest
     return digest(one.family, f"{one.seed} {one.prompt_index} {worlds}", rules, one.program)
 
@@ -116,10 +107,10 @@ def _batches(groups: Iterable[Batch]) -> Iterator[Batch]:
             yield group[start : start + TOGETHER]
 
 
-def _under_way(
+def _judge_ahead(
     batches: Iterator[Batch], judged: Callable[[Batch], list[Components]]
 ) -> Iterator[tuple[Batch, list[Components]]]:
-    """Each batch with what is found of it, in order, with as many under way as keep all workers busy."""
+    """Yield each batch with its results, in order; a limited number of batches keeps all workers busy."""
     pool = shared_pool()
     waiting: deque[tuple[Batch, Future[list[Components]]]] = deque()
     try:
@@ -130,13 +121,13 @@ def _under_way(
                 return
             batch, future = waiting.popleft()
             yield batch, future.result()
-    finally:  # after an interrupt, nobody waits for the rest
+    finally:  # after an interrupt, the results are not needed
         for _, future in waiting:
             future.cancel()
 
 
-def _judged(worlds: int, house: HouseRules | None, batch: Batch) -> list[Components]:
-    """What programs for the same prompt did, in a thread that has a worker."""
+def _judge_batch(worlds: int, house: HouseRules | None, batch: Batch) -> list[Components]:
+    """Judge programs for the same prompt; runs in a thread with a worker."""
     first = batch[0]
     task = trained_task(first.family, first.seed, worlds=worlds)
     task.expect_prompt(first.prompt_index)
@@ -152,7 +143,7 @@ def _judged(worlds: int, house: HouseRules | None, batch: Batch) -> list[Compone
 
 
 def _has_run(outcomes: Sequence[Outcome]) -> bool:
-    """Whether a program has certainly been executed, so that it is Python."""
+    """Whether an outcome proves that the program was executed, and therefore is valid Python."""
     return any(outcome.trace or outcome.error is None for outcome in outcomes)
 
 

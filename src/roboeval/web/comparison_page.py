@@ -1,4 +1,4 @@
-"""The page of several runs side by side: how often each passes, prompt by prompt, and why not."""
+"""The page that compares runs: pass rates by prompt, and causes of failures."""
 
 from __future__ import annotations
 
@@ -15,79 +15,81 @@ from roboeval.web.difference import PAIR, Difference, differences_of, draw_diffe
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
-from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import EVERY, HeatMap, completions_text, score_text, show_state
 
-MOST = 12  # runs side by side; more are no comparison
+MOST = 12  # runs on the page
 MOST_NAME = 60
-NOT_ALIKE = "These runs were judged by different suites or versions of a suite. Compare with care."
+DIFFERENT_SUITES = (
+    "These runs were judged with different suites or versions of a suite. Compare them with care."
+)
 
 
 async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
     """Draw the runs of these names."""
     PlainText("h1", "Runs side by side")
     if not names:
-        PlainText("p", "Tick runs in the list, then show them side by side.", "quiet")
+        PlainText("p", "Select runs in the list, then click \u201cShow side by side\u201d.", "quiet")
         html.a("All runs", href=outside("/runs"))
         return
     if len(names) > MOST:
-        PlainText("p", f"These are the first {MOST} of {len(names):,} runs.", "quiet")
+        PlainText("p", f"Only the first {MOST} of {len(names):,} runs are shown.", "quiet")
     comparison = _Comparison(store, names[:MOST])
     await comparison.refresh()
     ui.timer(EVERY, comparison.refresh, immediate=False)
 
 
 class _Comparison:
-    """Runs beside each other, kept up to date with their folders."""
+    """Runs side by side, kept up to date with their folders."""
 
     def __init__(self, store: RunStore, names: Sequence[str]) -> None:
         self._store, self._names = store, names
         self._versions: list[Hashable] = []
-        self._troubles = ui.element("div").props("role=status")
+        self._errors = ui.element("div").props("role=status")
         self._list = ui.element("ul").classes("beside-list")
-        self._difference = ui.element("section").classes("pane").props('aria-label="Which is better"')
+        self._difference = ui.element("section").classes("pane").props('aria-label="Which model is better"')
         with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
-            PlainText("h2", "Where they pass").props("id=h-heat")
-            self._tasks = HeatMap("Tasks by prompts, run by run", "Task")
-            text = "Percent of the completions of each prompt; the first column of a run is their mean."
+            PlainText("h2", "Pass rates").props("id=h-heat")
+            self._tasks = HeatMap("Pass rates by task, prompt and run", "Task")
+            text = "Percent of each prompt's completions that pass; the first column of a run is the mean."
             PlainText("p", text, "quiet")
         with ui.element("section").classes("pane causes").props("aria-labelledby=h-kinds"):
-            PlainText("h2", "Why they fail").props("id=h-kinds")
+            PlainText("h2", "Causes of failures").props("id=h-kinds")
             self._kinds = HeatMap("Kinds of failures by run", "Kind of failure")
-            PlainText("p", "Percent of all completions of a run.", "quiet")
+            PlainText("p", "Percent of all judged completions of a run.", "quiet")
 
     async def refresh(self) -> None:
         """Show the runs as they are now."""
-        runs, troubles = await asyncio.to_thread(self._read)
-        versions: list[Hashable] = [*((run.name, run.version) for run in runs), *troubles]
+        runs, errors = await asyncio.to_thread(self._read)
+        versions: list[Hashable] = [*((run.name, run.version) for run in runs), *errors]
         if versions != self._versions:
             self._versions = versions
             judged = [run for run in runs if run.judged]
             found = await asyncio.to_thread(differences_of, judged) if len(judged) >= PAIR else []
-            self._show(runs, troubles, found)
+            self._show(runs, errors, found)
 
     def _read(self) -> tuple[list[Snapshot], list[str]]:
-        runs, troubles = [], []
+        runs, errors = [], []
         for name in self._names:
             try:
                 runs.append(self._store.open(name))
             except UserError as error:
-                troubles.append(error.sentence)
+                errors.append(error.sentence)
         heads = [run.results.head for run in runs if run.judged]
         judged_by = {tuple(str(head.get(part)) for part in ("suite", "digest", "ablation")) for head in heads}
-        return runs, [*troubles, *[NOT_ALIKE] * (len(judged_by) > 1)]
+        return runs, [*errors, *[DIFFERENT_SUITES] * (len(judged_by) > 1)]
 
-    def _show(self, runs: Sequence[Snapshot], troubles: Sequence[str], found: Sequence[Difference]) -> None:
-        self._troubles.clear()
-        with self._troubles:
-            for sentence in troubles:
+    def _show(self, runs: Sequence[Snapshot], errors: Sequence[str], found: Sequence[Difference]) -> None:
+        self._errors.clear()
+        with self._errors:
+            for sentence in errors:
                 PlainText("p", sentence, "trouble")
         self._list.clear()
         with self._list:
             for run in runs:
                 _draw_run(run)
-        cells = [TaskCells(run, Filter()) for run in runs]
-        groups = [{**_head(run), "columns": of.columns} for run, of in zip(runs, cells, strict=True)]
+        cells = [TaskCells(run, CompletionFilter()) for run in runs]
+        groups = [{**_column(run), "columns": of.columns} for run, of in zip(runs, cells, strict=True)]
         tasks = dict.fromkeys(task for of in cells for task in of.tasks)
         rows = [
             {"name": shortened(task, MOST_NAME), "cells": [cell for of in cells for cell in of.row(task)]}
@@ -99,13 +101,13 @@ class _Comparison:
         self._difference.set_visibility(bool(found))
         if found:
             with self._difference:
-                PlainText("h2", "Which is better")
+                PlainText("h2", "Which model is better")
                 draw_differences(found)
-        columns = [_head(run) for run in judged]
+        columns = [_column(run) for run in judged]
         self._kinds.show(groups=[{"name": "", "columns": columns}], rows=failure_rows(judged))
 
 
-def _head(run: Snapshot) -> dict[str, Any]:
+def _column(run: Snapshot) -> dict[str, Any]:
     return {"name": shortened(run.name, MOST_NAME), "title": models_of(run), "href": address(run.name)}
 
 

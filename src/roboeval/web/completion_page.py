@@ -1,4 +1,4 @@
-"""The page of one completion: the program, and in each world what the robot did, what failed, and why."""
+"""The page of one completion: its program, and for each world the robot's actions and failed checks."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from roboeval.suites.task import check_label, describe_person, world_title
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import completion_details
-from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import ProgramView
 
 MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION, MOST_REPLY = 80, 2_000, 5_000, 50_000
-RED = "Red: the step at which a check failed."
+RED = "Red marks the step at which a check failed."
 NEIGHBOURS = ("Previous completion", "Next completion")
-CHANGED = "The program was changed or removed after it was judged; the verdicts are about the earlier one."
+CHANGED = "The program was changed or removed after it was judged. The verdicts refer to the earlier version."
 
 
 async def draw_completion(
-    store: RunStore, run: str, name: str, chosen: Filter, evaluation: str | None
+    store: RunStore, run: str, name: str, chosen: CompletionFilter, evaluation: str | None
 ) -> None:
-    """Draw a completion, with links to its neighbours among those that were chosen."""
+    """Draw a completion, with links to its neighbours in the filtered list."""
     snapshot, data, fix = await asyncio.to_thread(_read, store, run, name, evaluation)
     _draw_head(snapshot, data, fix, chosen, chosen.query(evaluation))
     with ui.element("div").classes("one-program"):
@@ -57,27 +57,29 @@ async def draw_completion(
 def _read(
     store: RunStore, run: str, name: str, evaluation: str | None
 ) -> tuple[Snapshot, dict[str, Any], Fix | None]:
-    """A run, a completion of it, and if that failed, what would turn it into the nearest one that passes."""
+    """Read a run and a completion; if that failed, also the most similar program that passes."""
     snapshot = store.open(run, evaluation)
     row = snapshot.row(name)
     if row is None:
         raise MissingError(f'this run has no completion "{shortened(name, MOST_NAME)}"')
     data = completion_details(snapshot, row)
     key: Key = data["task"], data["prompt"], data["index"]
-    has_failed = data["passed"] is False and _sentence(data) is None
+    has_failed = data["passed"] is False and _no_program_sentence(data) is None
     fix = nearest_fix(snapshot.results, key) if has_failed else None
     return snapshot, data, fix
 
 
 def _worlds(run: Snapshot, task: str) -> dict[str, World]:
-    """The worlds in which a task was judged, by what they are about; none if the suite is not at hand."""
+    """The worlds of a task by description; none if the suite is unavailable."""
     if run.suite is None or task not in run.suite.tasks:
         return {}
     scenarios = run.suite.tasks[task].judged_in(ablated=run.results.is_ablated)
     return {scenario.world.about: scenario.world for scenario in scenarios}
 
 
-def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: Filter, query: str) -> None:
+def _draw_head(
+    run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: CompletionFilter, query: str
+) -> None:
     key: Key = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
         html.a(shortened(run.name, MOST_NAME), href=outside(f"{address(run.name)}{query}#completions")).props(
@@ -98,7 +100,7 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: 
         if data["model"] is not None:
             PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
         if fix is not None:
-            text = f"Nearest program that passes: {counted(fix.changed, 'line')} changed"
+            text = f"Most similar program that passes: {counted(fix.changed, 'line')} changed"
             html.a(text, href=outside(f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
     if data["stale"]:
         PlainText("p", CHANGED, "trouble")
@@ -111,31 +113,31 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: 
 
 def _draw_program(data: Mapping[str, Any]) -> None:
     with ui.element("section").classes("pane").props("aria-labelledby=h-program"):
-        title = "Program" if _sentence(data) is None else "Taken from the reply"
+        title = "Program" if _no_program_sentence(data) is None else "Extracted from the reply"
         PlainText("h2", title).props("id=h-program")
         if data["program"] is None:
-            PlainText("p", "It is no longer in this run.", "quiet")
+            PlainText("p", "The program is no longer in this run.", "quiet")
             return
-        ran = data["worlds"] if _sentence(data) is None else ()
+        ran = data["worlds"] if _no_program_sentence(data) is None else ()
         lines = (world["line"] for world in ran if not world["satisfied"])
         view = ProgramView(data["program"], (line for line in lines if line is not None))
         if view.left_out:
-            PlainText("p", f"{view.left_out:,} more lines; all are in completions.jsonl.", "quiet")
+            PlainText("p", f"{view.left_out:,} more lines; see completions.jsonl.", "quiet")
 
 
-def _sentence(data: Mapping[str, Any]) -> str | None:
-    """Why its reply held no program; None if it held one."""
+def _no_program_sentence(data: Mapping[str, Any]) -> str | None:
+    """Why the reply contains no program; None if it contains one."""
     return None if data["failure"] is None else no_program_sentence(data["failure"])
 
 
 def _draw_reply(reply: Mapping[str, Any] | None) -> None:
-    """Draw how the reply ended, and folded, what the model thought and the reply as it came."""
+    """Draw how the reply ended; its reasoning and full text are folded."""
     if reply is None:
         return
     with ui.element("section").classes("pane reply").props("aria-labelledby=h-reply"):
         PlainText("h2", "Reply").props("id=h-reply")
         PlainText("p", "; ".join(reply_facts(reply)), "quiet")
-        for name, text in (("Reasoning", reply["reasoning"]), ("Reply as it came", reply["raw_reply"])):
+        for name, text in (("Reasoning", reply["reasoning"]), ("Full reply", reply["raw_reply"])):
             if text:
                 title = f"{name}, {counted(len(text), 'character')}"
                 _draw_folded(partial(PlainText, "span", title), partial(_draw_text, text, name))
@@ -149,13 +151,13 @@ def _draw_text(text: str, name: str) -> None:
 def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> None:
     judged = completion["worlds"]
     with ui.element("div").classes("worlds-of"):
-        if (sentence := _sentence(completion)) is not None:  # no robot did anything
+        if (sentence := _no_program_sentence(completion)) is not None:  # without a program nothing was run
             PlainText("p", sentence, "trouble")
             return
         if completion["lowered"] and judged:
             PlainText("p", LOWERED, "quiet")
         if not judged:
-            PlainText("p", "It has not been judged yet.", "quiet")
+            PlainText("p", "This completion has not been judged yet.", "quiet")
         for number, data in failing_first(judged):
             head = partial(_draw_world_head, data, number, len(judged))
             draw = partial(_draw_world, data, worlds.get(data["world"]), f"world-{number}-step-")
@@ -176,11 +178,11 @@ def _draw_world_head(data: Mapping[str, Any], number: int, of: int) -> None:
 
 
 def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
-    """Draw the error that ended a run, its failed checks, and what else explains it."""
+    """Draw the error that ended a run, its failed checks, and remarks."""
     if data["error"] is not None:
-        allowed = ". A program may wait for ever in this world, so this is allowed." * data["satisfied"]
-        told = f"{shortened(data['error']['kind'])}: {shortened(error_sentence(data))}{allowed}"
-        PlainText("p", told, "quiet" if data["satisfied"] else "trouble")
+        allowed = ". This world allows a program to wait forever." * data["satisfied"]
+        sentence = f"{shortened(data['error']['kind'])}: {shortened(error_sentence(data))}{allowed}"
+        PlainText("p", sentence, "quiet" if data["satisfied"] else "trouble")
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
             _draw_check(check, anchor)
@@ -189,7 +191,7 @@ def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
 
 
 def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
-    """Draw what happened in a world; its steps have the `anchor` and their number as an id."""
+    """Draw what happened in a world; the ids of its steps are the `anchor` and a number."""
     _draw_reasons(data, anchor)
     steps, cut = data["steps"], data.get("cut")
     wrong = {check["step"] for check in data["failed_checks"]} - {None}
@@ -204,8 +206,8 @@ def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> No
     if cut is not None:
         PlainText("p", f"{cut_sentence(cut)}.", "quiet")
     if steps:
-        kept = "Every step" if cut is None else "Every step that was kept"
-        title = f"{kept}, {len(steps):,} in all"
+        kept = "All steps" if cut is None else "All stored steps"
+        title = f"{kept} ({len(steps):,})"
         _draw_folded(partial(PlainText, "span", title), partial(_draw_steps, steps))
     if world is not None:
         _draw_folded(partial(PlainText, "span", "The world"), partial(_draw_rooms, world))
@@ -221,7 +223,7 @@ def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
 
 
 def _draw_folded(head: Callable[[], object], draw: Callable[[], None]) -> None:
-    """Draw a head, and below it what is drawn only when it is unfolded for the first time."""
+    """Draw a foldable section; its content is drawn when it is first unfolded."""
     with html.details() as details:
         with ui.element("summary"):
             head()
@@ -237,7 +239,7 @@ def _draw_folded(head: Callable[[], object], draw: Callable[[], None]) -> None:
 
 def _draw_steps(steps: Sequence[Mapping[str, Any]]) -> None:
     lines = (f"{step['step']:>4}  {step_text(step).plain}" for step in steps)
-    PlainText("pre", "\n".join(lines), "source").props('tabindex=0 aria-label="Every step"')
+    PlainText("pre", "\n".join(lines), "source").props('tabindex=0 aria-label="All steps"')
 
 
 def _draw_rooms(world: World) -> None:

@@ -1,4 +1,4 @@
-"""By how much one of two runs is better, task by task, and the completions that tell them apart."""
+"""The difference between two runs by task, and the completions with different verdicts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.analysis.compare import compared, pairs_to_compare, verdict
+from roboeval.analysis.compare import compare_scores, pairs_to_compare, verdict
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
 from roboeval.evaluation.runs.completions import KEY, Key, name_of
 from roboeval.web.heat_map import address
@@ -21,29 +21,29 @@ from roboeval.web.widgets import interval_text
 
 MOST_NAME, MOST_TASKS, MOST_KEYS = 60, 100, 30
 PAIR = 2
-HEADS = ("95% interval", "Different verdicts")
-ABOUT = "The interval of all tasks is over tasks, that of a task over its prompts."
-UNKNOWN = " Where all differ equally, or one is alone, it is unknown."
+HEADS = ("95% confidence interval", "Different verdicts")
+ABOUT = "The interval for all tasks is over tasks, that for a task over its prompts."
+UNKNOWN = " It is unknown for a single prompt or without variation."
 
 
 @dataclass(frozen=True)
 class TaskRow:
-    """How two runs differ in a task."""
+    """The difference between two runs in a task."""
 
     task: str
-    shares: tuple[float, float]  # of completions that pass, mean over the prompts that both have
-    difference: Estimate  # the second minus the first; over prompts, of all tasks over tasks
-    differing: tuple[tuple[Key, bool], ...]  # where one run's passes, and whether it is the second's
+    shares: tuple[float, float]  # mean pass@1 over common prompts
+    difference: Estimate  # second minus first; the interval is over prompts, for all tasks over tasks
+    differing: tuple[tuple[Key, bool], ...]  # passed in one run only; True: in the second run
 
 
 def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
-    """The tasks that both runs have, those that differ most first."""
+    """Compare the tasks that both runs have; the largest differences come first."""
     scores = [pass_at_1(run.scores) for run in (first, second)]
     prompts: dict[str, list[tuple[float, float]]] = {}
     for key in scores[0]:
         if key in scores[1]:
             prompts.setdefault(key[0], []).append((scores[0][key], scores[1][key]))
-    differing = _differing(first, second)
+    differing = _find_differing(first, second)
     rows = [
         TaskRow(
             task,
@@ -56,7 +56,7 @@ def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
     return sorted(rows, key=lambda row: (-abs(row.difference.mean), row.task))
 
 
-def _differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[Key, bool]]]:
+def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[Key, bool]]]:
     judged = [run.completions.drop_nulls("passed").select(*KEY, "passed") for run in (first, second)]
     both = judged[0].join(judged[1], on=KEY, how="inner", suffix="_second", maintain_order="left")
     found: dict[str, list[tuple[Key, bool]]] = {}
@@ -69,16 +69,16 @@ def _differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[Key, b
 
 @dataclass(frozen=True)
 class Difference:
-    """How two judged runs differ."""
+    """The difference between two judged runs."""
 
     runs: tuple[Snapshot, Snapshot]
-    told: str  # which is better, and how sure that is
-    overall: TaskRow | None = None  # over all tasks; None where they have no prompt in common
+    sentence: str  # which run is better, and how significant the difference is
+    overall: TaskRow | None = None  # over all tasks; None if they have no prompt in common
     rows: tuple[TaskRow, ...] = ()
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
-    """Compare judged runs pair by pair, which may take seconds for large ones; two also task by task."""
+    """Compare judged runs pair by pair, and two runs also by task; may take seconds for large runs."""
     pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
     return [_difference(*pair, by_task=len(runs) == PAIR) for pair in pairs]
 
@@ -86,33 +86,33 @@ def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
 def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Difference:
     names = shortened(first.name, MOST_NAME), shortened(second.name, MOST_NAME)
     try:
-        found = compared(pass_at_1(first.scores), pass_at_1(second.scores))
+        found = compare_scores(pass_at_1(first.scores), pass_at_1(second.scores))
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
-    told = verdict(found, names)
+    sentence = verdict(found, names)
     if not by_task:
-        return Difference((first, second), told)
+        return Difference((first, second), sentence)
     overall = TaskRow("All tasks", (found.first, found.second), found.over_tasks, ())
-    return Difference((first, second), told, overall, tuple(task_rows(first, second)[:MOST_TASKS]))
+    return Difference((first, second), sentence, overall, tuple(task_rows(first, second)[:MOST_TASKS]))
 
 
 def draw_differences(found: Sequence[Difference]) -> None:
-    """Draw which run of each pair is better; of a single pair also the tasks."""
+    """Draw the comparison of each pair; for a single pair also by task."""
     if len(found) == 1:
         _draw_difference(found[0])
         return
     with ui.element("ul").classes("pairs"):
         for one in found:
             with ui.element("li"):
-                PlainText("span", one.told)
+                PlainText("span", one.sentence)
                 query = urlencode([("run", run.name) for run in one.runs], errors="replace")
-                html.a("Task by task", href=outside(f"/side-by-side?{query}"))
+                html.a("By task", href=outside(f"/side-by-side?{query}"))
 
 
 def _draw_difference(difference: Difference) -> None:
     runs, rows, overall = difference.runs, difference.rows, difference.overall
     names = [shortened(run.name, MOST_NAME) for run in runs]
-    PlainText("p", difference.told)
+    PlainText("p", difference.sentence)
     if overall is None:
         return
     region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
@@ -154,5 +154,5 @@ def _draw_differing(row: TaskRow, runs: Sequence[Snapshot]) -> None:
                 PlainText("li", f"and {left:,} more")
 
 
-def _verdicts(is_second: bool) -> Iterator[str]:  # noqa: FBT001 - which of two
+def _verdicts(is_second: bool) -> Iterator[str]:  # noqa: FBT001 - a private function
     yield from ("failed", "passed") if is_second else ("passed", "failed")

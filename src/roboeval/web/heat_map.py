@@ -1,4 +1,4 @@
-"""Heat maps: the text of each cell, its shade, and its link."""
+"""Heat maps: the text, shade and link of each cell."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from roboeval.analysis.metrics import mean_of
 from roboeval.analysis.summary import Failures
 from roboeval.evaluation.failures import NO_PROGRAM, ending_of, plural_of
 from roboeval.evaluation.runs.completions import by_hand
-from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.snapshot import CompletionFilter, Snapshot
 
 STEPS = 10
 NONE = "-"
@@ -21,14 +21,14 @@ EMPTY = {"text": "", "shade": "none"}
 
 
 def percent(share: float) -> str:
-    """A share in whole percent; what is little is not nothing, and what is nearly all is not all."""
-    if 0 < share < 0.01:  # noqa: PLR2004 - a percent
+    """Format a share in whole percent; "<1" and ">99" avoid rounding to 0 and 100."""
+    if 0 < share < 0.01:  # noqa: PLR2004 - one percent
         return "<1"
-    return ">99" if 0.99 < share < 1 else f"{100 * share:.0f}"  # noqa: PLR2004 - all but a percent
+    return ">99" if 0.99 < share < 1 else f"{100 * share:.0f}"  # noqa: PLR2004 - 99 percent
 
 
 def shade(share: float | None, *, bad: bool) -> str:
-    """The CSS class of a cell with a share from 0 to 1; None where there is none."""
+    """The CSS class of a cell with a share from 0 to 1, or None without one."""
     if share is None:
         return "waits"
     step = 0 if share == 0 else STEPS if share == 1 else max(1, min(STEPS - 1, round(share * STEPS)))
@@ -41,14 +41,14 @@ def address(run: str) -> str:
 
 
 def models_of(run: Snapshot) -> str:
-    """The models that wrote a run's completions, as text."""
+    """Format the models of a run."""
     if not run.models:
         return "model not recorded"
     return shortened(", ".join(run.models), MOST_MODELS) + by_hand(run.models)
 
 
-def failure_text(chosen: Filter) -> str | None:
-    """How programs end by the kind or class that a filter means, such as `in NameError`; else None."""
+def failure_text(chosen: CompletionFilter) -> str | None:
+    """Describe the failure that a filter selects, such as `in NameError`; None if it selects no failure."""
     kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MOST_NAME)
     if chosen.failure_class == NO_PROGRAM:
         return ending_of(NO_PROGRAM) + ("" if kind is None else f" ({kind})")
@@ -58,11 +58,11 @@ def failure_text(chosen: Filter) -> str | None:
 
 
 class TaskCells:
-    """The part of a run in a heat map of tasks by prompts, where one cell may be marked."""
+    """The cells of a run in a heat map of tasks by prompts; the selected cell is marked."""
 
-    def __init__(self, run: Snapshot, chosen: Filter, evaluation: str | None = None) -> None:
+    def __init__(self, run: Snapshot, chosen: CompletionFilter, evaluation: str | None = None) -> None:
         self._run, self._filter, self._evaluation = run, chosen, evaluation
-        counted = Filter(passed=True) if chosen.verdict == Filter() else chosen
+        counted = CompletionFilter(passed=True) if chosen.verdict == CompletionFilter() else chosen
         self._bad = not counted.passed
         by = failure_text(counted)
         self._verb = "passed" if counted.passed else "failed" if by is None else f"ended {by}"
@@ -73,7 +73,7 @@ class TaskCells:
 
     @property
     def columns(self) -> list[dict[str, Any]]:
-        """The mean over the prompts, and a column for each prompt."""
+        """A column for the mean and one for each prompt."""
         numbers = [{"name": f"prompt {n}", "title": f"prompt {n} of each task"} for n in range(self._prompts)]
         return [{"name": "mean", "title": "mean over the prompts"}, *numbers]
 
@@ -81,14 +81,14 @@ class TaskCells:
         """The cells of a task."""
         prompts = self.tasks.get(task)
         if prompts is None:
-            return [{**EMPTY, "text": "not asked", "span": 1 + self._prompts}]
+            return [{**EMPTY, "text": "no completions", "span": 1 + self._prompts}]
         shares = [each["share"] for each in prompts.values() if each["share"] is not None]
         mean = self._mean(task, mean_of([shares]) if shares else None)
         return [mean, *(self._cell(prompts[n]) if n in prompts else EMPTY for n in range(self._prompts))]
 
     def _mean(self, task: str, mean: float | None) -> dict[str, Any]:
         text = NONE if mean is None else percent(mean)
-        title = "nothing is judged yet" if mean is None else f"{text}% {self._verb}"
+        title = "not judged yet" if mean is None else f"{text}% {self._verb}"
         return self._linked(task, None, text, f"mean {shade(mean, bad=self._bad)}", title)
 
     def _cell(self, of: Mapping[str, Any]) -> dict[str, Any]:
@@ -96,7 +96,7 @@ class TaskCells:
         text = f"({of['written']})" if share is None else percent(share)
         title = f"{text}% {self._verb}, {of['counted']} of {of['judged']}"
         if share is None:
-            title = f"{of['written']} written, none judged yet"
+            title = f"{of['written']} written, not judged yet"
         return self._linked(of["task"], of["prompt"], text, shade(share, bad=self._bad), title)
 
     def _linked(self, task: str, prompt: int | None, text: str, look: str, title: str) -> dict[str, Any]:
@@ -114,7 +114,7 @@ class TaskCells:
 
 
 def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
-    """Failures by run, of which something was judged: each class with its kinds, the most frequent first."""
+    """Rows of failures by run: each class with its kinds, the most frequent first."""
     found = [{(of.name, kind.name): kind for of in run.failures for kind in of.kinds} for run in runs]
     most: dict[tuple[str, str], float] = {}
     for kinds in found:
@@ -126,9 +126,11 @@ def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
     rows = []
     for name in sorted(largest, key=lambda name: -largest[name]):
         totals = [known.get(name) for known in classes]
-        rows.append(_failure_row(plural_of(name), runs, Filter(failure_class=name), totals, "of-all"))
+        rows.append(
+            _failure_row(plural_of(name), runs, CompletionFilter(failure_class=name), totals, "of-all")
+        )
         for kind in sorted((k for of, k in most if of == name), key=lambda kind: -most[name, kind]):
-            chosen = Filter(failure_class=name, failure_kind=kind)
+            chosen = CompletionFilter(failure_class=name, failure_kind=kind)
             rows.append(
                 _failure_row(kind, runs, chosen, [kinds.get((name, kind)) for kinds in found], "of-class")
             )
@@ -136,13 +138,17 @@ def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
 
 
 def _failure_row(
-    name: str, runs: Sequence[Snapshot], chosen: Filter, failures: Sequence[Failures | None], look: str
+    name: str,
+    runs: Sequence[Snapshot],
+    chosen: CompletionFilter,
+    failures: Sequence[Failures | None],
+    look: str,
 ) -> dict[str, Any]:
     cells = [_failure_cell(run, chosen, one) for run, one in zip(runs, failures, strict=True)]
     return {"name": shortened(name, MOST_NAME), "look": look, "cells": cells}
 
 
-def _failure_cell(run: Snapshot, chosen: Filter, kind: Failures | None) -> dict[str, Any]:
+def _failure_cell(run: Snapshot, chosen: CompletionFilter, kind: Failures | None) -> dict[str, Any]:
     count, share = (0, 0.0) if kind is None else (kind.count, kind.share)
     text = percent(share)
     return {

@@ -1,4 +1,4 @@
-"""The pages of the benchmark, as `codebotler serve` finds them and `roboeval serve` opens them."""
+"""The pages of the benchmark, for `roboeval serve` and, by an entry point, for `codebotler serve`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STATIC = Path(__file__).with_name("static")
 
 
 def pages(suites: Sequence[Suite] = ()) -> Pages:
-    """The pages; runs may have been judged by these suites, besides those that ship with the package."""
+    """Create the pages; `suites` extends the suites that ship with the package."""
 
     def add(site: Site) -> None:
         store = RunStore(site.runs, suites)
@@ -35,7 +35,7 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
         site.app.include_router(router(store, all_runs))
         site.app.mount("/static/benchmark", StaticFiles(directory=STATIC))
         if not site.frame.has_robot:
-            site.app.get("/", include_in_schema=False)(_to_runs)
+            site.app.get("/", include_in_schema=False)(_redirect_to_runs)
 
         @ui.page("/runs", response_timeout=PATIENCE)
         async def show_runs() -> None:
@@ -60,9 +60,9 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
     return Pages("Benchmark", "RoboEval", "/runs", add)
 
 
-def _to_runs(request: Request) -> RedirectResponse:
+def _redirect_to_runs(request: Request) -> RedirectResponse:
     return RedirectResponse(f"{prefix_of(request.scope)}/runs")
 
 
 PAGES = pages()
-"""Named by the entry point."""
+"""The entry point refers to this name."""

@@ -1,4 +1,4 @@
-"""The page of one run: how far it has come, where its programs fail and by what, and all of them."""
+"""The page of one run: its progress, its failures by task and kind, and all completions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboeval.evaluation.failures import plural_of
 from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models_of, percent
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
-from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import (
     EVERY,
     CompletionList,
@@ -29,11 +29,11 @@ from roboeval.web.widgets import (
 
 MOST_NAME = 80
 SCROLL = "document.getElementById('completions').scrollIntoView()"
-GONE = "This run was deleted or renamed. What you see was read before that."
+GONE = "This run was deleted or renamed. The page shows its last known state."
 
 
-async def draw_run(store: RunStore, name: str, chosen: Filter, evaluation: str | None) -> None:
-    """Draw a run, and at first of its completions those that were chosen."""
+async def draw_run(store: RunStore, name: str, chosen: CompletionFilter, evaluation: str | None) -> None:
+    """Draw a run; its list of completions starts with a filter."""
     page = _RunPage(store, await asyncio.to_thread(store.open, name, evaluation), chosen, evaluation)
     page.timer = ui.timer(EVERY, page.refresh, immediate=False)
 
@@ -43,36 +43,38 @@ class _RunPage:
 
     timer: ui.timer
 
-    def __init__(self, store: RunStore, run: Snapshot, chosen: Filter, evaluation: str | None) -> None:
+    def __init__(
+        self, store: RunStore, run: Snapshot, chosen: CompletionFilter, evaluation: str | None
+    ) -> None:
         self._store, self._run, self._chosen, self._evaluation = store, run, chosen, evaluation
         self._changes = 0
-        self._kinds: dict[Filter, _Kind] = {}
+        self._kinds: dict[CompletionFilter, _Kind] = {}
         PlainText("h1", shortened(run.name, MOST_NAME))
-        self._trouble = PlainText("p", "", "trouble").props("role=alert")
-        self._trouble.say("")
+        self._error = PlainText("p", "", "trouble").props("role=alert")
+        self._error.say("")
         self._head = ui.element("div").classes("run-head")
         with ui.element("div").classes("findings"):
             with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
                 self._title = PlainText("h2", "").props("id=h-heat")
-                self._heat = HeatMap("Tasks by prompts", "Task", self._choose_cell)
-                text = "Percent of the completions of each prompt; the first column is their mean."
+                self._heat = HeatMap("Results by task and prompt", "Task", self._choose_cell)
+                text = "Percent of each prompt's completions; the first column is the mean."
                 PlainText("p", text, "quiet")
             with ui.element("section").classes("pane ends").props("aria-labelledby=h-kinds"):
-                PlainText("h2", "How they end").props("id=h-kinds")
+                PlainText("h2", "Outcomes").props("id=h-kinds")
                 self._ends = ui.element("div").classes("kinds")
             with ui.element("section").classes("pane list").props("id=completions aria-labelledby=h-list"):
                 with ui.element("div").classes("head"):
                     self._which = PlainText("h2", "").props("id=h-list")
-                    self._all = Button("Show all", lambda: self._choose(Filter()), "plain small")
+                    self._all = Button("Show all", lambda: self._choose(CompletionFilter()), "plain small")
                 self._list = CompletionList()
         self._show()
 
     async def refresh(self) -> None:
-        """Show the run as it is now; once it is gone, it is not looked for any more."""
+        """Show the current state of the run; stop refreshing if it is gone."""
         try:
             run = await asyncio.to_thread(self._store.open, self._run.name, self._evaluation)
         except MissingError:
-            self._trouble.say(GONE)
+            self._error.say(GONE)
             self.timer.deactivate()
             return
         if run.version != self._run.version:
@@ -84,10 +86,10 @@ class _RunPage:
         self._choose(replace(self._chosen, task=task, prompt=prompt))
         ui.run_javascript(SCROLL)
 
-    def _choose_kind(self, kind: Filter) -> None:
+    def _choose_kind(self, kind: CompletionFilter) -> None:
         self._choose(replace(kind, task=self._chosen.task, prompt=self._chosen.prompt))
 
-    def _choose(self, chosen: Filter) -> None:
+    def _choose(self, chosen: CompletionFilter) -> None:
         self._chosen = chosen
         ui.navigate.history.replace(outside(address(self._run.name)) + chosen.query(self._evaluation))
         self._show_chosen()
@@ -103,9 +105,9 @@ class _RunPage:
         cells = TaskCells(run, chosen, self._evaluation)
         rows = [{"name": shortened(task, MOST_NAME), "cells": cells.row(task)} for task in cells.tasks]
         self._heat.show(groups=[{"name": "", "columns": cells.columns}], rows=rows)
-        self._title.say(f"Where they {_verb(chosen)}")
+        self._title.say(f"Share that {_verb(chosen)}")
         self._which.say(_heading(chosen))
-        self._all.set_visibility(chosen != Filter())
+        self._all.set_visibility(chosen != CompletionFilter())
         source = f"/api/runs/{quote(run.name, safe='')}/completions{chosen.query(run.results.key) or '?'}"
         query = chosen.query(self._evaluation)
         base = outside(address(run.name))
@@ -114,11 +116,14 @@ class _RunPage:
 
     def _show_kinds(self) -> None:
         run = self._run
-        counts = {Filter(): ("all judged", run.judged), Filter(passed=True): ("passed", run.passed)}
+        counts = {
+            CompletionFilter(): ("all judged", run.judged),
+            CompletionFilter(passed=True): ("passed", run.passed),
+        }
         for of in run.failures:
-            counts[Filter(failure_class=of.name)] = plural_of(of.name), of.count
+            counts[CompletionFilter(failure_class=of.name)] = plural_of(of.name), of.count
             for one in of.kinds:
-                counts[Filter(failure_class=of.name, failure_kind=one.name)] = one.name, one.count
+                counts[CompletionFilter(failure_class=of.name, failure_kind=one.name)] = one.name, one.count
         if list(self._kinds) != list(counts):
             self._ends.clear()
             with self._ends:
@@ -130,9 +135,9 @@ class _RunPage:
 
 
 class _Kind:
-    """A way in which programs end, as a button that chooses it."""
+    """An outcome of programs, as a button that selects it."""
 
-    def __init__(self, name: str, kind: Filter, choose: Callable[[Filter], None]) -> None:
+    def __init__(self, name: str, kind: CompletionFilter, choose: Callable[[CompletionFilter], None]) -> None:
         look = "kind" + " of-class" * (kind.failure_kind is not None)
         look += " bad-kind" * (kind.failure_class is not None)
         with Button("", lambda: choose(kind), look) as self._button:
@@ -141,7 +146,7 @@ class _Kind:
             self._share = PlainText("small", "", "quiet")
 
     def show(self, count: int, of: int, *, is_here: bool) -> None:
-        """Show how many there are, of how many, and whether it is chosen."""
+        """Show the count, its share, and whether the outcome is selected."""
         self._button.props(f"aria-pressed={'true' if is_here else 'false'}")
         self._button.style(f"--share: {count / of if of else 0:.3f}")
         self._count.say(f"{count:,}")
@@ -166,29 +171,28 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
             PlainText("li", sentence, "unsure")
     with ui.element("p").classes("facts"):
         if has_report:
-            html.a("The report of this run", href=outside(f"/api/runs/{quote(run.name, safe='')}/report"))
+            html.a("Report of this run", href=outside(f"/api/runs/{quote(run.name, safe='')}/report"))
         for other in run.evaluations if len(run.evaluations) > 1 else ():
             link = html.a(
-                shortened(other, MOST_NAME), href=outside(address(run.name) + Filter().query(other))
+                shortened(other, MOST_NAME), href=outside(address(run.name) + CompletionFilter().query(other))
             )
             if other == key:
                 link.props('aria-current="true"')
 
 
-def _verb(chosen: Filter, *, past: bool = False) -> str:
+def _verb(chosen: CompletionFilter) -> str:
     if (by := failure_text(chosen)) is not None:
-        return f"{'ended' if past else 'end'} {by}"
-    verb = "fail" if chosen.passed is False else "pass"
-    return f"{verb}ed" if past else verb
+        return f"ended {by}"
+    return "failed" if chosen.passed is False else "passed"
 
 
-def _heading(chosen: Filter) -> str:
-    """Which completions are listed."""
+def _heading(chosen: CompletionFilter) -> str:
+    """The heading of the list of completions."""
     parts = []
     if chosen.task is not None:
         parts.append(f"of {shortened(chosen.task, MOST_NAME)}")
     if chosen.prompt is not None:
         parts.append(f"prompt {chosen.prompt}")
-    if chosen.verdict != Filter():
-        parts.append(f"that {_verb(chosen, past=True)}")
+    if chosen.verdict != CompletionFilter():
+        parts.append(f"that {_verb(chosen)}")
     return f"Completions {', '.join(parts)}".rstrip()

@@ -1,4 +1,4 @@
-"""The folder of runs: each run is found by its name, and read again when one of its files has changed."""
+"""The folder of runs: finds runs by name, and reads them again when their files change."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.suites.load import ABLATED, Suite, has_suite, load_suite
 from roboeval.web.snapshot import Snapshot
 
-MOST_HELD = 16  # evaluations that stay in memory
-REPORT, MOST_REPORT = "index.html", 20_000_000  # the page of a report, and its bytes
-REST = 10  # a run is not read again before this many times as long as reading it took
-OUTSIDE = "leads outside the folder of runs, so it is not read"
+MOST_HELD = 16  # evaluations in memory
+REPORT, MOST_REPORT = "index.html", 20_000_000  # the page of a report, and its largest size in bytes
+REST = 10  # wait this many times the duration of a read before reading a run again
+OUTSIDE = "leads outside the folder of runs; move it into the folder"
 
 Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
 
 class MissingError(UserError):
-    """A run or a completion that is not there, or not any more."""
+    """A run or a completion does not exist or was removed."""
 
 
 class RunStore:
-    """The runs in a folder, for any thread; the folder may be a run itself, and need not exist yet."""
+    """The runs in a folder, thread-safe; the folder may be a run itself, and need not exist yet."""
 
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
@@ -39,49 +39,49 @@ class RunStore:
         self._reader_of = lru_cache(maxsize=MOST_HELD)(partial(_Reader, self))
 
     def names(self) -> list[str]:
-        """The names of the runs, sorted."""
+        """The sorted names of the runs."""
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """A run as it is now, or was a moment ago; its first evaluation that is not ablated, unless named."""
+        """Read a run, or reuse a recent snapshot; the default evaluation is the first that is no ablation."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
-        """The version that a run would have if it was opened now; it is not read."""
+        """The version of a run, found without reading it."""
         return self._reader(name, None).version()
 
     def report(self, name: str, part: str = REPORT) -> bytes | None:
-        """The page of the report in a run's folder, or another part of it; None if it cannot be read."""
+        """Read the page of a run's report, or another part of it; None if it cannot be read."""
         path = self._reader(name, None).folder / "report" / part
         if _stamp(path, self.folder.resolve()) is None:
             return None
         try:
             size = path.stat().st_size
             if size > MOST_REPORT:
-                raise UserError(f"is too large to be shown here: {size:,} bytes", file=path.name)
+                raise UserError(f"is too large to show ({size:,} bytes); open the file", file=path.name)
             return path.read_bytes()
         except OSError:
             return None
 
     def has_report(self, name: str) -> bool:
-        """Whether there is a report in a run's folder."""
+        """Whether a run's folder contains a report."""
         try:
             return self.report(name) is not None
         except UserError:
             return False
 
     def suite(self, name: str) -> Suite | None:
-        """A suite that ships, is installed or was named; None if it is not at hand."""
+        """Load a suite that ships, is installed or was given; None if it is unavailable."""
         if name not in self._suites:
             try:
                 self._suites[name] = load_suite(name) if has_suite(name) else None
             except UserError as error:
-                note(f"a suite is left out: {error}")
+                note(f"a suite is ignored: {error}")
                 self._suites[name] = None
         return self._suites[name]
 
     def _folders(self) -> dict[str, Path]:
-        """The folder if it is a run itself, else what lies in it, by name."""
+        """The folder if it is a run itself, otherwise its entries, by name."""
         if Run(self.folder).completions.is_file():
             return {self.folder.resolve().name: self.folder.resolve()}
         try:
@@ -92,9 +92,9 @@ class RunStore:
             raise UserError(f"cannot be read ({error.strerror})", file=self.folder) from None
 
     def _reader(self, name: str, key: str | None) -> _Reader:
-        path = self._folders().get(name)  # letter by letter, so that no name leads anywhere else
+        path = self._folders().get(name)  # compared with entries, so a name cannot lead to another folder
         if path is None or not _is_run(path):
-            raise MissingError(f'there is no run "{shortened(name)}" in this folder; perhaps it was deleted')
+            raise MissingError(f'this folder has no run "{shortened(name)}"; it may have been deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):
             raise UserError(f'"{shortened(name)}" {OUTSIDE}')
         run = Run(path)
@@ -108,7 +108,7 @@ class RunStore:
 
 
 class _Reader:
-    """One evaluation of a run, read again when one of its files has changed."""
+    """Reads one evaluation of a run, again when one of its files changes."""
 
     def __init__(self, store: RunStore, run: Run, key: str | None) -> None:
         self._store, self._run, self._key = store, run, key
@@ -121,7 +121,7 @@ class _Reader:
 
     @property
     def folder(self) -> Path:
-        """Where the run is."""
+        """The folder of the run."""
         return self._run.path
 
     def read(self) -> Snapshot:
@@ -132,7 +132,7 @@ class _Reader:
                 began = time.monotonic()
                 self._results, self._stamps = self._read_files(), stamps
                 ended = time.monotonic()
-                # Faults of files that changed while they were read may be gone by now.
+                # Faults may come from files that changed during the read, so read them again soon.
                 mixed = bool(self._results.faults) and self._stamps_now() != stamps
                 self._rests_until = ended + (0 if mixed else REST * (ended - began))
             version = self._version(self._stamps)
@@ -149,7 +149,7 @@ class _Reader:
         return self._key, self.evaluations, self._run.is_being_written, stamps
 
     def _stamps_now(self) -> Stamps:
-        """What tells one state of its files from another."""
+        """The stamps of all files, which change with their content."""
         run, key = self._run, self._key or ""
         checks = run.checks(key.removesuffix(ABLATED))
         within = self._store.folder.resolve()
@@ -166,7 +166,7 @@ class _Reader:
 
 
 def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
-    """What changes when a file does; None if there is none."""
+    """A value that changes with a file; None if it does not exist."""
     try:
         found = path.resolve(strict=True)
         status = found.stat()
@@ -175,12 +175,12 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
     if not found.is_relative_to(within):
         raise UserError(OUTSIDE, file=path.name)
     if not stat.S_ISREG(status.st_mode):
-        raise UserError("is no file", file=path.name)
+        raise UserError("is not a regular file", file=path.name)
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _is_run(path: Path) -> bool:
-    """Whether a folder looks like a run; also while its first completion is waited for."""
+    """Whether a folder looks like a run, even before its first completion."""
     run = Run(path)
     is_named = path.name.isprintable() and not path.name.startswith(".")
     return is_named and (run.completions.exists() or run.about.exists())

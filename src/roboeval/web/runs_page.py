@@ -1,4 +1,4 @@
-"""The page of all runs: who wrote each, how far it has come, and how often its programs pass."""
+"""The page of all runs: their models, progress and pass rates."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import EVERY, count_text, date_text, interval_text, show_state, tasks_text
 
-READ_FOR = 0.5  # seconds after which runs are shown that were not read yet
+READ_FOR = 0.5  # seconds; then the page shows runs that are not read yet
 
-Order: TypeAlias = Callable[[Mapping[str, Any]], tuple[float, str]]
-ORDERS: Mapping[str, tuple[str, Order]] = {
+SortKey: TypeAlias = Callable[[Mapping[str, Any]], tuple[float, str]]
+ORDERS: Mapping[str, tuple[str, SortKey]] = {
     "Run": ("ascending", lambda run: (0, run["run"].lower())),
     "pass@1": ("descending", lambda run: (-(run.get("pass@1") or {"mean": -1})["mean"], run["run"])),
     "Started": ("descending", lambda run: (-_moment(run.get("date")), run["run"])),
     "Completions": ("descending", lambda run: (-run.get("completions", 0), run["run"])),
 }
 COLUMNS = ("Run", "Suite", "Tasks", "State", "Completions", "pass@1", "Started")
-ABOUT = "pass@1 is shown with its 95% interval over tasks; times are UTC."
-NOTHING = "There are no runs yet. This makes the first one, without a key or a network:"
+ABOUT = "pass@1 with its 95% confidence interval over tasks; times are in UTC."
+NOTHING = "There are no runs yet. This command creates one without an API key or a network:"
 FIRST = "run --model recorded:hasty --num-completions 3"
 MOST_NAME = 80
 
@@ -51,15 +51,15 @@ async def draw_runs(folder: Path, runs: RunList) -> None:
 
 
 class _Table:
-    """The runs as rows of a table."""
+    """The table of runs."""
 
     def __init__(self, runs: RunList) -> None:
         self._runs = runs
         self._order = "Run"
         self._heads: dict[str, ui.element] = {}
         self._data: list[dict[str, Any]] = []
-        self._rows: list[_Row] = []
-        self._trouble = PlainText("p", "", "trouble").props("role=alert")
+        self._rows: list[_RunRow] = []
+        self._error = PlainText("p", "", "trouble").props("role=alert")
         self._empty = ui.element("div").classes("first-run")
         with self._empty:
             PlainText("p", NOTHING, "quiet")
@@ -86,13 +86,13 @@ class _Table:
                 PlainText("span", name)
 
     async def refresh(self) -> None:
-        """Show the runs as they are now."""
+        """Show the current state of the runs."""
         try:
             data = await asyncio.to_thread(self._runs.data, READ_FOR)
         except UserError as error:
-            self._trouble.say(str(error))
+            self._error.say(str(error))
         else:
-            self._trouble.say("")
+            self._error.say("")
             self._show(data, self._order)
 
     def _show(self, data: list[dict[str, Any]], order: str) -> None:
@@ -104,12 +104,12 @@ class _Table:
         if [row.name for row in self._rows] != [run["run"] for run in self._data]:
             self._body.clear()
             with self._body:
-                self._rows = [_Row(run["run"]) for run in self._data]
+                self._rows = [_RunRow(run["run"]) for run in self._data]
         for row, run in zip(self._rows, self._data, strict=True):
             row.show(run)
 
 
-class _Row:
+class _RunRow:
     """A run as a row of the table."""
 
     def __init__(self, name: str) -> None:
@@ -118,7 +118,7 @@ class _Row:
             with html.td().classes("tick"):
                 box = ui.element("input").props("type=checkbox name=run")
                 box.props["value"] = name
-                box.props["aria-label"] = f"Show {shortened(name, MOST_NAME)} side by side with others"
+                box.props["aria-label"] = f"Compare {shortened(name, MOST_NAME)} with others"
             with html.th().props("scope=row"):
                 with html.a(href=outside(address(name))):
                     PlainText("b", shortened(name, MOST_NAME))
@@ -142,7 +142,7 @@ class _Row:
                 self._date = PlainText("span")
 
     def show(self, run: Mapping[str, Any]) -> None:
-        """Show its numbers, as `run_data` gives them."""
+        """Show the data of a run, from `run_data`."""
         by_hand = ", programs written by hand" if run.get("by_hand") else ""
         self._models.say(shortened(", ".join(run.get("models", ())), 160) + by_hand)
         self._settings.say(shortened(run.get("settings") or "", 160))

@@ -20,12 +20,12 @@ from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, na
 from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
-from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.snapshot import CompletionFilter, Snapshot
 
 MOST_FAULTS, MOST_NAME, MOST_REASON = 5, 120, 300
 
 
-class State(StrEnum):
+class RunState(StrEnum):
     """The progress of a run."""
 
     READING = "being read"
@@ -39,24 +39,24 @@ class State(StrEnum):
     UNREADABLE = "not read"
 
 
-def state_of(run: Snapshot) -> State:
-    """How far a run has come."""
+def state_of(run: Snapshot) -> RunState:
+    """Determine the progress of a run."""
     written, coverage = len(run.results.completions), run.coverage
     lacks = coverage.there < coverage.total
     unjudged = run.judged < run.results.scope.total
     stages = (
-        (State.GENERATING, run.is_written and (lacks or not written)),
-        (State.JUDGING, run.is_written and unjudged),
-        (State.DAMAGED, bool(run.results.faults)),
-        (State.EMPTY, run.completions.is_empty()),
-        (State.NOT_JUDGED, not lacks and not run.judged),
-        (State.UNFINISHED, lacks or unjudged),
+        (RunState.GENERATING, run.is_written and (lacks or not written)),
+        (RunState.JUDGING, run.is_written and unjudged),
+        (RunState.DAMAGED, bool(run.results.faults)),
+        (RunState.EMPTY, run.completions.is_empty()),
+        (RunState.NOT_JUDGED, not lacks and not run.judged),
+        (RunState.UNFINISHED, lacks or unjudged),
     )
-    return next((state for state, holds in stages if holds), State.JUDGED)
+    return next((state for state, holds in stages if holds), RunState.JUDGED)
 
 
 def run_data(run: Snapshot) -> dict[str, Any]:
-    """A run in short."""
+    """Summarise a run."""
     results, mean, coverage = run.results, run.pass_at_1, run.coverage
     return {
         "run": run.name,
@@ -83,40 +83,42 @@ def run_data(run: Snapshot) -> dict[str, Any]:
 
 
 def settings_text(about: Mapping[str, Any]) -> str:
-    """The settings that a run.json records, for people; those that were not sent are left out."""
+    """Format the settings in run.json, except those that were not sent."""
     settings = about.get("settings")
     named = settings.items() if isinstance(settings, dict) else ()
-    return ", ".join(f"{name.replace('_', '-')} {_said(value)}" for name, value in named if value is not None)
+    return ", ".join(
+        f"{name.replace('_', '-')} {_format(value)}" for name, value in named if value is not None
+    )
 
 
-def _said(value: object) -> str:
+def _format(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
 def date_of(about: Mapping[str, Any]) -> str | None:
-    """When the first completions of a run were requested, as ISO 8601; None where nobody recorded that."""
+    """The time of the first request of a run, as ISO 8601; None if unrecorded."""
     began = [one.get("started") for one in batches(about)]
     return min((text for text in began if isinstance(text, str)), default=None)
 
 
 def notes(run: Snapshot) -> list[str]:
-    """What is wrong with a run, in sentences."""
+    """Describe problems of a run in sentences."""
     results, stale = run.results, len(run.results.stale)
     faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
     found = [str(fault) for fault in faults[:MOST_FAULTS]]
     if len(faults) > MOST_FAULTS:
         found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
     if faults:
-        found.append("The other rows are shown.")
+        found.append("All other rows are shown.")
     if (warning := run.cut_off.warning) is not None:
         found.append(f"{warning}.")
     if stale:
-        found.append(f"{how_many(stale)} changed since the verdict; `roboeval evaluate --redo` judges again.")
+        found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
         name = shortened(str(results.head.get("suite")), MOST_NAME)
         found.append(
-            f'The suite "{name}" was not found, so failed checks cannot be explained; '
-            "`roboeval serve --suite FOLDER` names it."
+            f'The suite "{name}" was not found, so failed checks are not explained; '
+            "use `roboeval serve --suite FOLDER`."
         )
     elif run.judged and run.suite is not None and results.head.get("digest") != run.suite.digest:
         found.append("The suite has changed since this run was judged; explanations may be missing.")
@@ -124,19 +126,19 @@ def notes(run: Snapshot) -> list[str]:
 
 
 class RunList:
-    """The runs of a store in short, each of them read only when something in it has changed."""
+    """Summaries of the runs of a store, which are updated only when a run changes."""
 
     def __init__(self, store: RunStore) -> None:
         self._store = store
         self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
 
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
-        """All runs in short, or why one cannot be read; after so many seconds no further one is read."""
+        """Summarise all runs, or say why one cannot be read; stop reading runs after so many seconds."""
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 
     def _run_data(self, name: str, *, may_read: bool) -> dict[str, Any]:
-        unread = {"run": name, "state": State.READING, "notes": []}
+        unread = {"run": name, "state": RunState.READING, "notes": []}
         version, data = self._known.get(name, (None, unread))
         try:
             if may_read and version != self._store.version(name):
@@ -144,16 +146,16 @@ class RunList:
                 data = run_data(run)
                 self._known[name] = run.version, data
         except UserError as error:
-            return {**unread, "state": State.UNREADABLE, "notes": [str(error)]}
+            return {**unread, "state": RunState.UNREADABLE, "notes": [str(error)]}
         return data
 
 
 def run_details(run: Snapshot) -> dict[str, Any]:
-    """A run with its tasks, prompts and kinds of failures."""
+    """A run with its tasks, prompts and kinds of failure."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
     shares = pass_at_1(run.scores)
     tasks: dict[str, list[dict[str, Any]]] = {}
-    for prompt in run.prompts(Filter(passed=True)):
+    for prompt in run.prompts(CompletionFilter(passed=True)):
         tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
     kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
@@ -181,7 +183,7 @@ def _prompt_data(
 
 
 def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A completion in short, from a row of `Snapshot.completions`."""
+    """Summarise a completion, from a row of `Snapshot.completions`."""
     failure = {name: row[f"failure_{name}"] for name in ("class", "kind", "world", "check")}
     return {
         **{name: row[name] for name in (*KEY, "passed")},
@@ -193,7 +195,7 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
-    """A completion with its program, and with each world's steps, failed checks and explanations."""
+    """A completion with its program, and the steps, failed checks and explanations of each world."""
     results = run.results
     key: Key = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)

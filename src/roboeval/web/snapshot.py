@@ -1,4 +1,4 @@
-"""A run as it was last read: a row for each completion, judged or not, and what is counted of them."""
+"""A snapshot of a run: its completions, judged or not, and their counts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.models.no_program import IN_WORDS
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
-from roboeval.analysis.summary import Failures, cut_off, failures
+from roboeval.analysis.summary import Failures, cut_off_replies, failures
 from roboeval.analysis.tasks import prompt_counts
 from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import KEY, Key
@@ -25,7 +25,7 @@ from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
 
 HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM)
-# How a program did in a world: + satisfied, - not, ! ended by an error.
+# The result of a program in a world: + satisfied, - not satisfied, ! error.
 SIGN = (
     pl.when("satisfied")
     .then(pl.lit("+"))
@@ -33,7 +33,7 @@ SIGN = (
     .then(pl.lit("-"))
     .otherwise(pl.lit("!"))
 )
-# What decided: the failed check, the limit that stopped the program, or its error.
+# The cause of a failure: the failed check, the limit that stopped the program, or its error.
 ERROR = pl.col("error_message")
 WHY = (
     pl.when(HAS_NO_PROGRAM)
@@ -48,30 +48,30 @@ MOST = 2**63
 
 
 @dataclass(frozen=True)
-class Filter:
-    """Which completions are meant, as addresses of the pages and of the API say it: values by column."""
+class CompletionFilter:
+    """Selects completions by the values of columns; also the query of pages and of the API."""
 
-    task: Annotated[str | None, Query(description="Only of this task.")] = None
-    prompt: Annotated[
-        int | None, Query(ge=0, lt=MOST, description="Only of this prompt, counted from 0.")
-    ] = None
-    passed: Annotated[bool | None, Query(description="Only those that passed, or those that failed.")] = None
-    failure_class: Annotated[str | None, Query(description="Only those that failed by this class.")] = None
-    failure_kind: Annotated[str | None, Query(description="Only those that failed by this kind.")] = None
+    task: Annotated[str | None, Query(description="Only this task.")] = None
+    prompt: Annotated[int | None, Query(ge=0, lt=MOST, description="Only this prompt, counted from 0.")] = (
+        None
+    )
+    passed: Annotated[bool | None, Query(description="Only those that passed, or that failed.")] = None
+    failure_class: Annotated[str | None, Query(description="Only this class of failure.")] = None
+    failure_kind: Annotated[str | None, Query(description="Only this kind of failure.")] = None
 
     @property
     def condition(self) -> pl.Expr:
-        """It as a condition on `Snapshot.completions`."""
+        """The filter as a condition on `Snapshot.completions`."""
         conditions = [pl.col(name) == value for name, value in asdict(self).items() if value is not None]
         return pl.all_horizontal(pl.lit(value=True), *conditions)
 
     @property
     def verdict(self) -> Self:
-        """The same in all tasks and prompts."""
+        """The filter without its task and prompt."""
         return replace(self, task=None, prompt=None)
 
     def query(self, evaluation: str | None) -> str:
-        """It as the query of an address; empty if it means all completions of the usual evaluation."""
+        """The filter as the query of a URL; empty if it selects all completions of the default evaluation."""
         values = {"evaluation": evaluation, **asdict(self)}
         if self.passed is not None:
             values["passed"] = str(self.passed).lower()
@@ -81,12 +81,12 @@ class Filter:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One evaluation of a run as it was last read."""
+    """One evaluation of a run, read at one time."""
 
     results: Results
-    evaluations: tuple[str, ...]  # names of all of the run
-    is_written: bool  # by a process, now
-    version: Hashable  # differs whenever something has changed
+    evaluations: tuple[str, ...]  # the names of all evaluations of the run
+    is_written: bool  # whether a process is writing it
+    version: Hashable  # changes whenever a file does
 
     @property
     def name(self) -> str:
@@ -95,21 +95,20 @@ class Snapshot:
 
     @property
     def suite(self) -> Suite | None:
-        """The suite by which it was judged, or is to be; None if it is not at hand."""
+        """The suite that judges the run; None if it is unavailable."""
         return self.results.suite
 
     @cached_property
     def models(self) -> list[str]:
-        """The models that wrote the completions, as far as that was recorded."""
+        """The recorded models of the completions."""
         return sorted({c.model for c in self.results.completions.values() if c.model is not None})
 
     @cached_property
     def completions(self) -> pl.DataFrame:
-        """A row for each completion in the suite's order, also where only the verdict is there.
+        """A row for each completion in the suite's order, even if only its verdict is left.
 
-        `passed` is null where nothing was judged, `worlds` has a sign for each world in which a program
-        ran, `why` is the check or
-        the error that decided, and `written` whether the completion stands in the run now.
+        `passed` is null if it was not judged, `worlds` has a sign for each world, `why` is the check or the
+        error that caused the failure, and `written` tells whether the run still has the completion.
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
@@ -127,62 +126,62 @@ class Snapshot:
         return judged.join(written, on=KEY, how="full", coalesce=True).with_columns(*filled).sort(place, *KEY)
 
     def row(self, name: str) -> dict[str, Any] | None:
-        """The row of a completion, by its name; None if there is none."""
+        """Find the row of a completion by its name; None if there is none."""
         found = self.completions.filter(pl.format("{}/{}/{}", *KEY) == name)
         return found.row(0, named=True) if found.height else None
 
-    def select(self, chosen: Filter) -> pl.DataFrame:
-        """The completions that a filter means, in order."""
+    def select(self, chosen: CompletionFilter) -> pl.DataFrame:
+        """Select completions, in order."""
         return self.completions.filter(chosen.condition)
 
-    def neighbours(self, key: Key, chosen: Filter) -> tuple[Key | None, Key | None]:
-        """The completions before and after one, among those that a filter means; None at an end."""
+    def neighbours(self, key: Key, chosen: CompletionFilter) -> tuple[Key | None, Key | None]:
+        """The completions before and after one in the filtered list; None at an end."""
         keys = [None, *self.select(chosen).select(KEY).iter_rows(), None]
         at = keys.index(key) if key in keys else None
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
-    def prompts(self, chosen: Filter) -> list[dict[str, Any]]:
-        """All prompts, and how many completions are `written`, `judged` and `counted` (meant by a filter)."""
-        return prompt_counts(self.completions, chosen.verdict.condition).to_dicts()  # whatever its prompt
+    def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
+        """All prompts, and how many completions are `written`, `judged` and `counted` (pass the filter)."""
+        return prompt_counts(self.completions, chosen.verdict.condition).to_dicts()
 
     @property
     def judged(self) -> int:
-        """How many completions were judged."""
+        """The number of judged completions."""
         return judged_count(prompts_of(self.scores))
 
     @property
     def passed(self) -> int:
-        """How many completions passed."""
+        """The number of completions that passed."""
         return passed_count(prompts_of(self.scores))
 
     @cached_property
     def scope(self) -> JudgingScope:
-        """What there is to judge."""
+        """The completions that are to be judged."""
         return self.results.scope
 
     @property
     def coverage(self) -> Coverage:
-        """Of how many completions its numbers speak."""
+        """How many completions were judged, are there, and were requested."""
         return self.scope.coverage(self.judged)
 
     @property
     def cut_off(self) -> CutOff:
         """The replies that were cut off."""
-        return cut_off(self.failures, self.scope)
+        return cut_off_replies(self.failures, self.scope)
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:
-        """How often completions passed, by task and prompt."""
+        """The scores by task and prompt."""
         return task_scores(self.results.table)
 
     @cached_property
     def pass_at_1(self) -> Estimate | None:
-        """pass@1 over all prompts, with its interval over tasks; None where nothing was judged."""
+        """pass@1 over all prompts, with its interval over tasks; None if nothing was judged."""
         return overall(self.scores, 1) if self.scores else None
 
     @cached_property
     def failures(self) -> list[Failures]:
-        """The classes of failures that there are, each with its kinds, the most frequent first."""
+        """The classes of failures that occur, each with its kinds, the most frequent first."""
         classes = failures(tally_of(self.results.table)) if self.judged else ()
         return [
             replace(

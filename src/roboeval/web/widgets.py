@@ -1,4 +1,4 @@
-"""What pages are made of: heat maps, lists and programs that the browser draws, and states of runs."""
+"""Elements of the pages: heat maps, lists, programs, and the progress of runs."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from roboeval.evaluation.explanation import shown_lines
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.web.heat_map import NONE
 from roboeval.web.run_store import MissingError
-from roboeval.web.serializers import State
+from roboeval.web.serializers import RunState
 
 STYLE = '<link rel="stylesheet" href="{prefix}/static/benchmark/benchmark.css">'
-EVERY = 1.0  # seconds after which a page looks whether something has changed
+EVERY = 1.0  # seconds between refreshes of a page
 MOST_TITLE = 80
 
 
 @contextmanager
 def page_of(frame: Frame, title: str) -> Iterator[None]:
-    """A page of the benchmark; of an error that a user can cause, only its sentence is shown."""
+    """Draw a page of the benchmark; show the sentence of an error for users."""
     frame(shortened(title, MOST_TITLE), "/runs")
     ui.add_head_html(STYLE.format(prefix=outside("")))
     with ui.element("div").classes("benchmark"):
@@ -44,17 +44,17 @@ def page_of(frame: Frame, title: str) -> Iterator[None]:
 
 class _DataElement(Element):
     def show(self, **props: object) -> None:
-        """Send properties to the browser, if they are others than it has."""
+        """Send properties to the browser if they have changed."""
         if any(self._props.get(name) != value for name, value in props.items()):
             self._props.update(props)
             self.update()
 
 
 class HeatMap(_DataElement, component="static/heat.js"):
-    """A table of shares, each cell with a shade; cells are links unless `chosen` takes their task and prompt.
+    """A table of shaded shares; a click on a cell follows its link, or calls `chosen` with task and prompt.
 
-    It shows `groups` of columns, with `name`, `href` and `columns`, each of these with `name`, `title` and
-    `href`; and `rows` with `name` and `cells`, each of these with `text`, `shade`, `title`, `href` and `at`.
+    Its properties are `groups` with `name`, `href` and `columns` (`name`, `title`, `href`), and `rows` with
+    `name` and `cells` (`text`, `shade`, `title`, `href`, `at`).
     """
 
     def __init__(
@@ -68,15 +68,15 @@ class HeatMap(_DataElement, component="static/heat.js"):
 
 
 class CompletionList(_DataElement, component="static/rows.js"):
-    """A list of completions, of which the browser fetches those in view.
+    """A list of completions; the browser fetches only those in view.
 
-    The API lists them at the address `source`; they have their pages below the address `base`, with the
-    `query`; `version` differs when they have changed.
+    Its properties are `source` (the URL of the API), `base` and `query` (of the pages of completions), and
+    `version`, which changes with the completions.
     """
 
 
 class ProgramView(Element, component="static/code.js"):
-    """A program, any text, with some lines marked, counted from 1."""
+    """A program with some lines marked, counted from 1; the text need not be valid Python."""
 
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()
@@ -84,7 +84,7 @@ class ProgramView(Element, component="static/code.js"):
         self._props.update(program=shown, marked=sorted(set(marked)), keywords=kwlist, skills=all_names())
 
 
-# --- how a run is doing, from its data in short
+# --- progress of a run, from `run_data`
 
 
 def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = None) -> None:
@@ -93,14 +93,14 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
     label.say(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
     if bar is not None:
-        names = ("completions", "requested") if state == State.GENERATING else ("judged", "to_judge")
+        names = ("completions", "requested") if state == RunState.GENERATING else ("judged", "to_judge")
         done, of = (data.get(name) or 0 for name in names)
-        bar.set_visibility(state in {State.GENERATING, State.JUDGING})
+        bar.set_visibility(state in {RunState.GENERATING, RunState.JUDGING})
         bar.props(f"value={done / of if of else 0:.3f}").props["aria-label"] = f"{done:,} of {of:,}"
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """Of how many completions a run's numbers speak, where there is little room."""
+    """Format the coverage of a run, in short."""
     if "completions" not in data:
         return NONE
     coverage = _coverage(data)
@@ -109,7 +109,7 @@ def count_text(data: Mapping[str, Any]) -> str:
 
 
 def completions_text(data: Mapping[str, Any]) -> str:
-    """Of how many completions a run's numbers speak."""
+    """Format the coverage of a run."""
     return str(_coverage(data)) if "completions" in data else NONE
 
 
@@ -118,7 +118,7 @@ def _coverage(data: Mapping[str, Any]) -> Coverage:
 
 
 def tasks_text(data: Mapping[str, Any]) -> str:
-    """How many tasks a run has completions of, and how many its suite has."""
+    """Format the number of tasks with completions, and of tasks in the suite."""
     if "tasks_there" not in data:
         return NONE
     of = data["tasks_of_suite"]
@@ -126,17 +126,17 @@ def tasks_text(data: Mapping[str, Any]) -> str:
 
 
 def date_text(data: Mapping[str, Any]) -> str:
-    """The day and the time at which a run began, in UTC."""
+    """Format the start of a run, in UTC."""
     return (data.get("date") or NONE)[:16].replace("T", " ")
 
 
 def interval_text(estimate: Estimate, form: str = ".2f") -> str:
-    """An interval where there is little room."""
+    """Format an interval, in short."""
     return estimate.ends(form) if estimate.is_known else "interval unknown"
 
 
 def score_text(data: Mapping[str, Any]) -> str:
-    """How often a run's programs pass; empty where nothing was judged."""
+    """Format pass@1 of a run; empty if nothing was judged."""
     mean = data.get("pass@1")
     if mean is None:
         return ""

@@ -11,7 +11,7 @@ from codebotler.core.world_file import read_world
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import PAPER, WORDS_FOR_PEOPLE, SimulationSettings, choose, resolve_room
-from roboeval.suites.schema import RulesFile
+from roboeval.suites.schema import SimulationFile
 
 STRICT = SimulationSettings(
     literals="as-written",
@@ -49,12 +49,12 @@ def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
 
 
 def test_words_for_people_are_usual_ones_where_a_suite_names_none() -> None:
-    rules = RulesFile.model_validate({"people": "own-name-or-word"}).rules()
+    rules = SimulationFile.model_validate({"people": "own-name-or-word"}).rules()
     assert robot(rules=rules).rules.words_for_people == WORDS_FOR_PEOPLE
-    assert RulesFile.model_validate(
+    assert SimulationFile.model_validate(
         {"people": "own-name-or-word", "words_for_people": ["dog"]}
     ).rules() == SimulationSettings(people="own-name-or-word", words_for_people=("dog",))
-    assert RulesFile().rules() == PAPER
+    assert SimulationFile().rules() == PAPER
 
 
 WORDS = SimulationSettings(

@@ -11,7 +11,13 @@ from codebotler.core.trace import Event, trace_data
 from codebotler.core.world import Room, World
 from made_results import VERDICT, as_driven, results_of
 from made_up_runs import SUITE, made_up
-from roboeval.analysis.breakdown import by_ability, coming_back, never_returned, phrasing, spread
+from roboeval.analysis.breakdown import (
+    by_ability,
+    compare_phrasings,
+    compare_report_back,
+    never_returned,
+    spread_by_task,
+)
 from roboeval.analysis.counts import prompt_scores
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.traces import circumstances
@@ -65,7 +71,7 @@ def test_nobody_knows_of_rows_of_an_earlier_version_who_never_returned(
     monkeypatch.delitem(VERDICT, "places")  # with which rows are filled in
     old = row("kitchen", index=1)
     del old["verdicts"][0]["places"]
-    table = coming_back(results_of([old, row("kitchen", "start", index=2)], ABLE))
+    table = compare_report_back(results_of([old, row("kitchen", "start", index=2)], ABLE))
     assert table["never_returned"].to_list() == [None]
     assert table["failed"].to_list() == [2]
 
@@ -77,7 +83,7 @@ def test_coming_back_by_hand() -> None:
         row("kitchen", "start", index=2),
         row("moon", index=3, kind="GoToInvalidLocation"),
     ]
-    (found,) = coming_back(results_of([passed, *failed], ABLE)).to_dicts()
+    (found,) = compare_report_back(results_of([passed, *failed], ABLE)).to_dicts()
     assert found == {
         "reports": True,
         "completions": 4,
@@ -86,20 +92,20 @@ def test_coming_back_by_hand() -> None:
         "lost": 1,
         "pass@1": 0.25,
     }
-    assert coming_back(results_of([passed, *failed], SUITE)).is_empty()
+    assert compare_report_back(results_of([passed, *failed], SUITE)).is_empty()
 
 
 def test_tasks_without_a_report_stand_beside() -> None:
     run = made_up("a", {"FindBook": (2,), "Visit": (1,)}, suite=ABLE)
-    found = coming_back(run.results)
+    found = compare_report_back(run.results)
     assert found["reports"].to_list() == [True, False]
     assert found["pass@1"].to_list() == pytest.approx([0.1, 0.2])
-    assert coming_back(made_up("a", {"FindBook": (2,)}, suite=ABLE).results).is_empty()
+    assert compare_report_back(made_up("a", {"FindBook": (2,)}, suite=ABLE).results).is_empty()
 
 
 def test_spread_by_hand() -> None:
     table = made_up("a", {"Visit": (4, 9, 2, 9, 2), "FindBook": (3,)}).table
-    (found,) = spread(table).to_dicts()
+    (found,) = spread_by_task(table).to_dicts()
     assert found == {
         "task": "Visit",
         "spread": pytest.approx(0.7),
@@ -114,7 +120,7 @@ def test_which_phrasing_hurts() -> None:
     runs = [made_up("a", {"Visit": (10, 4)}), made_up("b", {"Visit": (6, 2), "FindBook": (1,)})]
     tables = [prompt_scores(run.table) for run in runs]
     scores = pl.concat([table.with_columns(model=pl.lit(at)) for at, table in enumerate(tables)])
-    best, worst = phrasing(scores).to_dicts()
+    best, worst = compare_phrasings(scores).to_dicts()
     assert (worst["task"], worst["prompt"], worst["better"]) == ("Visit", 1, pytest.approx(-0.25))
     assert (worst["hurts"], worst["models"]) == (2, 2)
     assert (best["better"], best["hurts"]) == (pytest.approx(0.25), 0)

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 from codebotler.models.no_program import IN_WORDS
 from made_results import results_of
-from roboeval.analysis.cluster import cluster_data, clusters, groups, nearest_fix
+from roboeval.analysis.cluster import cluster_data, describe_groups, group_failures, nearest_fix
 from roboeval.cli.views.groups import cluster_view
 from roboeval.evaluation.runs.completions import Key
 from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict
@@ -58,7 +58,8 @@ def test_same_task_same_check_similar_program() -> None:
     rows.append(failed(0, 0, task="FindBook"))
     programs["FindBook", 0, 0] = GOES.format("lab")
     found = [
-        [(row["task"], row["prompt"], row["index"]) for row in those] for those in groups(rows, programs)
+        [(row["task"], row["prompt"], row["index"]) for row in those]
+        for those in group_failures(rows, programs)
     ]
     assert found == [
         [("Visit", 0, 0), ("Visit", 0, 1), ("Visit", 1, 0)],
@@ -76,7 +77,7 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     programs: dict[Key, str] = {("Visit", 0, 0): "No.", ("Visit", 0, 1): "I must not do that,\nsince ..."}
     programs |= {("Visit", 0, 2): "", ("Visit", 1, 0): RIGHT}
     results = results_of(rows, SUITE, programs)
-    refused, empty = clusters(groups(cast("list[Row]", rows[:3]), programs), results)
+    refused, empty = describe_groups(group_failures(cast("list[Row]", rows[:3]), programs), results)
     assert [len(one.members) for one in (refused, empty)] == [2, 1]
     assert (refused.fix, refused.why) == (None, IN_WORDS["refusal"])
     text = printed(cluster_view(refused))
@@ -87,7 +88,7 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
 def test_groups_of_one_size_take_turns_by_task() -> None:
     rows = [failed(n, 0, task=task, check=f"{n}()") for task in ("Visit", "FindBook") for n in range(3)]
     rows += [failed(9, n, check="nine()") for n in range(2)]
-    found = [(those[0]["task"], those[0]["prompt"]) for those in groups(rows, {})]
+    found = [(those[0]["task"], those[0]["prompt"]) for those in group_failures(rows, {})]
     tasks = ("FindBook", "Visit")
     assert found == [("Visit", 9), *((task, n) for n in range(3) for task in tasks)]
 
@@ -109,7 +110,7 @@ def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
     programs = {("Visit", 0, 0): "pass", ("Visit", 0, 1): program, ("Visit", 0, 2): program}
     programs["Visit", 4, 0] = RIGHT
     results = results_of([*rows, {**row(4, 0), "passed": True}], SUITE, programs)
-    (one,) = clusters([[*map(results.failed_row, results.failed)]], results)
+    (one,) = describe_groups([[*map(results.failed_row, results.failed)]], results)
     return one
 
 
@@ -138,8 +139,8 @@ def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
 def test_programs_that_are_gone() -> None:
     rows = [failed(0, 0), failed(0, 1)]
     results = results_of(rows, SUITE)
-    (group,) = groups(map(results.failed_row, results.failed), results.programs)
-    (one,) = clusters([group], results)
+    (group,) = group_failures(map(results.failed_row, results.failed), results.programs)
+    (one,) = describe_groups([group], results)
     assert one.program is None
     assert one.fix is None
     assert "no longer in this run" in printed(cluster_view(one), width=200)

@@ -13,12 +13,12 @@ from codebotler.core.errors import UserError
 from command_line import refused, roboeval
 from made_results import results_of
 from roboeval.analysis.compare import (
-    Compared,
-    compared,
+    ComparedRun,
+    compare_scores,
     comparison_data,
+    other_differences,
     pairs_to_compare,
-    to_tell,
-    unlike,
+    sample_size_sentences,
     verdict,
 )
 from roboeval.cli.inputs import Opened, expect_same_suite
@@ -32,7 +32,7 @@ SECOND = {("A", 0): 0.7, ("A", 1): 0.9, ("B", 0): 0.2, ("D", 0): 1.0}
 
 
 def test_paired_by_prompt() -> None:
-    found = compared(FIRST, SECOND)
+    found = compare_scores(FIRST, SECOND)
     assert (found.prompts, found.left_out) == (3, 2)
     assert (found.first, found.second) == pytest.approx((0.4, 0.6))
     assert found.over_tasks.mean == found.over_prompts.mean == pytest.approx(0.2)
@@ -44,35 +44,37 @@ def test_paired_by_prompt() -> None:
 
 
 def test_the_other_way_round() -> None:
-    one, other = compared(FIRST, SECOND), compared(SECOND, FIRST)
+    one, other = compare_scores(FIRST, SECOND), compare_scores(SECOND, FIRST)
     assert one.over_tasks.low == pytest.approx(-other.over_tasks.high)
     assert one.p_prompts == other.p_prompts
-    assert one.needed == other.needed
+    assert one.sample_sizes == other.sample_sizes
 
 
 def test_no_prompt_in_common() -> None:
     with pytest.raises(UserError, match="no prompt"):
-        compared({("A", 0): 1.0}, {("A", 1): 1.0})
+        compare_scores({("A", 0): 1.0}, {("A", 1): 1.0})
 
 
 def test_verdicts() -> None:
     def said(differences: list[float], tasks: int) -> str:
         a = {(f"T{i % tasks}", i): 0.4 for i in range(len(differences))}
         b = {key: 0.4 + d for key, d in zip(a, differences, strict=True)}
-        return verdict(compared(a, b), ("one", "two"))
+        return verdict(compare_scores(a, b), ("one", "two"))
 
     assert "equally" in said([0.0] * 4, 4)
     assert "two is better than one by 10.0 points (p = 0.002 over tasks)." in said([0.1] * 10, 10)
     assert "one is better than two by 10.0 points on prompts like these (p = 0.002" in said([-0.1] * 10, 2)
-    assert "may well be chance (p = 1.000 over tasks)" in said([0.3, -0.2], 2)
+    assert "not significant (p = 1.000 over tasks)" in said([0.3, -0.2], 2)
     assert "(p < 0.001" in said([0.1] * 12, 12)
     assert said([0.1, 0.2, -0.3], 3) == said([0.0] * 4, 4)  # but for the last digit
 
 
 def test_prompts_that_only_one_has_are_left_out_in_words() -> None:
-    assert "2 prompts that both have" in verdict(compared(FIRST, {("A", 0): 1.0, ("B", 0): 0.0}), ("x", "y"))
-    assert re.search(r"\b3 prompts that both have; 2 prompts\b", verdict(compared(FIRST, SECOND), ("x", "y")))
-    assert "left out" not in verdict(compared(FIRST, FIRST), ("x", "y"))
+    assert "2 prompts in common" in verdict(compare_scores(FIRST, {("A", 0): 1.0, ("B", 0): 0.0}), ("x", "y"))
+    assert re.search(
+        r"\b3 prompts in common, without 2 prompts\b", verdict(compare_scores(FIRST, SECOND), ("x", "y"))
+    )
+    assert "without" not in verdict(compare_scores(FIRST, FIRST), ("x", "y"))
 
 
 def test_of_many_runs_each_is_compared_with_the_best() -> None:
@@ -83,22 +85,22 @@ def test_of_many_runs_each_is_compared_with_the_best() -> None:
 
 
 def test_how_much_it_takes_is_said() -> None:
-    (alike,) = to_tell(compared(FIRST, FIRST))
+    (alike,) = sample_size_sentences(compare_scores(FIRST, FIRST))
     assert not re.search(r"\d", alike)
-    told = to_tell(compared(FIRST, SECOND))
+    told = sample_size_sentences(compare_scores(FIRST, SECOND))
     assert re.search(r"\b25 completions .*\b75\b", told[0])
     assert re.search(r"\b8\b", told[1])
 
 
-def sides(*names: str, failures: str = "PythonError") -> tuple[Compared, Compared]:
+def sides(*names: str, failures: str = "PythonError") -> tuple[ComparedRun, ComparedRun]:
     rows = [row(0, 0), row(0, 1, (failures, "cut-off"))]
     programs = {("Visit", 0, index): "" for index in range(2)}
-    first, second = (Compared.of(name, results_of(rows, SUITE, programs)) for name in names or ("a", "b"))
+    first, second = (ComparedRun.of(name, results_of(rows, SUITE, programs)) for name in names or ("a", "b"))
     return first, second
 
 
 def test_both_runs_say_of_how_many_completions_and_how_they_fail() -> None:
-    found = compared(FIRST, SECOND)
+    found = compare_scores(FIRST, SECOND)
     text = printed(comparison_view(found, sides(failures="NoProgram")), width=120)
     assert re.search(r"\npass@1 of a +\d\.\d{3}  2 of 2 completions *\n", text)
     assert re.search(r"\nwithout a program +50\.0% +50\.0%\n", text)
@@ -109,7 +111,7 @@ def test_both_runs_say_of_how_many_completions_and_how_they_fail() -> None:
 
 
 def test_names_are_text() -> None:
-    found = compared(FIRST, SECOND)
+    found = compare_scores(FIRST, SECOND)
     assert SHOWN.split("\\n", maxsplit=1)[0][:10] in printed(
         comparison_view(found, sides(HOSTILE, "b")), width=200
     )
@@ -125,9 +127,9 @@ def test_what_is_unlike() -> None:
     judged = {"python": "3.11", "codebotler": "1"}
     one = a_run({"template": "a", "settings": settings}, judged)
     two = a_run({"template": "b", "settings": {"temperature": 0.8, "seed": 1}}, {**judged, "python": "3.12"})
-    assert unlike(one, one) == []
+    assert other_differences(one, one) == []
     for sentence, (name, values) in zip(
-        unlike(one, two),
+        other_differences(one, two),
         [
             ("Python", "3.11 and 3.12"),
             ("template", "a and b"),
@@ -138,10 +140,10 @@ def test_what_is_unlike() -> None:
     ):
         assert name in sentence
         assert sentence.endswith(values)
-    (unknown,) = unlike(one, a_run({"python": "3.9"}, {"python": "3.11"}))
+    (unknown,) = other_differences(one, a_run({"python": "3.9"}, {"python": "3.11"}))
     assert "settings" in unknown
     for wrong in ([1, 2], "abc", 3):
-        assert unlike(one, a_run({"template": "a", "settings": wrong}, judged)) == [unknown]
+        assert other_differences(one, a_run({"template": "a", "settings": wrong}, judged)) == [unknown]
 
 
 def test_other_suites_are_refused() -> None:
@@ -158,7 +160,7 @@ def test_other_suites_are_refused() -> None:
 def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
     def shown(tasks: int) -> str:
         a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
-        found = compared(a, {key: value / 2 for key, value in a.items()})
+        found = compare_scores(a, {key: value / 2 for key, value in a.items()})
         return printed(comparison_view(found, sides()), width=120)
 
     assert re.search(r"bootstrap.* too narrow", shown(7))
@@ -168,13 +170,13 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
 
 
 def test_equal_differences_have_no_interval() -> None:
-    shown = printed(comparison_view(compared(FIRST, FIRST), sides()), width=120)
-    assert re.search(r"interval over prompts +unknown: all prompts are alike", shown)
+    shown = printed(comparison_view(compare_scores(FIRST, FIRST), sides()), width=120)
+    assert re.search(r"interval over prompts +unknown: no variation between prompts", shown)
     assert "+0.000 to" not in shown
 
 
 def test_one_prompt_is_not_many() -> None:
-    assert "over 1 prompt " in printed(comparison_view(compared({("A", 0): 1}, {("A", 0): 0}), sides()))
+    assert "over 1 prompt " in printed(comparison_view(compare_scores({("A", 0): 1}, {("A", 0): 0}), sides()))
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,12 @@ import polars as pl
 import pytest
 
 from made_up_runs import UNCHECKED, made_up
-from roboeval.analysis.cost import budgets, spent
-from roboeval.analysis.resample import Trial, rejected_share, requests
+from roboeval.analysis.cost import budgets, cost_of
+from roboeval.analysis.resample import CheckedCompletion, rejected_share, requests
 from roboeval.evaluation.runs.table import Price
 
-GOOD = Trial(accepted=True, ran=True, passed=True)
-BAD = Trial(accepted=False, ran=False, passed=False)
+GOOD = CheckedCompletion(accepted=True, ran=True, passed=True)
+BAD = CheckedCompletion(accepted=False, ran=False, passed=False)
 
 
 def usage(there: float, back: float, seconds: float) -> Mapping[str, Any]:
@@ -26,7 +26,7 @@ def paid(**about: Any) -> pl.DataFrame:  # noqa: ANN401 - of a made up run
 
 
 def test_cost_by_hand() -> None:
-    found = spent(paid(), Price(10.0, 20.0))
+    found = cost_of(paid(), Price(10.0, 20.0))
     assert (found.completions, found.passed) == (10, 4)
     assert (found.input_tokens, found.output_tokens, found.seconds) == (10_000, 5_000, 20.0)
     assert found.money == pytest.approx(0.1 + 0.1)
@@ -36,27 +36,27 @@ def test_cost_by_hand() -> None:
 
 
 def test_where_nothing_passes_no_pass_costs_anything() -> None:
-    found = spent(paid(passes={"Visit": (0,)}), Price(10.0, 20.0))
+    found = cost_of(paid(passes={"Visit": (0,)}), Price(10.0, 20.0))
     assert found.money == pytest.approx(0.2)
     assert found.tokens_per_pass is found.money_per_pass is None
 
 
 def test_what_was_not_recorded_costs_nothing_known() -> None:
-    nothing = spent(paid(written=lambda *_: {}), Price(1, 1))
+    nothing = cost_of(paid(written=lambda *_: {}), Price(1, 1))
     assert (nothing.uncounted, set(nothing[3:])) == (10, {None})
-    zeros = spent(paid(written=lambda *_: usage(0, 0, 0.0)), Price(1, 1))
+    zeros = cost_of(paid(written=lambda *_: usage(0, 0, 0.0)), Price(1, 1))
     assert (zeros.uncounted, set(zeros[3:])) == (0, {None})
 
 
 def test_refused_requests_add_nothing_and_are_counted() -> None:
-    half = spent(paid(written=lambda _, index: usage(1, 1, 1.0) if index else {}), Price(1, 1))
+    half = cost_of(paid(written=lambda _, index: usage(1, 1, 1.0) if index else {}), Price(1, 1))
     assert (half.uncounted, half.input_tokens, half.output_tokens, half.seconds) == (1, 9, 9, 9.0)
 
 
 def test_sums_do_not_depend_on_the_order_of_completions() -> None:
     table = paid(written=lambda _, index: usage(1, 1, 0.1 * index))
-    assert spent(table) == spent(table.reverse())
-    assert spent(table).seconds == math.fsum(0.1 * index for index in range(10))
+    assert cost_of(table) == cost_of(table.reverse())
+    assert cost_of(table).seconds == math.fsum(0.1 * index for index in range(10))
 
 
 def test_requests_by_hand() -> None:
@@ -91,7 +91,7 @@ def test_money_goes_by_what_each_prompt_takes() -> None:
 
 def test_what_was_not_judged_costs_nothing() -> None:
     both = paid(passes={"Visit": (4,), "FindBook": (4,)}, accepted=UNCHECKED)
-    assert spent(both.filter(pl.col("task") == "Visit")) == spent(paid())
+    assert cost_of(both.filter(pl.col("task") == "Visit")) == cost_of(paid())
 
 
 @pytest.mark.parametrize("much", [10**400, 10**13, float("inf"), float("nan"), -1, True, "x", None])
@@ -100,10 +100,10 @@ def test_what_nobody_can_have_counted(much: object) -> None:
     table = made_up("a", {"Visit": (1,)}, written=lambda *_: said).table
     assert set(table["input_tokens"]) == set(table["latency_s"]) == {None}
     assert set(table["output_tokens"]) == {1}
-    assert spent(table, Price(1, 1)).tokens_per_pass is None
+    assert cost_of(table, Price(1, 1)).tokens_per_pass is None
 
 
 def test_usage_that_is_none() -> None:
     table = made_up("a", {"Visit": (1,)}, written=lambda *_: {"usage": 3, "latency_s": 1.5}).table
     assert set(table["output_tokens"]) == {None}
-    assert spent(table).seconds == 15.0
+    assert cost_of(table).seconds == 15.0

@@ -192,7 +192,7 @@ def test_prompts_count_the_same_however_many_completions_they_have() -> None:
 def test_overall_interval_is_over_tasks() -> None:
     alike = [TaskScore(name, (PromptScore(name, 0, 4, 0), PromptScore(name, 1, 4, 4))) for name in "AB"]
     passed = overall(alike, 1)
-    assert passed.interval == "95% interval over tasks unknown: all tasks are alike"
+    assert passed.interval == "95% interval over tasks unknown: no variation between tasks"
     assert overall(alike[:1], 1).ends() == "unknown: too few tasks"
     apart = [*alike, *(TaskScore(name, (PromptScore(name, 0, 4, 4),)) for name in "CD")]
     assert re.fullmatch(r"95% interval over tasks 0\.\d{3} to 1\.000", overall(apart, 1).interval)

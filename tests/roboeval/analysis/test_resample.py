@@ -10,25 +10,25 @@ from roboeval.analysis.metrics import PromptScore, TaskScore, overall, pass_at_1
 from roboeval.analysis.resample import (
     LIMITS,
     Chances,
+    CheckedCompletion,
     CheckedPrompt,
-    Trial,
     chances,
     curve_data,
-    resampled,
+    resample,
     trials_by_prompt,
 )
 from roboeval.cli.views.groups import resample_view
 from roboeval.evaluation.runs.scope import Coverage
 from small_run import printed, row
 
-GOOD = Trial(accepted=True, ran=True, passed=True)
-WRONG = Trial(accepted=True, ran=True, passed=False)
-UNSEEN = Trial(accepted=True, ran=False, passed=False)
-REJECTED = Trial(accepted=False, ran=False, passed=False)
-UNJUST = Trial(accepted=False, ran=True, passed=True)
+GOOD = CheckedCompletion(accepted=True, ran=True, passed=True)
+WRONG = CheckedCompletion(accepted=True, ran=True, passed=False)
+UNSEEN = CheckedCompletion(accepted=True, ran=False, passed=False)
+REJECTED = CheckedCompletion(accepted=False, ran=False, passed=False)
+UNJUST = CheckedCompletion(accepted=False, ran=True, passed=True)
 
 
-def drawn(trials: list[Trial], retries: int, chance: random.Random) -> Trial:
+def drawn(trials: list[CheckedCompletion], retries: int, chance: random.Random) -> CheckedCompletion:
     trial = chance.choice(trials)
     while retries and not trial.accepted:
         trial, retries = chance.choice(trials), retries - 1
@@ -63,7 +63,7 @@ def test_without_retries_the_mean_is_pass_at_1_to_the_last_digit(seed: int) -> N
     ]
     scores = [PromptScore("Visit", p.prompt, len(p.trials), sum(t.passed for t in p.trials)) for p in prompts]
     score = TaskScore("Visit", tuple(scores))
-    found = resampled(prompts, 0)
+    found = resample(prompts, 0)
     assert found.passed == overall([score], 1)
     assert {("Visit", n): one.passed for n, one in enumerate(found.by_prompt)} == pass_at_1([score])
 
@@ -118,7 +118,7 @@ PROMPTS = (
 
 
 def test_limits_over_prompts() -> None:
-    none, hundred = resampled(PROMPTS, 0), resampled(PROMPTS, 100)
+    none, hundred = resample(PROMPTS, 0), resample(PROMPTS, 100)
     assert none.passed.mean == pytest.approx(1 / 8)
     assert none.prompts == {0.25: 1 / 2, 0.5: 0, 0.75: 0, 1.0: 0}
     assert hundred.passed.mean == pytest.approx(1 / 2)

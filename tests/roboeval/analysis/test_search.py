@@ -9,7 +9,7 @@ import pytest
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
 from roboeval.analysis import search as searching
-from roboeval.analysis.search import Found, SearchQuery
+from roboeval.analysis.search import TraceMatch, TraceQuery
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES
 
 
@@ -31,11 +31,11 @@ ROWS = [
 ]
 
 
-def found(question: SearchQuery, rows: list[dict[str, Any]] | None = None) -> list[Found]:
+def found(question: TraceQuery, rows: list[dict[str, Any]] | None = None) -> list[TraceMatch]:
     return [one for one in search(ROWS if rows is None else rows, question) if one.worlds]
 
 
-def search(rows: list[dict[str, Any]], question: SearchQuery, *, workers: int = 1) -> list[Found]:
+def search(rows: list[dict[str, Any]], question: TraceQuery, *, workers: int = 1) -> list[TraceMatch]:
     return [*searching.search(list(map(to_line, rows)), question, workers=workers)]
 
 
@@ -43,33 +43,33 @@ HALL = 'tr.Exists(goto("hall"))'
 
 
 def test_a_formula_is_tried_in_every_world() -> None:
-    assert [(one.key[2], [n for n, _ in one.worlds]) for one in found(SearchQuery(HALL))] == [
+    assert [(one.key[2], [n for n, _ in one.worlds]) for one in found(TraceQuery(HALL))] == [
         (0, [1]),
         (1, [2]),
         (3, [1, 2]),
     ]
-    negated = found(SearchQuery(HALL, negated=True))
+    negated = found(TraceQuery(HALL, negated=True))
     assert [(one.key[2], [n for n, _ in one.worlds]) for one in negated] == [(0, [2]), (1, [1]), (2, [1, 2])]
 
 
 def test_narrowed_to_a_task_or_a_world() -> None:
-    assert [one.key[2] for one in found(SearchQuery(HALL, task="Wait"))] == [3]
-    assert [one.key[2] for one in found(SearchQuery(HALL, world="2"))] == [1, 3]
-    assert [one.key[2] for one in found(SearchQuery(HALL, world="world 1"))] == [0, 3]
-    assert len(found(SearchQuery())) == 4
+    assert [one.key[2] for one in found(TraceQuery(HALL, task="Wait"))] == [3]
+    assert [one.key[2] for one in found(TraceQuery(HALL, world="2"))] == [1, 3]
+    assert [one.key[2] for one in found(TraceQuery(HALL, world="world 1"))] == [0, 3]
+    assert len(found(TraceQuery())) == 4
 
 
 def test_what_cannot_be_judged_does_not_match() -> None:
     asks = row(0, [["ask", "tea?", [{"no text": "1"}], None]])
     formula = 'tr.Exists(ask("tea", "yes"))'
-    assert found(SearchQuery(formula), [asks]) == []
-    assert len(found(SearchQuery(formula, negated=True), [asks])) == 1
+    assert found(TraceQuery(formula), [asks]) == []
+    assert len(found(TraceQuery(formula, negated=True), [asks])) == 1
 
 
 def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "ROWS_FOR_PROCESSES", 50)
     rows = [{**ROWS[n % 4], "index": n} for n in range(50)]
-    assert search(rows, SearchQuery(HALL), workers=2) == search(rows, SearchQuery(HALL))
+    assert search(rows, TraceQuery(HALL), workers=2) == search(rows, TraceQuery(HALL))
 
 
 def test_places_are_those_of_the_row_and_not_of_requests() -> None:
@@ -77,9 +77,9 @@ def test_places_are_those_of_the_row_and_not_of_requests() -> None:
     old = row(0, [["goto", "hall"], ["say", "x"]])
     new = {**old, "verdicts": [{**old["verdicts"][0], "places": [[1, "hall"], [2, "the hall"], [3, "lab"]]}]}
     other = {**old, "verdicts": [{**old["verdicts"][0], "places": [[1, "hall"], [2, "lab"]]}]}
-    (unknown,) = search([old], SearchQuery(formula))
+    (unknown,) = search([old], TraceQuery(formula))
     assert (unknown.worlds, unknown.cut, unknown.earlier) == ((), (), ((1, "World 1"),))
-    assert [len(one.worlds) for one in search([new, other], SearchQuery(formula))] == [1, 0]
+    assert [len(one.worlds) for one in search([new, other], TraceQuery(formula))] == [1, 0]
 
 
 # --- the command
@@ -101,16 +101,16 @@ def test_the_command(runs: Path) -> None:
     assert made.out.startswith("found ")
     assert "GrilledCheese" not in made.out
     of_the_task = json.loads(roboeval("find", runs, "--task", "SayGoodDay", "--json").out)
-    assert of_the_task["looked_at"] == len(of_the_task["found"]) > 0
-    assert f" of {of_the_task['looked_at']} completions" in made.out
+    assert of_the_task["count_searched"] == len(of_the_task["found"]) > 0
+    assert f" of {of_the_task['count_searched']} completions" in made.out
     assert " passes, and differs in " in made.out
     data = json.loads(roboeval("find", runs, "--json").out)
-    assert data["looked_at"] == len(data["found"])
+    assert data["count_searched"] == len(data["found"])
     failed = sum(not one["passed"] for one in data["found"])
     assert sum(group["size"] for group in data["groups"]) == failed > 0
     assert all(group["why"] for group in data["groups"])
     every = roboeval("find", runs).out
-    assert every.startswith(f"{failed} completions of {data['looked_at']} failed, in ")
+    assert every.startswith(f"{failed} completions of {data['count_searched']} failed, in ")
     assert "passed" not in every.splitlines()[2]
     there = json.loads(roboeval("find", runs, 'tr.Exists(goto("lab"))', "--json").out)["found"]
     said = roboeval("find", runs, 'tr.Exists(goto("lab"))').out.partition("failed, in")[0]
@@ -135,7 +135,7 @@ def test_rows_of_an_earlier_version_are_undecided(runs: Path) -> None:
     plain = roboeval("find", runs, 'tr.Exists(goto("lab"))', "--json")
     file.write_bytes(kept)
     key.write_bytes(sealed)
-    assert len(json.loads(made.out)["undecided"]) == json.loads(made.out)["looked_at"] == len(rows)
+    assert len(json.loads(made.out)["undecided"]) == json.loads(made.out)["count_searched"] == len(rows)
     assert "earlier version" in made.err
     assert "--redo" in made.err
     assert json.loads(plain.out)["undecided"] == []

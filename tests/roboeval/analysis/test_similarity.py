@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from roboeval.analysis.cluster import LONGEST, passing, shape, shortest_fix, similarity
+from roboeval.analysis.cluster import LONGEST, passing_programs, shape, shortest_fix, similarity
 
 ONE = """\
 def task_program():
@@ -60,7 +60,7 @@ def test_the_shortest_fix() -> None:
     wrong = "def task_program():\n    go_to('hall')\n    say('x')\n"
     near = wrong.replace("'x'", "'y'")
     far = "def task_program():\n    pass\n"
-    fix = shortest_fix(wrong, passing([("far", far), ("near", near), ("again", near)]))
+    fix = shortest_fix(wrong, passing_programs([("far", far), ("near", near), ("again", near)]))
     assert fix is not None
     assert (fix.name, fix.changed) == ("near", 2)
     assert fix.changes[-2:] == (("-", "    say('x')"), ("+", "    say('y')"))
@@ -68,26 +68,26 @@ def test_the_shortest_fix() -> None:
 
 
 def test_of_equally_near_programs_the_first() -> None:
-    fix = shortest_fix("a\nb\n", passing([("one", "a\nc\n"), ("two", "a\nd\n")]))
+    fix = shortest_fix("a\nb\n", passing_programs([("one", "a\nc\n"), ("two", "a\nd\n")]))
     assert fix is not None
     assert fix.name == "one"
 
 
 def test_lines_that_only_move_are_changes() -> None:
-    fix = shortest_fix("a\nb\n", passing([("moved", "b\na\n")]))
+    fix = shortest_fix("a\nb\n", passing_programs([("moved", "b\na\n")]))
     assert fix is not None
     assert fix.changed == 2
 
 
 def test_what_is_left_out_of_a_difference_is_marked() -> None:
     lines = [f"line {n}" for n in range(30)]
-    fix = shortest_fix("\n".join(lines), passing([("p", "\n".join([*lines[:29], "other"]))]))
+    fix = shortest_fix("\n".join(lines), passing_programs([("p", "\n".join([*lines[:29], "other"]))]))
     assert fix is not None
     assert fix.changes[0] == (" ", "...")
     assert [sign for sign, _ in fix.changes] == [" ", " ", " ", "-", "+"]
 
 
 def test_the_same_lines_in_another_order_may_be_further_than_other_lines() -> None:
-    fix = shortest_fix("a\nb\nc\n", passing([("turned", "c\nb\na\n"), ("other", "a\nb\nd\n")]))
+    fix = shortest_fix("a\nb\nc\n", passing_programs([("turned", "c\nb\na\n"), ("other", "a\nb\nd\n")]))
     assert fix is not None
     assert (fix.name, fix.changed) == ("other", 2)

@@ -10,10 +10,10 @@ import pytest
 
 from roboeval.analysis.metrics import DIFFERENCE, Clusters, Estimate, by_formula
 from roboeval.analysis.statistics import (
-    Needed,
+    SampleSizes,
     by_bootstrap,
-    needed,
     p_by_signs,
+    sample_sizes,
 )
 
 
@@ -143,22 +143,22 @@ def test_where_neither_is_better_p_is_small_as_rarely_as_it_should_be() -> None:
 
 def test_how_many_completions_by_hand() -> None:
     # One prompt each way: a (1 - a) + b (1 - b) = 0.25 + 0.24; (1.96 + 0.8416)**2 = 7.849 over 0.01.
-    found = needed([(0.5, 0.6), (0.5, 0.6)])
+    found = sample_sizes([(0.5, 0.6), (0.5, 0.6)])
     assert found.completions == math.ceil(7.849 / 0.01 * 0.49 / 2)
     assert found.prompts == 2
     # Differences 0 and 0.4: mean 0.2, variance 0.08.
-    assert needed([(0.0, 0.0), (0.0, 0.4)]).prompts == math.ceil(7.849 / 0.04 * 0.08)
+    assert sample_sizes([(0.0, 0.0), (0.0, 0.4)]).prompts == math.ceil(7.849 / 0.04 * 0.08)
 
 
 def test_what_does_not_differ_is_never_told() -> None:
-    assert needed([(0.5, 0.6), (0.6, 0.5)]) == Needed(None, None)
-    assert needed([(0.0, 1.0)]) == Needed(1, None)
+    assert sample_sizes([(0.5, 0.6), (0.6, 0.5)]) == SampleSizes(None, None)
+    assert sample_sizes([(0.0, 1.0)]) == SampleSizes(1, None)
 
 
 def test_so_many_completions_do_tell_four_times_in_five() -> None:
     chance = random.Random(9)
     true = [(0.3, 0.45), (0.6, 0.7), (0.5, 0.55), (0.2, 0.4)]
-    n = needed(true).completions
+    n = sample_sizes(true).completions
     assert n is not None
     told = 0
     for _ in range(300):

@@ -14,9 +14,8 @@ import pytest
 from codebotler.core.errors import UserError
 from made_results import table_of
 from roboeval.analysis.counts import tally_of
-from roboeval.analysis.summary import ALL, EvaluationSummary, kinds_in_order, summary_data
+from roboeval.analysis.summary import ALL, EvaluationSummary, kinds_in_order, summarise, summary_data
 from roboeval.analysis.summary import causes as causes_of
-from roboeval.analysis.summary import summary as summary_of
 from roboeval.cli.views.results import summary_view
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import Completion
@@ -34,7 +33,7 @@ def summary(
     ablated: bool = False,
 ) -> EvaluationSummary:
     scope = scope or JudgingScope(Counter(row["task"] for row in rows))
-    return summary_of(tally_of(table_of(rows)), suite, scope, k=k, ablated=ablated)
+    return summarise(tally_of(table_of(rows)), suite, scope, k=k, ablated=ablated)
 
 
 def completion(prompt: int, index: int, **more: str) -> Completion:
@@ -105,7 +104,7 @@ def test_the_tables_fit_and_break_no_number(width: int) -> None:
     assert "runs/one" in text
     assert "Visit" in text
     assert "4,000 of 4,000 completions failed (100.0%)" in text
-    unknown = "pass@2 over all prompts: 0.000 (95% interval over tasks unknown: all tasks are alike)"
+    unknown = "pass@2 over all prompts: 0.000 (95% interval over tasks unknown: no variation between tasks)"
     assert unknown in " ".join(text.split())
     assert "\n4,000 of 4,000 completions, 4 prompts of 2 tasks\n" in text
     assert "without a program" not in text, "it did not happen"

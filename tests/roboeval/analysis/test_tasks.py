@@ -12,7 +12,7 @@ from codebotler.core.terminal import visible
 from codebotler.models.no_program import IN_WORDS
 from made_results import results_of, table_of
 from roboeval.analysis.counts import tally_of
-from roboeval.analysis.summary import summary
+from roboeval.analysis.summary import summarise
 from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import summary_view, task_view
@@ -76,7 +76,7 @@ def test_what_a_model_wrote_is_text(*, colour: bool) -> None:
     rows = [row(0, 0, ("PythonError", HOSTILE))]
     completions = [Completion(task="Visit", prompt=0, index=0, program="", instruction=HOSTILE)]
     views = [
-        summary_view(summary(tally_of(table_of(rows)), SUITE, JudgingScope({})), title=HOSTILE),
+        summary_view(summarise(tally_of(table_of(rows)), SUITE, JudgingScope({})), title=HOSTILE),
         task_view(task_data(results(*completions, rows=rows), "Visit")),
     ]
     for view in views:

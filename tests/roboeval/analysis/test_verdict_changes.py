@@ -16,12 +16,12 @@ from made_results import results_of
 from roboeval.analysis.verdict_changes import (
     VerdictChanges,
     changes_data,
-    overtakings,
-    place,
-    said,
-    said_of_order,
-    said_of_prompts,
+    describe_ranking,
+    describe_run,
+    rank,
+    rank_changes,
     verdict_changes,
+    warn_of_prompts,
 )
 from roboeval.cli.views.comparison import changes_view
 from roboeval.evaluation.runs.results import Results
@@ -93,14 +93,14 @@ def test_counted_by_hand() -> None:
     }  # what the first has against
     assert found.programs == 2
     assert re.search(
-        r"^a: strict .*\b3 of the 14 .*\bsmall .*\b2 .*small .*\(2 different programs\)", said(found)
+        r"^a: strict .*\b3 of the 14 .*\bsmall .*\b2 .*small .*\(2 distinct programs\)", describe_run(found)
     )
 
 
 def test_nothing_changes() -> None:
     found = changed({"Visit": (3,)}, {"Visit": (3,)})
     assert (found.first_only, found.second_only) == ((), ())
-    assert re.search(r"\bsmall and strict agree .*\b10\b", said(found))
+    assert re.search(r"\bsmall and strict agree .*\b10\b", describe_run(found))
     assert "only, and what" not in printed(changes_view([found], most=3))
 
 
@@ -119,17 +119,17 @@ def runs(**scores: tuple[int, int]) -> list[VerdictChanges]:
 
 def test_places_are_shared_by_those_that_pass_equally_often() -> None:
     scores = {"a": 0.5, "b": 0.9, "c": 0.5 + 1e-15, "d": 0.1}
-    assert {name: place(name, scores) for name in scores} == {"a": 2, "b": 1, "c": 2, "d": 4}
+    assert {name: rank(name, scores) for name in scores} == {"a": 2, "b": 1, "c": 2, "d": 4}
 
 
 def test_who_changes_places() -> None:
     found = runs(a=(9, 3), b=(5, 5), c=(9, 2), d=(1, 1))
-    assert [(one.one, one.other) for one in overtakings(found)] == [("b", "a"), ("a", "c"), ("b", "c")]
-    tied = next(one for one in overtakings(found) if one.one == "a")
+    assert [(one.one, one.other) for one in rank_changes(found)] == [("b", "a"), ("a", "c"), ("b", "c")]
+    tied = next(one for one in rank_changes(found) if one.one == "a")
     assert tied.first == 0.0
     assert tied.second == pytest.approx(0.1)
     for sentence, (one, other, how) in zip(
-        said_of_order(found),
+        describe_ranking(found),
         [("b", "a", "less often"), ("a", "c", "as often"), ("b", "c", "less often")],
         strict=True,
     ):
@@ -137,21 +137,21 @@ def test_who_changes_places() -> None:
 
 
 def test_who_is_caught_up() -> None:
-    (one,) = said_of_order(runs(a=(2, 4), b=(5, 4)))
+    (one,) = describe_ranking(runs(a=(2, 4), b=(5, 4)))
     assert re.match(r"b passes as often as a under strict, .*\bmore often\b.* small", one)
 
 
 def test_the_order_stays() -> None:
-    (sentence,) = said_of_order(runs(a=(5, 3), b=(2, 1)))
+    (sentence,) = describe_ranking(runs(a=(5, 3), b=(2, 1)))
     assert re.search(r"\b2 runs is the same under strict\b.* small", sentence)
-    assert said_of_order(runs(a=(5, 3))) == []
+    assert describe_ranking(runs(a=(5, 3))) == []
 
 
 def test_runs_about_different_prompts_are_warned_of() -> None:
     one, other = runs(a=(5, 3), b=(2, 1))
     more = changed({"Visit": (1, 1)}, {"Visit": (1, 1)}, name="c")
-    assert said_of_prompts([one, other]) == []
-    (warning,) = said_of_prompts([one, more])
+    assert warn_of_prompts([one, other]) == []
+    (warning,) = warn_of_prompts([one, more])
     assert "different prompts" in warning
 
 
@@ -227,7 +227,7 @@ def test_the_report(judged_twice: Path, tmp_path: Path) -> None:
     made = roboeval("report", "hasty", "careful", "--out", str(out), *options, cwd=judged_twice)
     assert made.status == 0, made
     page = (out / "index.html").read_text()
-    assert "What other checks change" in page
+    assert 'id="beside"' in page
     assert "--beside plus" in page
     assert (out / "tables" / "reversals.csv").exists()
     made = roboeval("report", "hasty", "careful", "--out", str(out), "--no-check", cwd=judged_twice)

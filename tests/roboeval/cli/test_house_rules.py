@@ -98,11 +98,11 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
     assert "100.0% of the programs" in shown
-    assert "(95% interval over tasks unknown: all tasks are alike)" in " ".join(shown.split())
+    assert "(95% interval over tasks unknown: no variation between tasks)" in " ".join(shown.split())
     reported = roboeval("report", "run", "--rules", "house.yaml", "--out", "report", "--no-check", cwd=folder)
     assert reported.status == 0, reported.err
     page = (folder / "report" / "index.html").read_text()
-    assert "the interval of the share that breaks a rule is unknown: all tasks are alike." in page
+    assert "the interval of the share that breaks a rule is unknown: no variation between tasks." in page
 
 
 def test_rows_are_the_same_with_any_number_of_workers_and_on_both_roads(folder: Path) -> None:

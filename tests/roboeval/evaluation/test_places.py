@@ -25,7 +25,7 @@ from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from made_results import results_of
 from roboeval.analysis.breakdown import never_returned
-from roboeval.analysis.search import Found, SearchQuery, answer
+from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
 from roboeval.analysis.tasks import prompt_data
 from roboeval.evaluation.explanation import CHANGED, completion_data
 from roboeval.evaluation.judge import is_met, judged, run_in_worlds
@@ -75,8 +75,8 @@ def explained(row: dict[str, Any], suite: Suite) -> list[str]:
     return [check["explanation"] for check in world["failed_checks"]]
 
 
-def find(row: dict[str, Any], formula: str) -> Found:
-    return answer(row, SearchQuery(formula), parse(formula))
+def find(row: dict[str, Any], formula: str) -> TraceMatch:
+    return match_row(row, TraceQuery(formula), parse(formula))
 
 
 def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:
@@ -304,7 +304,7 @@ def test_rows_of_earlier_versions_answer_what_needs_no_places(worker: Worker) ->
     assert "never said" in said
     for formula in formulas[:2]:
         for negated in (False, True):
-            found = answer(old, SearchQuery(formula, negated), parse(formula))
+            found = match_row(old, TraceQuery(formula, negated), parse(formula))
             assert (found.worlds, found.undecided, found.earlier) == ((), ((1, "w"),), ((1, "w"),))
     assert find(old, 'tr.Exists(say("hi"))').worlds == ((1, "w"),)
     assert not find(row, formulas[1]).undecided

@@ -8,7 +8,7 @@ import pytest
 from codebotler.core.trace import Trace
 from codebotler.core.words import brief
 from codebotler.rtl import explain
-from roboeval.linting.trials import tried
+from roboeval.linting.trials import judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.task import check_label
 
@@ -28,7 +28,7 @@ def without_what_was_said(sentence: str, trace: Trace) -> str:
 
 
 def explanations(task: Task, suite: Suite) -> Iterator[str]:
-    for verdicts in tried(task, suite):
+    for verdicts in judge_solutions(task, suite):
         for verdict in verdicts:
             for requirement in verdict.failed:
                 why = explain(requirement.formula, verdict.outcome.trace)

@@ -14,7 +14,7 @@ from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import tried
+from roboeval.linting.trials import judge_solutions
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task
 from roboeval.suites.solutions import solutions
@@ -75,7 +75,7 @@ def linted(tmp_path: Path) -> Lint:
         (suite / "tasks" / "Hello.yaml").write_text(text)
         loaded = load_suite(str(suite))
         task = loaded.task("Hello")
-        findings = lint(task, tried(task, loaded) if untripped else [])
+        findings = lint(task, judge_solutions(task, loaded) if untripped else [])
         wanted = {"untripped": untripped, "unworded": unworded}
         return [one for one in findings if wanted.get(one.kind, True)]
 
@@ -237,20 +237,20 @@ def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
     checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
     (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
     assert '"not swears"' in finding.message
-    assert not re.search(r"\d", finding.message)
+    assert "1 wrong program " in finding.message
     two = (
         SOLUTIONS
         + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
     )
     (finding,) = linted(checks, ["speaks", "not swears"], solutions=two, untripped=True)
-    assert "2 programs of the task that fail" in finding.message
+    assert "2 wrong programs" in finding.message
 
 
 def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:
     speaks = SOLUTIONS.replace("pass", "say('hello')")
     found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], solutions=speaks, untripped=True)
     (message,) = (one.message for one in found if one.kind == "untripped")
-    for name in ("2 programs of the task that fail", '"speaks"', '"not"'):
+    for name in ("2 wrong programs", '"speaks"', '"not"'):
         assert name in message
 
 
@@ -503,12 +503,12 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     accepted = replace(findings[0], accepted="for later")
     shown, more = render([*findings, accepted]).splitlines()
     assert shown == line
-    assert re.search(r"^1 finding more .* --accepted", more)
-    assert re.search(r"^nothing was found .*\b2 findings .* --accepted", render([accepted, accepted]))
+    assert re.search(r"^1 accepted finding .* --accepted", more)
+    assert re.search(r"^2 accepted findings .* --accepted", render([accepted, accepted]))
     told = line.replace("warning", "accepted") + ": for later"
     assert render([*findings, accepted], accepted=True) == f"{line}\n{told}"
     assert render([accepted], accepted=True) == told
-    assert render([], accepted=True) == render([]) == "nothing was found"
+    assert render([], accepted=True) == render([]) == "no findings"
     monkeypatch.chdir(tmp_path / "suite0" / "solutions")
     assert render(findings).startswith(f"{path}:6: ")
 
@@ -549,7 +549,7 @@ def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path:
     new_task(tmp_path, "MakeTea")
     suite = load_suite(str(tmp_path))
     task = suite.task("MakeTea")
-    assert lint(task, tried(task, suite)) == []
+    assert lint(task, judge_solutions(task, suite)) == []
     rows = [
         Completion(task="MakeTea", prompt=0, index=i, program=one.program)
         for i, one in enumerate(solutions(task))

@@ -161,7 +161,7 @@ def test_an_equivalent_mutant_is_not_shown_again(small: Path) -> None:
     [
         (("SayGoodDay,SayGoodNight",), ['"paper"', '"SayGoodNight"']),
         (("SayGoodNight",), ['"paper"', '"SayGoodNight"']),
-        (("SayGoodDay", "--worlds", "200"), ["worlds", '"paper"', "written out"]),
+        (("SayGoodDay", "--worlds", "200"), ["worlds", '"paper"', "by hand"]),
         (("SayGoodDay", "--suite", "plus", "--worlds", "1000000000"), ["invalid value", "'--worlds'"]),
         (("SayGoodDay", "--out", ""), ["empty", "a folder"]),
         (("SayGoodDay", "--suite", "nowhere"), ['"nowhere"']),

@@ -1,4 +1,4 @@
-"""Mutants: distinct by their trees, drawn evenly, and with a diff that a person can read."""
+"""Mutants: distinct by their trees, sample_mutants evenly, and with a diff that a person can read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 
 from codebotler.core.world import Room, World
-from roboeval.mutation.mutants import OPERATORS, Mutant, Original, drawn, mutants, originals
+from roboeval.mutation.mutants import OPERATORS, Mutant, Original, mutants, originals, sample_mutants
 from roboeval.mutation.operator import Context, operators_in
 from roboeval.mutation.operators import misuse
 from roboeval.suites.load import Suite
@@ -55,9 +55,9 @@ def test_a_diff_shows_what_was_changed() -> None:
 
 def test_mutants_are_drawn_evenly_and_by_the_seed() -> None:
     every = made(*(f'def task_program():\n    go_to("lobby")\n    say("{n}")\n' for n in range(20)))
-    some = drawn(every, 60, seed=1)
-    assert some == drawn(reversed(every), 60, seed=1)
-    assert some != drawn(every, 60, seed=2)
+    some = sample_mutants(every, 60, seed=1)
+    assert some == sample_mutants(reversed(every), 60, seed=1)
+    assert some != sample_mutants(every, 60, seed=2)
     assert len(some) == len(set(some)) == 60
     drawn_of, all_of = (Counter(mutant.operator for mutant in those) for those in (some, every))
     level = max(drawn_of.values())
@@ -66,7 +66,7 @@ def test_mutants_are_drawn_evenly_and_by_the_seed() -> None:
 
 def test_no_more_are_drawn_than_there_are() -> None:
     every = made(GOES)
-    assert Counter(drawn(every, 1_000, seed=3)) == Counter(every)
+    assert Counter(sample_mutants(every, 1_000, seed=3)) == Counter(every)
 
 
 # --- originals

@@ -22,7 +22,7 @@ from codebotler.simulator.engine import run
 from codebotler.simulator.settings import Limits, SimulationSettings
 from roboeval.mutation.mutants import OPERATORS
 from roboeval.mutation.operator import Context, Operator
-from roboeval.mutation.program_tree import changed, read
+from roboeval.mutation.program_tree import apply_edit, read
 
 WORLD = World(
     rooms=(
@@ -73,7 +73,7 @@ def mutants(operator: Operator, body: str) -> Iterator[str]:
     """What an operator makes of a body."""
     source = read(program(body))
     assert source is not None
-    found = (changed(source, edit) for edit in operator.edits(source, CONTEXT))
+    found = (apply_edit(source, edit) for edit in operator.edits(source, CONTEXT))
     yield from (one for one in found if one is not None)
 
 

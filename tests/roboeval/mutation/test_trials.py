@@ -16,7 +16,7 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.report import to_yaml
-from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMutant
+from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, TriedMutant
 from roboeval.mutation.trials import mutation_score, result_of, worlds_of
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import equivalent_mutants
@@ -41,6 +41,7 @@ worlds:
     require: [goes, says]
 """
 KILLED, SURVIVED, EQUIVALENT, SAME, CRASHES = MutantStatus
+NOT_SAYS = MutantResult(KILLED, "nobody is in", "not says")
 RIGHT = Original(
     "right", "def task_program():\n    go_to('kitchen')\n    if is_in_room('ann'):\n        say('bye')\n"
 )
@@ -74,19 +75,22 @@ def outcomes_of(source: str, suite: Suite, pool: WorkerPool) -> list[Outcome]:
 @pytest.mark.parametrize(
     ("body", "result"),
     [
-        ("say('bye')", Result(KILLED, "nobody is in", "goes")),
-        ("go_to('kitchen')", Result(KILLED, "ann is in", "says")),
-        ("go_to('attic')", Result(KILLED, "nobody is in", "GoToInvalidLocation")),
-        ("go_to('kitchen'); ask('ann', 'Hm?', ['yes'])", Result(KILLED, "nobody is in", "AskNoPerson")),
-        ("go_to('kitchen'); while True: pass", Result(KILLED, "nobody is in", "TimeoutError")),
-        ("go_to('kitchen'); [1][is_in_room('x')]; say('bye')", Result(KILLED, "nobody is in", "not says")),
-        ("go_to('kitchen'); [1][is_in_room('x')]", Result(KILLED, "ann is in", "IndexError")),
-        ("go_to('kitchen'); say(1)", Result(CRASHES, "nobody is in", "TypeError")),
-        ("go_to('kitchen'); [say('bye') for _ in [1] if is_in_room('ann')]", Result(SAME)),
-        ("go_to('kitchen'); say('hi'); [say('bye') for _ in [1] if is_in_room('x')]", Result(SURVIVED)),
+        ("say('bye')", MutantResult(KILLED, "nobody is in", "goes")),
+        ("go_to('kitchen')", MutantResult(KILLED, "ann is in", "says")),
+        ("go_to('attic')", MutantResult(KILLED, "nobody is in", "GoToInvalidLocation")),
+        ("go_to('kitchen'); ask('ann', 'Hm?', ['yes'])", MutantResult(KILLED, "nobody is in", "AskNoPerson")),
+        ("go_to('kitchen'); while True: pass", MutantResult(KILLED, "nobody is in", "TimeoutError")),
+        (
+            "go_to('kitchen'); [1][is_in_room('x')]; say('bye')",
+            MutantResult(KILLED, "nobody is in", "not says"),
+        ),
+        ("go_to('kitchen'); [1][is_in_room('x')]", MutantResult(KILLED, "ann is in", "IndexError")),
+        ("go_to('kitchen'); say(1)", MutantResult(CRASHES, "nobody is in", "TypeError")),
+        ("go_to('kitchen'); [say('bye') for _ in [1] if is_in_room('ann')]", MutantResult(SAME)),
+        ("go_to('kitchen'); say('hi'); [say('bye') for _ in [1] if is_in_room('x')]", MutantResult(SURVIVED)),
     ],
 )
-def test_what_becomes_of_a_mutant(body: str, result: Result, suite: Suite, pool: WorkerPool) -> None:
+def test_what_becomes_of_a_mutant(body: str, result: MutantResult, suite: Suite, pool: WorkerPool) -> None:
     before, now = (outcomes_of(source, suite, pool) for source in (RIGHT.program, program(body)))
     assert result_of(now, before, suite.task("T").scenarios) == result
 
@@ -96,8 +100,8 @@ def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, pool: Wo
     score = mutation_score(task, suite, pool, further=[RIGHT, *wrong])
     assert score.right == (RIGHT,)
     assert score.wrong == (
-        (wrong[0], Result(KILLED, "ann is in", "says")),
-        (wrong[1], Result(KILLED, "nobody is in", "SyntaxError")),
+        (wrong[0], MutantResult(KILLED, "ann is in", "says")),
+        (wrong[1], MutantResult(KILLED, "nobody is in", "SyntaxError")),
     )
 
 
@@ -129,7 +133,7 @@ def test_mutants_are_judged_by_all_prompts_for_which_their_original_is_right(
 
 def score_of(*statuses: MutantStatus) -> MutationScore:
     made = (Mutant("drop-the-look", RIGHT, program(f"say({n})")) for n in range(len(statuses)))
-    tried = tuple(TriedMutant(one, Result(status)) for one, status in zip(made, statuses, strict=True))
+    tried = tuple(TriedMutant(one, MutantResult(status)) for one, status in zip(made, statuses, strict=True))
     return MutationScore("T", 2, (RIGHT,), (), tried)
 
 
@@ -174,7 +178,7 @@ def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, pool: Wo
         assert found.count(EQUIVALENT) == equivalent
         assert results[killed].status is KILLED
         assert results[survivor] == (
-            Result(EQUIVALENT, why="It does no harm.") if equivalent else Result(SURVIVED)
+            MutantResult(EQUIVALENT, why="It does no harm.") if equivalent else MutantResult(SURVIVED)
         )
 
 
@@ -200,7 +204,7 @@ def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> N
 
 def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
     assert worlds_of(suite, task, None, 1) == task.scenarios
-    with pytest.raises(UserError, match=r'"mine".* written out'):
+    with pytest.raises(UserError, match=r'"mine".* --worlds'):
         worlds_of(suite, task, 200, 1)
 
 

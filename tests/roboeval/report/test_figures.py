@@ -27,11 +27,11 @@ from roboeval.report.drawing import (
     PAPER,
     WHITE,
     WIDE,
-    darkened,
+    darken,
     new_figure,
+    render,
     shades,
-    styled,
-    written,
+    use_style,
 )
 from roboeval.report.failures import all_causes
 from roboeval.report.figures import (
@@ -72,9 +72,9 @@ def picture(case: str, name: str) -> Image.Image:
 
 
 def drawn_anew(case: str, name: str) -> Image.Image:
-    with styled():
+    with use_style():
         figure = DRAWINGS[name](cases()[case])
-        drawn = Image.open(io.BytesIO(written(figure)["png"])).convert("RGB")
+        drawn = Image.open(io.BytesIO(render(figure)["png"])).convert("RGB")
     drawn.thumbnail(SIZE)
     return drawn
 
@@ -118,7 +118,7 @@ def test_other_numbers_look_different() -> None:
 def test_a_further_class_of_failures_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     one = FailureClass("RuleError", "broken rule", "broken rules", ())
     monkeypatch.setitem(cast("dict[str, FailureClass]", CLASSES), one.name, one)
-    with styled():
+    with use_style():
         figure = DRAWINGS["causes"](cases()["usual"])
     assert [axes.get_title(loc="left") for axes in figure.axes][-1] == "(e) broken rules"
     _, labels = figure.axes[0].get_legend_handles_labels()
@@ -127,7 +127,7 @@ def test_a_further_class_of_failures_is_drawn(monkeypatch: pytest.MonkeyPatch) -
 
 def test_class_without_programs_is_drawn_only_where_it_happened() -> None:
     def titles(case: str) -> list[str]:
-        with styled():
+        with use_style():
             figure = DRAWINGS["causes"](cases()[case])
         return [axes.get_title(loc="left") for axes in figure.axes]
 
@@ -137,7 +137,7 @@ def test_class_without_programs_is_drawn_only_where_it_happened() -> None:
 
 def test_classes_keep_their_colours() -> None:
     def colours(case: str) -> dict[str, Any]:
-        with styled():
+        with use_style():
             figure = DRAWINGS["causes"](cases()[case])
         handles, labels = figure.axes[0].get_legend_handles_labels()
         found: list[Any] = list(handles)
@@ -150,7 +150,7 @@ def test_classes_keep_their_colours() -> None:
 
 def test_whisker_is_the_interval_and_marks_are_the_worst_and_the_best_prompt() -> None:
     run = made_up("a", {"Visit": (4, 5, 6), "CountMugs": (4,), "BringTea": (3, 3, 3)})
-    with styled():
+    with use_style():
         (axes,) = bars([run]).axes
     (ends,) = [np.asarray(line)[:, 1] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
     passed = run.scores[0].pass_at(1)
@@ -163,7 +163,7 @@ def test_whisker_is_the_interval_and_marks_are_the_worst_and_the_best_prompt() -
 
 def test_overall_figure_has_the_interval_over_tasks() -> None:
     runs = cases()["usual"]
-    with styled():
+    with use_style():
         (axes,) = overall_scores(runs).axes
     passed = [overall(run.scores, 1) for run in runs]
     ends = [np.asarray(line)[:, 0] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
@@ -173,7 +173,7 @@ def test_overall_figure_has_the_interval_over_tasks() -> None:
 
 @pytest.mark.parametrize("name", ["tasks", "thresholds", "accepted", "rejection-sampling"])
 def test_long_names_fit_into_legends(name: str) -> None:
-    with styled():
+    with use_style():
         figure = DRAWINGS[name](cases()["long names"])
         figure.draw_without_rendering()
         (legend,) = figure.legends
@@ -185,7 +185,7 @@ def test_long_names_fit_into_legends(name: str) -> None:
 def test_lines_end_where_the_axis_ends() -> None:
     run = made_up("a", {"Visit": (1,), "Wait": (0,)}, of=50)
     other = made_up("b", {"Visit": (5,)}, accepted=~pl.col("passed"))  # after 100 retries nearly none passes
-    with styled():
+    with use_style():
         drawn = {1 / 50: thresholds([run]), 1 / 10: limits({"b": curves(other.trials)}, 10)}
     for end, figure in drawn.items():
         ticks = [text.get_text() for text in figure.axes[0].get_xticklabels()]
@@ -201,7 +201,7 @@ def test_lines_end_where_the_axis_ends() -> None:
 
 def test_numbers_stand_out_from_their_shades() -> None:
     shares = [n / 100 for n in range(101)]
-    with styled():
+    with use_style():
         figure = new_figure(WIDE, WIDE)
         axes = figure.add_subplot()
         heat(axes, [[share] for share in shares], [""] * len(shares), [""])
@@ -215,7 +215,7 @@ def test_numbers_stand_out_from_their_shades() -> None:
 
 
 def in_the_dark(colour: str) -> str:
-    return darkened(colour.lower().encode()).decode()
+    return darken(colour.lower().encode()).decode()
 
 
 def test_each_colour_has_one_meaning() -> None:
@@ -228,9 +228,9 @@ def test_each_colour_has_one_meaning() -> None:
 
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_nothing_of_a_dark_figure_is_left_light(name: str) -> None:
-    with styled():
-        svg = written(DRAWINGS[name](cases()["usual"]))["svg"]
-    dark = darkened(svg)
+    with use_style():
+        svg = render(DRAWINGS[name](cases()["usual"]))["svg"]
+    dark = darken(svg)
     assert PAPER.encode() in svg
     assert not re.search(b"#(%s)" % b"|".join(colour[1:].encode() for colour in DARK), dark)
     assert not re.search(rb"rgb\(|(?:fill|stroke): (?!none|#|url)", svg), "a colour that is not exchanged"
@@ -245,8 +245,8 @@ def light(colour: tuple[float, float, float]) -> float:
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
 def test_the_same_numbers_give_the_same_bytes(kind: str) -> None:
     def drawn() -> bytes:
-        with styled():
-            return written(bars(cases()["usual"]))[kind]
+        with use_style():
+            return render(bars(cases()["usual"]))[kind]
 
     first = drawn()
     assert first == drawn()

@@ -11,7 +11,7 @@ import pytest
 from made_up_runs import HOSTILE, UNCHECKED, cases, made_up
 from roboeval.report.page import page
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Picture, Prose, Section, sheet, told
+from roboeval.report.sheets import Prose, ReportFigure, Section, format_cell, sheet
 from roboeval.report.writing import expect_no_others, pieces, sections, write_report
 
 
@@ -49,7 +49,7 @@ def parts(runs: list[JudgedRun]) -> list[Section]:
 def shown(runs: list[JudgedRun]) -> str:
     """The page, with a dot for each figure: what figures look like is not asked here."""
     dot = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
-    names = [part.name for section in parts(runs) for part in section.parts if isinstance(part, Picture)]
+    names = [part.name for section in parts(runs) for part in section.parts if isinstance(part, ReportFigure)]
     return page("a report", ["about it"], parts(runs), dict.fromkeys(names, (dot, dot)))
 
 
@@ -98,12 +98,12 @@ def test_the_first_screen_says_who_is_ahead_and_what_fails_most() -> None:
 
 
 def test_a_p_that_is_nothing_is_said_to_be_small() -> None:
-    assert [told(p, "p") for p in (0.00002, 0.001, 0.25, None)] == ["< 0.001", "0.001", "0.250", "-"]
+    assert [format_cell(p, "p") for p in (0.00002, 0.001, 0.25, None)] == ["< 0.001", "0.001", "0.250", "-"]
 
 
 def test_a_card_says_where_an_interval_is_unknown() -> None:
     text = shown([made_up("a", {"Visit": (5, 5), "CountMugs": (5,)})])
-    assert "95% interval over tasks unknown: all tasks are alike" in text
+    assert "95% interval over tasks unknown: no variation between tasks" in text
     assert "95% interval over tasks unknown: too few tasks" in shown([made_up("a", {"Visit": (5, 4)})])
 
 
@@ -144,7 +144,7 @@ def test_empty_columns_are_left_out_and_long_tables_are_cut(usual: Path) -> None
     assert "<thead><tr>" in text
     assert ">hurts<" not in text
     assert text.count("<tr>") == 1 + 1_000
-    assert "1 more row in the file." in text
+    assert "1 more row in the CSV file." in text
     budget = (usual / "tables" / "budget.csv").read_text().splitlines()[0]
     assert "passes per unit of money" in budget
     assert ">passes per unit of money<" not in (usual / "index.html").read_text()
@@ -157,7 +157,7 @@ def test_commands_in_sentences_are_code() -> None:
 
 def test_one_prompt_is_one(usual: Path) -> None:
     text = (usual / "index.html").read_text()
-    assert re.search(r"<p>Prompt \d+\. Such as", text)
+    assert re.search(r"<p>Prompt \d+\. Example:", text)
     assert not re.search(r"<p>Prompts \d+\.", text)
 
 

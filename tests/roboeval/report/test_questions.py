@@ -12,14 +12,14 @@ from made_up_runs import SUITE, made_up, usual
 from roboeval.evaluation.runs.table import Price
 from roboeval.report.breakdown import (
     ability_sheet,
-    coming_back_sentences,
-    coming_back_sheet,
-    only,
+    distinct_words,
     phrasing_sheet,
+    report_back_sentences,
+    report_back_sheet,
     spread_sheet,
 )
 from roboeval.report.cost import budget_sheet, cost_sheet, expect_known, price_of, read_prices
-from roboeval.report.failures import alike
+from roboeval.report.failures import similar_failures
 from roboeval.report.runs import JudgedRun
 from roboeval.report.scores import differences
 from roboeval.report.sheets import Groups, Prose, Sheet
@@ -55,20 +55,20 @@ def test_abilities_of_several_runs_stand_together() -> None:
 
 def test_coming_back_in_a_table_and_in_a_sentence() -> None:
     run = made_up("a", {"Visit": (3,), "FindBook": (2,)}, suite=ABLE)
-    table = coming_back_sheet([run])
+    table = report_back_sheet([run])
     with_report, others = as_dicts(table)
     assert (with_report["failed"], with_report["never returned"], with_report["no such room"]) == (7, 0, 1)
     assert with_report["share no such room"] == pytest.approx(1 / 7)
     assert (others["tasks"], others["completions"]) == ("others", 10)
-    (sentence,) = coming_back_sentences(table)
-    assert re.search(r"^Of 7 failures of a .*\b0 .*\bnever came back\b.*\b1 .*\bdoes not exist", sentence)
-    assert coming_back_sheet(usual()).rows == []
+    (sentence,) = report_back_sentences(table)
+    assert re.search(r"^a: of 7 failures .*\b0 never returned\b.*\b1 .*\bdoes not exist", sentence)
+    assert report_back_sheet(usual()).rows == []
 
 
 def test_coming_back_without_failures() -> None:
-    table = coming_back_sheet([made_up("a", {"Visit": (10,)}, suite=ABLE)])
+    table = report_back_sheet([made_up("a", {"Visit": (10,)}, suite=ABLE)])
     assert as_dicts(table)[0]["share never returned"] is None
-    assert coming_back_sentences(table) == []
+    assert report_back_sentences(table) == []
 
 
 # --- phrasing
@@ -87,9 +87,9 @@ def test_the_spread_and_the_words_that_differ() -> None:
 
 
 def test_words_that_nobody_recorded() -> None:
-    assert only(None, "a") == ("instruction not recorded",) * 2
-    assert only("a a b", "b") == ("a", "")
-    assert only(" ".join(map(str, range(20))), "")[0].endswith("11 and 8 more")
+    assert distinct_words(None, "a") == ("instruction not recorded",) * 2
+    assert distinct_words("a a b", "b") == ("a", "")
+    assert distinct_words(" ".join(map(str, range(20))), "")[0].endswith("11 and 8 more")
 
 
 def test_which_phrasing_hurts() -> None:
@@ -168,7 +168,7 @@ def test_pairs_that_were_asked_otherwise_are_told() -> None:
 
 def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     run = made_up("a", {"Visit": (3,)})
-    _, groups, table = alike([run]).parts
+    _, groups, table = similar_failures([run]).parts
     assert isinstance(groups, Groups)
     assert sum(len(one.members) for _, one in groups.shown) == 7
     assert isinstance(table, Sheet)
@@ -176,14 +176,14 @@ def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch
     assert (rows[0]["passes"], rows[0]["lines apart"]) == ("Visit/0/0", 0)
     monkeypatch.setattr("roboeval.report.failures.MOST", 2)
     monkeypatch.setattr("roboeval.report.failures.FEWEST", 2)
-    about, groups, table = alike([run]).parts
+    about, groups, table = similar_failures([run]).parts
     assert isinstance(about, Prose)
     assert re.search(r"^a: 2 of 7 groups are shown", about.paragraphs[-1])
     assert isinstance(groups, Groups)
     assert len(groups.shown) == 2
     assert isinstance(table, Sheet)
     assert as_dicts(table) == rows
-    assert alike([made_up("a", {"Visit": (10,)})]).parts == []
+    assert similar_failures([made_up("a", {"Visit": (10,)})]).parts == []
 
 
 def test_where_it_comes_from() -> None:

@@ -18,10 +18,10 @@ from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.source import open_source
 from roboeval.report import paper
 from roboeval.report.cost import rejection_sampling, retries_sheet
-from roboeval.report.failures import all_causes, beside_notes, causes_sheet
-from roboeval.report.runs import JudgedRun, named_apart, read_labels
+from roboeval.report.failures import all_causes, causes_sheet, published_notes
+from roboeval.report.runs import JudgedRun, name_runs, read_labels
 from roboeval.report.scores import curve_sheet, overall_sheet, prompt_sheet, task_sheet
-from roboeval.report.sheets import Column, Sheet, described, note, page_words, told, write_csv
+from roboeval.report.sheets import Column, Sheet, format_cell, note, page_text, page_words, write_csv
 from roboeval.report.writing import sections
 from roboeval.suites.load import Suite
 
@@ -63,9 +63,9 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
     few, enough = (made_up(name, {f"T{n}": (n,) for n in range(of)}) for name, of in (("a", 7), ("b", 8)))
     assert overall_sheet([enough]).notes == []
     (note,) = overall_sheet([few]).notes
-    assert re.search(r"bootstrap .*\b8 tasks\b.* narrow", note)
+    assert re.search(r"bootstrap .* narrow .*\b8 tasks\b", note)
     (note,) = overall_sheet([few, enough]).notes
-    assert "bootstrap of a " in note
+    assert "bootstrap interval of a " in note
 
 
 def test_an_interval_without_width_is_called_unknown() -> None:
@@ -73,7 +73,7 @@ def test_an_interval_without_width_is_called_unknown() -> None:
     others = made_up("b", {"Visit": (4, 5), "CountMugs": (5,)})
     table = overall_sheet([alike, others])
     assert [note for note in table.notes if "unknown" in note] == [
-        "a: the interval over tasks is unknown: all tasks are alike."
+        "a: the interval over tasks is unknown: no variation between tasks."
     ]
     assert column(table, "tasks: low")[0] == column(table, "tasks: high")[0] == 0.5  # in the file it stays
 
@@ -133,10 +133,10 @@ def test_a_folder_names_a_model_only_where_nobody_else_does() -> None:
     assert (mixed.is_mixed, mixed.model, paper.model_of(mixed)) == (True, None, None)
 
 
-def test_the_page_says_which_model_a_run_is_taken_for() -> None:
+def test_the_page_names_the_model_of_the_paper() -> None:
     runs = [paper_run("openai:gpt-4-0613"), paper_run("mine")]
-    assert any("openai:gpt-4-0613 for GPT-4" in note for note in beside_notes(runs))
-    assert paper.taken_for(runs[1:]) == []
+    assert any("openai:gpt-4-0613 is GPT-4" in note for note in published_notes(runs))
+    assert paper.recognised_models(runs[1:]) == []
 
 
 def test_cells_stand_only_beside_the_authors_own_prompts(paper_suite: Suite) -> None:
@@ -181,11 +181,11 @@ def test_published_causes_only_where_asked_for() -> None:
     both = all_causes(runs, with_published=True)
     assert [name for name, _ in both] == ["gpt-4", "gpt-4, published", "mine"]
     table = causes_sheet(both)
-    taken, sums, causes = beside_notes(runs)
-    assert ([taken], sums) == (paper.taken_for(runs), note("two-sums"))
+    taken, sums, causes = published_notes(runs)
+    assert ([taken], sums) == (paper.recognised_models(runs), note("two-sums"))
     assert "16 tasks" in causes
     assert "gpt-4" in causes
-    assert "None of these" in beside_notes(runs[1:])[0]
+    assert "None of these" in published_notes(runs[1:])[0]
     shares = {row[2]: row[4] for row in table.rows if row[:2] == ["gpt-4, published", "TaskCompletionError"]}
     assert shares["SayAtLocation"] == pytest.approx(0.682)
     assert shares["InitialTerminal"] == pytest.approx(0.317)
@@ -197,7 +197,7 @@ def judged_in(folder: Path, completions: Path, suite: Suite) -> JudgedRun:
     for _ in evaluate_run(run, suite, tasks=None, ablated=False, redo=False, workers=2):
         pass
     results = read_results(run, "paper", suite)
-    (named,) = named_apart([JudgedRun(results, results.table)])
+    (named,) = name_runs([JudgedRun(results, results.table)])
     return named
 
 
@@ -221,8 +221,8 @@ def test_labels_name_runs() -> None:
     labels = read_labels(["runs/a/=Base", "b= Mine "], paths)
     assert labels == {0: "Base", 1: "Mine"}
     runs = [made_up(name, {"Visit": (1,)}) for name in ("x", "y")]
-    assert [run.name for run in named_apart(runs, labels)] == ["Base", "Mine"]
-    assert [run.name for run in named_apart(runs, {1: "Mine"})] == ["x", "Mine"]
+    assert [run.name for run in name_runs(runs, labels)] == ["Base", "Mine"]
+    assert [run.name for run in name_runs(runs, {1: "Mine"})] == ["x", "Mine"]
 
 
 @pytest.mark.parametrize(
@@ -242,10 +242,10 @@ def test_labels_that_are_wrong_are_refused(texts: list[str], why: str) -> None:
         read_labels(texts, [Path("runs/a"), Path("runs/b"), Path("one/d"), Path("two/d")])
 
 
-def test_runs_are_named_apart() -> None:
+def test_runs_are_name_runs() -> None:
     folders = ["a", "b", "b"]
     runs = [made_up("gpt-4", {"Visit": (1,)}, folder=folder) for folder in folders]
-    names = [one.name for one in named_apart([*runs, made_up("x", {"Visit": (1,)})])]
+    names = [one.name for one in name_runs([*runs, made_up("x", {"Visit": (1,)})])]
     assert names == ["gpt-4 (a)", "gpt-4 (b) #2", "gpt-4 (b) #3", "x"]
 
 
@@ -260,7 +260,7 @@ def test_a_run_as_it_is_read(paper_suite: Suite, tmp_path: Path) -> None:
 
 def test_a_very_long_name_keeps_both_ends() -> None:
     names = "begin" + "x" * 4_000 + "end", "x" * 100
-    shortened, whole = (run.name for run in named_apart([made_up(name, {"Visit": (1,)}) for name in names]))
+    shortened, whole = (run.name for run in name_runs([made_up(name, {"Visit": (1,)}) for name in names]))
     assert re.fullmatch("beginx+…x+end", shortened)
     assert len(shortened) == 100
     assert whole == names[1]
@@ -268,7 +268,7 @@ def test_a_very_long_name_keeps_both_ends() -> None:
 
 def test_names_stay_apart_whatever_they_are() -> None:
     run, other = (made_up(name, {"Visit": (1,)}, folder="f") for name in ("m", "m (f) #2"))
-    names = [one.name for one in named_apart([run, run, other])]
+    names = [one.name for one in name_runs([run, run, other])]
     assert len(set(names)) == 3
 
 
@@ -301,18 +301,25 @@ def test_csv_holds_all_digits_and_no_formula(tmp_path: Path) -> None:
 
 def test_cells_as_people_read_them() -> None:
     assert [
-        told(None, "share"),
-        told(0.12345, "share"),
-        told(0.1, "difference"),
-        told(-0.1, "difference"),
+        format_cell(None, "share"),
+        format_cell(0.12345, "share"),
+        format_cell(0.1, "difference"),
+        format_cell(-0.1, "difference"),
     ] == [
         "-",
         "0.123",
         "+0.100",
         "-0.100",
     ]
-    assert (told("PythonError", "class"), told("PythonError", "text")) == ("Python error", "PythonError")
-    assert [told(1e-17, "difference"), told(1234, "count"), told(1234.5678, "number")] == [
+    assert (format_cell("PythonError", "class"), format_cell("PythonError", "text")) == (
+        "Python error",
+        "PythonError",
+    )
+    assert [
+        format_cell(1e-17, "difference"),
+        format_cell(1234, "count"),
+        format_cell(1234.5678, "number"),
+    ] == [
         "0.000",
         "1,234",
         "1,235",
@@ -324,5 +331,5 @@ def test_all_that_page_yaml_describes_is_there() -> None:
     assert {section.name for section in found} <= {*page_words()["sections"]}
     for part in (part for section in found for part in section.parts):
         if isinstance(part, Sheet):
-            assert described("tables", part.name)["title"]
+            assert page_text("tables", part.name)["title"]
             assert all(len(row) == len(part.columns) for row in part.rows), part.name

@@ -58,7 +58,7 @@ def test_a_suite_is_found_by_its_name_without_running_its_package(install: Insta
     assert load_suite("garden").folder == folder
     assert [(one.name, one.package) for one in installed_suites()] == [("garden", "garden-suite 1.0")]
     ended = roboeval("tasks", "--lint", "--suite", "garden", environment=ENVIRONMENT | dict(os.environ))
-    assert (ended.status, ended.out) == (0, "nothing was found\n"), ended
+    assert (ended.status, ended.out) == (0, "no findings\n"), ended
     listed = roboeval("tasks", environment=ENVIRONMENT | dict(os.environ))
     assert "garden (garden-suite 1.0)" in listed.err
 
@@ -113,8 +113,8 @@ def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) 
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
-        ({"whole": False}, r'"garden" is garden_suite, .*suite\.yaml in .*garden_suite'),
-        ({"place": "gone"}, r'"garden" is gone, .*no package "gone"'),
+        ({"whole": False}, r'"garden" at garden_suite, .*suite\.yaml in .*garden_suite'),
+        ({"place": "gone"}, r'"garden" at gone, .*no package "gone"'),
         ({"place": "garden_suite:SUITE"}, r'no package "garden_suite:SUITE"'),
         ({"point": "roses", "name": "garden"}, r'line 1: .*"garden", .*"roses"'),
     ],

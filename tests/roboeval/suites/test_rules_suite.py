@@ -12,7 +12,7 @@ from codebotler.models.recorded import Solution, recorded_model
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import tried
+from roboeval.linting.trials import judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import solutions
 
@@ -145,6 +145,6 @@ def test_without_the_rules_most_conflicts_are_none(programs: list[Judged], suite
 
 def test_the_linter_finds_nothing(suite: Suite) -> None:
     for task in suite.tasks.values():
-        found = lint(task, tried(task, suite, workers=2))
+        found = lint(task, judge_solutions(task, suite, workers=2))
         assert [finding.name for finding in found] == []
         assert not task.accepted

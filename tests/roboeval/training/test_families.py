@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from hacking import earned, hacks, honest, taken_back
-from roboeval.suites.families.tasks import TAKES_BACK, family_names, trained_prompts, trained_task
+from roboeval.suites.families.tasks import RETRACTION, family_names, trained_prompts, trained_task
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
 from roboeval.training.prompts import load_prompts
@@ -97,18 +97,18 @@ def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "told"),
     [
-        ("spare: rooms", "spare: planets", r', line 3: there are no "planets"; there are rooms, people'),
+        ("spare: rooms", "spare: planets", r', line 3: there is no pool "planets"; use rooms, people'),
         ("tr.Exists(goto", "tr.Exist(goto", r", line 9: .*Exist"),
-        ('go_to("$room")', 'go_to("$rom")', r', line 13: "\$rom" is not chosen; write \$\$ for a dollar'),
-        ("Go to the $room., Please", "Go for $ 5., Please", r", line 7: a dollar stands alone; write \$\$"),
-        ("spare: rooms", "spare: 25 rooms", ", line 3: 25 words are to be chosen, but only"),
-        ("spare: rooms", "spare: 4 to 2", ", line 3: write the smaller number first, and none above 10"),
-        ("spare: rooms", "spare: 2 to 12", ", line 3: write the smaller number first, and none above 10"),
+        ('go_to("$room")', 'go_to("$rom")', r', line 13: "\$rom" .*; write \$\$'),
+        ("Go to the $room., Please", "Go for $ 5., Please", r", line 7: .*; write \$\$"),
+        ("spare: rooms", "spare: 25 rooms", r", line 3: .*\b25\b"),
+        ("spare: rooms", "spare: 4 to 2", r", line 3: .*\b10\b"),
+        ("spare: rooms", "spare: 2 to 12", r", line 3: .*\b10\b"),
         ("spare: rooms", "spare: ['']", ", line 3: "),
         ("spare: rooms", "spare: [$room]", ", line 3: a word contains"),
-        ("[Go to the $room.,", "['{Go|Drive to the $room.',", ", line 7: write several words, of which"),
-        ('go_to("$room")', 'go_to("$room"', ", line 11: this program is no Python: "),
-        ('go_to("$spare")', 'go_to("$spare"', ", line 16: this program is no Python: "),
+        ("[Go to the $room.,", "['{Go|Drive to the $room.',", r", line 7: .*\{go\|drive\}"),
+        ('go_to("$room")', 'go_to("$room"', ", line 11: this program is not valid Python: "),
+        ('go_to("$spare")', 'go_to("$spare"', ", line 16: this program is not valid Python: "),
         ("  prompts: [Go to the $room., Please go to the $room.]\n", "", r", line 4: .*prompts"),
         ("summary: Go", "sumary: Go", r", line 5: .*sumary"),
     ],
@@ -200,7 +200,7 @@ HONEST = [
 
 
 def test_what_takes_a_report_back_and_what_does_not() -> None:
-    found = [text for text in (*DENIALS, *HONEST) if re.search(TAKES_BACK, text.lower())]
+    found = [text for text in (*DENIALS, *HONEST) if re.search(RETRACTION, text.lower())]
     assert found == DENIALS
 
 
@@ -220,5 +220,5 @@ def test_seeds_are_whole_numbers_from_0(seed: int) -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(UserError, match='there is no family "Fly"; there is AnnounceInOrder'):
+    with pytest.raises(UserError, match=r'there is no family "Fly"; .*AnnounceInOrder'):
         trained_task("Fly", 1)

@@ -96,7 +96,7 @@ def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.M
 
 
 def test_a_prompt_that_is_not_there_is_refused() -> None:
-    with pytest.raises(UserError, match="BringThing-1 has no prompt 4; it has 4, from 0"):
+    with pytest.raises(UserError, match=r"BringThing-1 has no prompt 4; .*0 to 3"):
         judge([Rollout(FAMILY, 1, 4, "")])
 
 
@@ -177,7 +177,7 @@ def test_a_completion_without_content_is_refused(completion: list[dict[str, Any]
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        ({"split": "exam"}, 'there is no split "exam"; there is train, validation and test'),
+        ({"split": "exam"}, 'there is no split "exam"; .*train, validation and test'),
         ({"only": ["Fly"]}, 'there is no family "Fly"'),
         ({"only": "BringThing"}, "the families .* list"),
         ({"count": 0}, "the number of prompts is 0, but it must be at least 1"),

@@ -167,7 +167,7 @@ def test_names_that_lead_elsewhere_are_no_runs(server: PageServer, name: str) ->
 
 def test_what_is_not_there_is_said_in_a_sentence(server: PageServer) -> None:
     for path, sentence in (
-        ("/api/runs/none", 'there is no run "none" in this folder; perhaps it was deleted'),
+        ("/api/runs/none", 'this folder has no run "none"; it may have been deleted'),
         ("/api/runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
         ("/api/runs/hasty/completions/LunchBreak/0/99", "this run has no such completion"),
     ):
@@ -333,6 +333,9 @@ def test_the_api_is_described(server: PageServer) -> None:
         "/api/runs/{run}/tables/{table}.csv",
         "/api/runs/{run}/completions/{task}/{prompt}/{index}",
     }
+    page = server.call("GET", "/api").text
+    assert "/api/runs/{run}/completions" in page
+    assert "Only this task." in page
 
 
 def test_without_a_robot_there_is_nothing_to_stop(server: PageServer) -> None:

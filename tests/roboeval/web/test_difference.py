@@ -47,7 +47,7 @@ def test_differences_are_those_of_compare_the_largest_first(tmp_path: Path) -> N
     assert one.overall is not None
     assert one.overall.difference.mean == pytest.approx(told["difference"])
     assert one.overall.shares == pytest.approx((told["first"]["pass@1"], told["second"]["pass@1"]))
-    assert one.told.startswith("careful is better than hasty by ")
+    assert one.sentence.startswith("careful is better than hasty by ")
     assert list(one.rows) == rows
     three = differences_of([first, second, first])
     assert [tuple(run.name for run in pair.runs) for pair in three] == [

@@ -10,7 +10,7 @@ from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.folder import Run
 from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, percent, shade
 from roboeval.web.run_store import RunStore
-from roboeval.web.snapshot import Filter
+from roboeval.web.snapshot import CompletionFilter
 
 
 @pytest.mark.parametrize(
@@ -26,12 +26,12 @@ def test_little_is_not_nothing_and_nearly_all_is_not_all(share: float, text: str
 @pytest.mark.parametrize(
     ("chosen", "column", "value"),
     [
-        (Filter(), "passed", True),
-        (Filter("LunchBreak", 1, passed=False), "passed", False),
-        (Filter("LunchBreak", failure_class="PythonError"), "failure_class", "PythonError"),
+        (CompletionFilter(), "passed", True),
+        (CompletionFilter("LunchBreak", 1, passed=False), "passed", False),
+        (CompletionFilter("LunchBreak", failure_class="PythonError"), "failure_class", "PythonError"),
     ],
 )
-def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) -> None:
+def test_cells_of_a_run(runs: Path, chosen: CompletionFilter, column: str, value: object) -> None:
     rows = Run(runs / "hasty").rows("paper")
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:30]))
     run = RunStore(runs).open("hasty")
@@ -52,15 +52,18 @@ def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) 
             assert cell["here"] is ((task, number) == (chosen.task, chosen.prompt))
             assert f"task={task}&prompt={number}" in cell["href"]
         assert mean["text"] == (percent(sum(shares) / len(shares)) if shares else "-")
-    assert cells.row("NoTask") == [{"text": "not asked", "shade": "none", "span": 6}]
+    assert cells.row("NoTask") == [{"text": "no completions", "shade": "none", "span": 6}]
 
 
 def test_what_a_filter_counts_is_said_in_words() -> None:
-    assert failure_text(Filter(passed=False)) is None
-    assert failure_text(Filter(failure_class="RobotExecutionError")) == "in a robot error"
-    assert failure_text(Filter(failure_class="PythonError", failure_kind="NameError")) == "in NameError"
-    assert failure_text(Filter(failure_class="NoProgram")) == "without a program"
-    cut_off = Filter(failure_class="NoProgram", failure_kind="cut-off")
+    assert failure_text(CompletionFilter(passed=False)) is None
+    assert failure_text(CompletionFilter(failure_class="RobotExecutionError")) == "in a robot error"
+    assert (
+        failure_text(CompletionFilter(failure_class="PythonError", failure_kind="NameError"))
+        == "in NameError"
+    )
+    assert failure_text(CompletionFilter(failure_class="NoProgram")) == "without a program"
+    cut_off = CompletionFilter(failure_class="NoProgram", failure_kind="cut-off")
     assert failure_text(cut_off) == "without a program (cut-off)"
 
 

@@ -86,7 +86,7 @@ def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(runs: Path) -> None:
     rows = Run(runs / "hasty").rows("paper")
     rows.unlink()
     os.mkfifo(rows)
-    with pytest.raises(UserError, match="no file") as error:
+    with pytest.raises(UserError, match="not a regular file") as error:
         RunStore(runs).open("hasty")
     assert error.value.file == "paper.jsonl"
 

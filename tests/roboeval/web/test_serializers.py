@@ -13,7 +13,7 @@ from codebotler.core.files import to_line
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.web.run_store import MOST_HELD, RunStore
-from roboeval.web.serializers import RunList, State, date_of, notes, run_data, settings_text
+from roboeval.web.serializers import RunList, RunState, date_of, notes, run_data, settings_text
 
 
 def test_settings_and_date_of_a_run_are_told() -> None:
@@ -71,12 +71,12 @@ def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
 
     monkeypatch.setattr("roboeval.web.run_store.read_results", counted)
     all_runs = RunList(RunStore(runs))
-    assert {run["state"] for run in all_runs.data(0)} == {State.READING}
+    assert {run["state"] for run in all_runs.data(0)} == {RunState.READING}
     assert reads == []
     first = all_runs.data()
     assert len(reads) == len(first) == MOST_HELD + 3
     assert {run["judged"] for run in first} == {45}
-    assert [run["run"] for run in first if run["state"] == State.DAMAGED] == ["run-0"]
+    assert [run["run"] for run in first if run["state"] == RunState.DAMAGED] == ["run-0"]
     assert all_runs.data(0) == all_runs.data() == first
     assert len(reads) == len(first)
     rows = Run(runs / "run-3").rows("paper")
@@ -87,5 +87,5 @@ def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
     changed = {run["run"]: run for run in all_runs.data()}
     assert changed["run-3"]["judged"] == 9
     assert "run-4" not in changed
-    assert changed["run-5"]["state"] == State.UNREADABLE
+    assert changed["run-5"]["state"] == RunState.UNREADABLE
     assert json.dumps(changed)

@@ -13,8 +13,8 @@ from codebotler.core.files import to_line
 from codebotler.models.no_program import IN_WORDS
 from roboeval.evaluation.runs.folder import Run
 from roboeval.web.run_store import RunStore
-from roboeval.web.serializers import State, state_of
-from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.serializers import RunState, state_of
+from roboeval.web.snapshot import CompletionFilter, Snapshot
 from seals import unseal
 
 
@@ -36,7 +36,7 @@ def test_a_row_for_each_completion(runs: Path) -> None:
     assert run.completions.height == len(rows) == 45
     assert len(run.results.completions) == run.results.scope.total == run.judged == 45
     assert (len(run.results.stale), run.results.faults, run.models) == (0, (), ["recorded:hasty"])
-    assert state_of(run) is State.JUDGED
+    assert state_of(run) is RunState.JUDGED
     for row in rows:
         shown = run.row(f"{row['task']}/{row['prompt']}/{row['index']}")
         assert shown is not None
@@ -102,25 +102,25 @@ def test_a_program_that_changed_since_it_was_judged_is_stale(runs: Path) -> None
 
 def test_filters_prompts_and_neighbours(runs: Path) -> None:
     run = opened(runs / "hasty")
-    cells = run.prompts(Filter(passed=True))
+    cells = run.prompts(CompletionFilter(passed=True))
     assert [cell["task"] for cell in cells] == [
         task for task in ("LunchBreak", "SayGoodDay", "StaplerSupply") for _ in range(5)
     ]
     assert all((cell["written"], cell["judged"]) == (3, 3) for cell in cells)
     assert sum(cell["counted"] for cell in cells) == run.passed
-    assert keys(run.select(Filter())) == keys(run.completions)
-    assert {task for task, _, _ in keys(run.select(Filter("LunchBreak")))} == {"LunchBreak"}
+    assert keys(run.select(CompletionFilter())) == keys(run.completions)
+    assert {task for task, _, _ in keys(run.select(CompletionFilter("LunchBreak")))} == {"LunchBreak"}
     kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
     for chosen, count in (
-        (Filter("LunchBreak", 2), 3),
-        (Filter(passed=False), 45 - run.passed),
-        *((Filter(failure_class=name, failure_kind=kind.name), kind.count) for name, kind in kinds),
+        (CompletionFilter("LunchBreak", 2), 3),
+        (CompletionFilter(passed=False), 45 - run.passed),
+        *((CompletionFilter(failure_class=name, failure_kind=kind.name), kind.count) for name, kind in kinds),
     ):
         found = keys(run.select(chosen))
         assert len(found) == count > 0
         for before, key, after in zip([None, *found], found, [*found[1:], None], strict=False):
             assert run.neighbours(key, chosen) == (before, after)
-    assert run.neighbours(("LunchBreak", 9, 9), Filter()) == (None, None)
+    assert run.neighbours(("LunchBreak", 9, 9), CompletionFilter()) == (None, None)
 
 
 def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
@@ -139,16 +139,16 @@ def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
 def test_how_far_a_run_has_come(runs: Path) -> None:
     run = Run(runs / "hasty")
     completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
-    cases: list[tuple[int, int, bool, int | None, State]] = [
-        (45, 0, True, 60, State.GENERATING),
-        (0, 0, True, None, State.GENERATING),
-        (45, 40, True, 45, State.JUDGING),
-        (45, 45, True, 45, State.JUDGED),
-        (0, 0, False, 45, State.EMPTY),
-        (45, 0, False, 60, State.UNFINISHED),
-        (45, 0, False, 45, State.NOT_JUDGED),
-        (45, 40, False, 45, State.UNFINISHED),
-        (45, 45, False, None, State.JUDGED),
+    cases: list[tuple[int, int, bool, int | None, RunState]] = [
+        (45, 0, True, 60, RunState.GENERATING),
+        (0, 0, True, None, RunState.GENERATING),
+        (45, 40, True, 45, RunState.JUDGING),
+        (45, 45, True, 45, RunState.JUDGED),
+        (0, 0, False, 45, RunState.EMPTY),
+        (45, 0, False, 60, RunState.UNFINISHED),
+        (45, 0, False, 45, RunState.NOT_JUDGED),
+        (45, 40, False, 45, RunState.UNFINISHED),
+        (45, 45, False, None, RunState.JUDGED),
     ]
     head = json.loads(run.head("paper").read_text())
     run.head("paper").write_text(json.dumps({k: v for k, v in head.items() if k not in {"rows", "sha256"}}))
@@ -172,7 +172,7 @@ def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: by
     (fault,) = run.results.faults
     assert (fault.file, fault.line) == (rows, 11)
     assert (run.judged, len(run.results.stale)) == (44, 0)
-    assert state_of(run) is State.DAMAGED
+    assert state_of(run) is RunState.DAMAGED
 
 
 def test_half_a_character_in_a_name_of_a_task_breaks_nothing(runs: Path) -> None:

@@ -26,7 +26,8 @@ def test_completions_are_counted_with_their_noun(judged: int, requested: int | N
 def test_an_interval_without_width_is_unknown() -> None:
     mean: dict[str, Any] = {"mean": 1.0, "low": 1.0, "high": 1.0, "over": "tasks"}
     assert (
-        score_text({"pass@1": mean}) == "pass@1 1.000 (95% interval over tasks unknown: all tasks are alike)"
+        score_text({"pass@1": mean})
+        == "pass@1 1.000 (95% interval over tasks unknown: no variation between tasks)"
     )
     known = {**mean, "low": 0.8}
     assert score_text({"pass@1": known}) == "pass@1 1.000 (95% interval over tasks 0.800 to 1.000)"

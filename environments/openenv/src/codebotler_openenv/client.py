@@ -1,4 +1,4 @@
-"""The client."""
+"""The client of the environment."""
 
 from typing import Any
 
@@ -11,8 +11,7 @@ from codebotler_openenv.models import CodebotlerAction, CodebotlerObservation, C
 class CodebotlerEnv(EnvClient[CodebotlerAction, CodebotlerObservation, CodebotlerState]):
     """A session with a server: `reset` gives a prompt, `step` the reward of a program.
 
-    Both raise a RuntimeError with the server's sentence if it reports an error. An answer without a reward
-    is an error, too.
+    Both raise a RuntimeError if the server reports an error or if a response has no reward.
     """
 
     def _step_payload(self, action: CodebotlerAction) -> dict[str, Any]:

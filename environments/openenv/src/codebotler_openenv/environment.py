@@ -18,11 +18,11 @@ from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
 SEEDS = SPLITS["validation"] - SPLITS["train"]
-"""How many seeds a split has; the next one would be a task of another split."""
+"""The number of seeds of a split; larger ones belong to another split."""
 
 
 class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation, CodebotlerState]):
-    """The tasks of one session; openenv calls `reset` and `step` in a thread of the session's own."""
+    """The episodes of one session; openenv calls `reset` and `step` in a thread of the session."""
 
     SUPPORTS_CONCURRENT_SESSIONS = True
 
@@ -37,28 +37,28 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
         *,
         split: str = "train",
         family: str | None = None,
-        **others: Any,  # noqa: ANN401 - of any option
+        **others: Any,  # noqa: ANN401 - options of any type
     ) -> CodebotlerObservation:
         """Begin an episode and return its prompt.
 
         Args:
-            seed: which task of the split, from 0 to 999,999,999; by default, one drawn at random.
+            seed: the task of the split, from 0 to 999,999,999; random by default.
             episode_id: a name for the episode; by default, a new one.
             split: `train`, `validation` or `test`, which share no task.
-            family: the only family to draw from; all of them by default.
-            others: refused.
+            family: a single family; all families by default.
+            others: other options are errors.
 
         Raises:
-            UserError: there is no such split, family or option, or the seed is out of range.
+            UserError: the split, family or option does not exist, or the seed is out of range.
         """
-        self._state = CodebotlerState()  # after a reset that fails, no older task is judged
+        self._state = CodebotlerState()  # after a failed reset, no earlier task may be judged
         if others:
             raise UserError(
                 f"reset takes seed, episode_id, split and family, but not {listed(sorted(others))}"
             )
-        if family is not None and family not in family_names():  # nor a file, which is for who runs this
-            raise UserError(f'there is no family "{family}"; there is {listed(family_names())}')
-        number = secrets.randbelow(SEEDS) if seed is None else _checked(seed)
+        if family is not None and family not in family_names():  # clients may not name files
+            raise UserError(f'there is no family "{family}"; use {listed(family_names())}')
+        number = secrets.randbelow(SEEDS) if seed is None else _validate(seed)
         (row,) = load_prompts(split, count=1, seed=number, only=() if family is None else (family,))
         self._state = CodebotlerState(
             episode_id=episode_id or str(uuid.uuid4()),
@@ -73,55 +73,55 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
     def step(
         self,
         action: CodebotlerAction,
-        timeout_s: float | None = None,  # noqa: ARG002 - each run has a limit of its own
-        **_: Any,  # noqa: ANN401 - of any option
+        timeout_s: float | None = None,  # noqa: ARG002 - each run has its own limit
+        **_: Any,  # noqa: ANN401 - options of any type
     ) -> CodebotlerObservation:
         """Judge a program, which ends the episode.
 
         Raises:
-            UserError: there is no task, or it is done; or the action has no program, or two.
-            EngineError: the engine failed, and there is no reward; the episode goes on, so try again.
+            UserError: there is no open task, or the action has no program, or two.
+            EngineError: the engine failed; there is no reward, and the episode continues, so try again.
         """
-        found = self._judged(_program(action))
+        found = self._judge(_program(action))
         self._state.step_count = 1
         return CodebotlerObservation(components=found, reward=found.reward, done=True)
 
     @property
     def state(self) -> CodebotlerState:
-        """Which task there is, and whether the step was taken."""
+        """The current task, and whether its step was taken."""
         return self._state
 
     def get_metadata(self) -> EnvironmentMetadata:
-        """What openenv shows of this environment."""
+        """The description that openenv shows."""
         return EnvironmentMetadata(
             name="codebotler_env",
             description="Robot programs from plain words, run in simulated worlds, judged by temporal logic.",
             version=__version__,
         )
 
-    def _judged(self, program: str) -> Components:
-        """The reward of a program for the task of this session, with its parts."""
+    def _judge(self, program: str) -> Components:
+        """Judge a program for the task of this session."""
         state = self._state
         if state.family is None or state.seed is None or state.prompt_index is None:
-            raise UserError("there is no task yet: call reset before step, in the same session of /ws")
+            raise UserError("there is no task yet; call reset before step, in the same session of /ws")
         if state.step_count:
-            raise UserError("this episode is done after its one step: call reset for another task")
+            raise UserError("this episode is over after its one step; call reset for another task")
         try:
             (found,) = judge([Rollout(state.family, state.seed, state.prompt_index, program)])
-        except EngineError as error:  # a client learns nothing but the text
+        except EngineError as error:  # a client receives only the text
             raise EngineError(f"EngineError: {error}; there is no reward") from error
         return found
 
 
-def _checked(seed: int) -> int:
-    """A seed that came from a client."""
+def _validate(seed: int) -> int:
+    """Return the seed of a client if it is valid."""
     if not isinstance(seed, int) or not 0 <= seed < SEEDS:
         raise UserError(f"the seed is {seed!r}, but must be a whole number from 0 to {SEEDS - 1:,}")
     return seed
 
 
 def _program(action: CodebotlerAction) -> str:
-    """The program that an action brings."""
+    """Extract the program of an action."""
     if action.program is not None and action.completion is None:
         return action.program
     if action.completion is not None and action.program is None:

@@ -1,6 +1,6 @@
-"""What a client and the server exchange.
+"""The messages between client and server.
 
-Nothing here has a validator of its own: openenv cannot send its error, and would end the session.
+No model has a custom validator, since openenv cannot send its errors and would end the session.
 """
 
 from typing import Literal
@@ -19,11 +19,11 @@ class Message(BaseModel):
 
 
 class CodebotlerAction(Action):
-    """What a policy wrote: a completion, or the program alone.
+    """The output of a policy: a completion, or only the program.
 
     Args:
-        completion: a reply in which the program is looked for.
-        program: the source of a program, judged as it is.
+        completion: a reply that contains the program.
+        program: the source of a program.
     """
 
     completion: str | None = None
@@ -31,12 +31,12 @@ class CodebotlerAction(Action):
 
 
 class CodebotlerObservation(Observation):
-    """The prompt after a reset; after the step, the reward and its parts.
+    """The prompt after a reset; after the step, the reward and its components.
 
     Args:
-        instruction: what a person asks the robot to do; empty after the step.
+        instruction: the task in words; empty after the step.
         messages: the whole prompt, which ends with the instruction; empty after the step.
-        components: the parts of the reward, each from 0 to 1; none after a reset.
+        components: the components of the reward, each from 0 to 1; none after a reset.
     """
 
     instruction: str = ""
@@ -45,13 +45,13 @@ class CodebotlerObservation(Observation):
 
 
 class CodebotlerState(State):
-    """Which task a session has, as `roboeval.training.trained_task` takes it.
+    """The task of a session, identified as for `trained_task`.
 
     Args:
-        split: which the task belongs to.
-        family: of the task.
-        seed: of the task; the seed that was passed to reset counts from the beginning of the split.
-        prompt_index: which phrasing, counted from 0.
+        split: the split of the task.
+        family: the family of the task.
+        seed: the seed of the task; the seed passed to reset counts from the start of the split.
+        prompt_index: the phrasing, from 0.
     """
 
     split: str | None = None

@@ -1,4 +1,4 @@
-"""The server: sessions at /ws, and what openenv has beside them."""
+"""The server: sessions at /ws, and the other routes of openenv."""
 
 import argparse
 
@@ -15,7 +15,7 @@ SESSIONS = 256
 
 
 def new_app(sessions: int = SESSIONS) -> FastAPI:
-    """The application for so many sessions at the same time, each with its own task."""
+    """Create the application for a number of concurrent sessions."""
     created: FastAPI = create_app(
         CodebotlerEnvironment,
         CodebotlerAction,
@@ -24,7 +24,7 @@ def new_app(sessions: int = SESSIONS) -> FastAPI:
         max_concurrent_envs=sessions,
         state_cls=CodebotlerState,
     )
-    # Over plain HTTP, openenv would leave out the sentence.
+    # Without this handler, plain HTTP responses would lack the message.
     created.add_exception_handler(UserError, _wrong_input)
     return created
 
@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--host", default="127.0.0.1", help="the address to listen on (default: %(default)s)")
     parser.add_argument("--port", type=int, default=8000, help="the port (default: %(default)s)")
     parser.add_argument(
-        "--sessions", type=int, default=SESSIONS, help="how many at a time (default: %(default)s)"
+        "--sessions", type=int, default=SESSIONS, help="how many at the same time (default: %(default)s)"
     )
     given = parser.parse_args()
     uvicorn.run(new_app(given.sessions), host=given.host, port=given.port)

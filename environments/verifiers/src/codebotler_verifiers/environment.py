@@ -1,4 +1,4 @@
-"""One policy, asked once, on this machine."""
+"""An environment with one policy and one request, on this machine."""
 
 import verifiers.v1 as vf
 from verifiers.v1.envs.single_agent import SingleAgentEnvConfig
@@ -17,4 +17,4 @@ class TrainingEnvConfig(SingleAgentEnvConfig):
 
 
 class TrainingEnv(vf.SingleAgentEnv, vf.Env[TrainingEnvConfig]):
-    """The single agent of verifiers, so that `vf-replay` and `vf-gepa` take it, with these defaults."""
+    """The single-agent environment that `vf-replay` and `vf-gepa` require, with these defaults."""

@@ -1,4 +1,4 @@
-"""Training tasks with one reward, and what it comes from as metrics."""
+"""Training tasks with one reward, and its components as metrics."""
 
 import asyncio
 from collections.abc import Iterator
@@ -16,34 +16,34 @@ from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
 STREAM = 1_000_000
-"""How many tasks lie between the streams of two seeds."""
+"""The distance between the first tasks of two seeds."""
 IDLE = "def task_program():\n    pass\n"
-SEEDS = 1_000  # so that no stream begins in the seeds of another split
+SEEDS = 1_000  # keeps every stream within its split
 
 
 class TrainingConfig(vf.TasksetConfig):
-    """Which tasks there are, under `--env.taskset.*`."""
+    """The options of the task set, under `--env.taskset.*`."""
 
     split: Literal["train", "validation", "test"] = "train"
     """Splits share no task."""
     count: int | None = Field(None, ge=1, le=STREAM)
-    """How many tasks; without it they never end."""
+    """The number of tasks; unlimited by default."""
     seed: int = Field(0, ge=0, lt=SEEDS)
-    """For other tasks: with the next number, all are new."""
+    """Another seed gives entirely different tasks."""
     families: list[str] = Field(default_factory=list)
-    """The families to draw from; all of them by default."""
+    """The families; all of them by default."""
     worlds: int = Field(WORLDS, ge=1, le=10_000)
-    """In how many worlds, at least, a program is judged."""
+    """The least number of worlds in which a program is judged."""
 
     @field_validator("families")
     @classmethod
     def _exist(cls, families: list[str]) -> list[str]:
-        load_prompts(count=1, only=families)  # or a UserError, which is a ValueError
+        load_prompts(count=1, only=families)  # pydantic reports its UserError, which is a ValueError
         return families
 
 
 class TrainingData(vf.TaskData):
-    """A prompt, and what it asks for."""
+    """A prompt, and the task that it belongs to."""
 
     family: str
     seed: int
@@ -57,25 +57,25 @@ TrainingTrace: TypeAlias = vf.Trace[TrainingData]
 class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
     """Judges the program in the last reply.
 
-    A failure of the engine is no reward: it is raised, and verifiers records it as the error of the rollout.
+    A failure of the engine is raised, and verifiers records it as the error of the rollout.
     """
 
     @property
     def key(self) -> str:
-        """The task and the phrasing, wherever in a stream they come."""
+        """The task and the phrasing, independent of their position in a stream."""
         assert self.data.id is not None
         return self.data.id
 
     @vf.metric
     async def components(self, trace: TrainingTrace) -> dict[str, float]:
-        """All parts of the reward, each a metric with its own name."""
+        """The components of the reward, each as a metric."""
         parts = asdict(await self._judged(trace))
         del parts["reward"]
         return parts
 
     @vf.reward
     async def reward(self, trace: TrainingTrace) -> float:
-        """From 0 to 1: 1 exactly if the program passes, 0 if it does nothing."""
+        """The reward: 1 if and only if the program passes, 0 if it does nothing."""
         return (await self._judged(trace)).reward
 
     async def validate(self, runtime: vf.Runtime) -> bool:  # noqa: ARG002 - programs run in the simulator
@@ -95,14 +95,14 @@ class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
 
 
 class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):
-    """Tasks without end, or as many as are wanted; the same on every machine."""
+    """A reproducible, possibly unlimited stream of tasks."""
 
     def __init__(self, config: TrainingConfig) -> None:
         super().__init__(config)
         self.INFINITE = config.count is None
 
     def load(self) -> Iterator[TrainingTask]:
-        """The tasks in the order of their seeds, each made when it is asked for."""
+        """Generate the tasks lazily, in the order of their seeds."""
         config = self.config
         first = config.seed * (config.count or STREAM)
         for number in islice(counting(first), config.count):
@@ -111,7 +111,7 @@ class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):
 
 
 def _data(row: dict[str, Any], worlds: int) -> TrainingData:
-    """A row of `load_prompts`, with its system prompt where verifiers can replace it."""
+    """Convert a row of `load_prompts`; the system prompt is separate, so that verifiers can replace it."""
     system, *messages = row["prompt"]
     name = f"{row['family']}-{row['seed']}"
     return TrainingData(
@@ -126,7 +126,7 @@ def _data(row: dict[str, Any], worlds: int) -> TrainingData:
     )
 
 
-@lru_cache(maxsize=4_096)  # the metrics and the reward of a rollout ask one after the other
+@lru_cache(maxsize=4_096)  # metrics and reward of a rollout use the same result
 def _components(rollout: Rollout, worlds: int) -> Components:
     (found,) = judge([rollout], worlds=worlds)
     return found

@@ -12,15 +12,15 @@ from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.compare import Compared, Comparison, p_text, to_tell, verdict
+from roboeval.analysis.compare import ComparedRun, Comparison, p_text, sample_size_sentences, verdict
 from roboeval.analysis.statistics import FEW
-from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences
+from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences
 from roboeval.cli.views.groups import cluster_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.failures import plural_of, shown_classes
 
 
-def comparison_view(comparison: Comparison, runs: tuple[Compared, Compared]) -> RenderableType:
+def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun]) -> RenderableType:
     """A comparison as text and tables."""
     names = runs[0].name, runs[1].name
     a, b = map(visible, names)
@@ -51,11 +51,11 @@ def comparison_view(comparison: Comparison, runs: tuple[Compared, Compared]) -> 
         for run in runs
         if (warning := run.cut_off.warning) is not None
     ]
-    needed = map(Text, to_tell(comparison))
+    needed = map(Text, sample_size_sentences(comparison))
     return Group(sentence, Text(), rows, Text(), *needed, *warnings, Text(), _ends(runs), Text(), table)
 
 
-def _ends(runs: tuple[Compared, Compared]) -> Table:
+def _ends(runs: tuple[ComparedRun, ComparedRun]) -> Table:
     """How the completions of both runs fail, by class."""
     table = ruled("share that fails", *(visible(run.name) for run in runs))
     for name in shown_classes([name for run in runs for name, share in run.classes.items() if share]):
@@ -77,14 +77,14 @@ def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableTyp
 
 def _scores(found: Sequence[VerdictChanges]) -> Table:
     first, second = found[0].suites
-    table = ruled("pass@1", first, second, "difference", "95% over tasks", "place", "completions")
+    table = ruled("pass@1", first, second, "difference", "95% over tasks", "rank", "completions")
     scores = [{one.name: one.pass_at_1[side] for one in found} for side in (0, 1)]
     for one in found:
         before, after = one.pass_at_1
         ends = one.comparison.over_tasks
         numbers = f"{before:.3f}", f"{after:.3f}", f"{after - before:+.3f}"
         interval = ends.ends("+.3f")
-        places = " -> ".join(dict.fromkeys(str(place(one.name, of)) for of in scores))
+        places = " -> ".join(dict.fromkeys(str(rank(one.name, of)) for of in scores))
         of = f"{one.completions:,} of {one.completions + one.left_out:,}"
         table.add_row(Text(visible(one.name)), *numbers, interval, places, of)
     return table

@@ -13,8 +13,8 @@ from rich.text import Text
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
-from roboeval.analysis.search import Found
+from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resample
+from roboeval.analysis.search import TraceMatch
 from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.explanation import GONE
@@ -26,7 +26,7 @@ MOST_LINES = 60  # of a difference between programs
 
 
 def found_view(
-    found: Sequence[Found],
+    found: Sequence[TraceMatch],
     counts: pl.DataFrame,
     total: int,
     told: Sequence[Cluster],
@@ -51,7 +51,7 @@ def found_view(
     return Group(*parts)
 
 
-def _by_task(found: Sequence[Found], counts: pl.DataFrame) -> Table:
+def _by_task(found: Sequence[TraceMatch], counts: pl.DataFrame) -> Table:
     table = ruled("task", "found", "passed")
     table.add_column("such as")
     for task, count, passed in counts.iter_rows():
@@ -66,7 +66,7 @@ def cluster_view(cluster: Cluster) -> RenderableType:
     size = how_many(len(cluster.members))
     name = visible(name_of(cluster.representative))
     head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
-    world = "" if cluster.has_no_program else f', in "{visible(str(cluster.told["world"]))}"'
+    world = "" if cluster.has_no_program else f', in "{visible(str(cluster.reason["world"]))}"'
     lines = [Text(f"such as {name}{world}", "dim")]
     check = cluster.failure["check"]
     lines.append(Text(shortened(f"{check_label(check)}: {cluster.why}" if check else cluster.why)))
@@ -89,7 +89,7 @@ def resample_view(
     """The results of asking again, by limit of retries."""
     reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
     table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
-    for limit in (resampled(prompts, retries) for retries in limits):
+    for limit in (resample(prompts, retries) for retries in limits):
         shares = (*limit.prompts.values(), limit.accepted, limit.ran)
         table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
     hopeless = sum(not any(trial.accepted for trial in prompt.trials) for prompt in prompts)

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from codebotler.core.words import listed
 from roboeval.linting.clauses import clauses_of
-from roboeval.suites.load import Check, Scenario, Suite, Task
+from roboeval.suites.load import Scenario, Suite, Task, TaskCheck
 from roboeval.suites.task import describe_person, world_title
 
 
@@ -73,7 +73,7 @@ def _section(title: str, lines: Iterable[RenderableType]) -> list[RenderableType
     return [Text(), Text(title, "bold"), *(Padding(line, (0, 0, 0, 2)) for line in lines)]
 
 
-def _check_view(check: Check) -> RenderableType:
+def _check_view(check: TaskCheck) -> RenderableType:
     head = check.name + (f"({', '.join(check.parameters)})" if check.parameters else "")
     formula = _Formula(" ".join(check.rtl.split()), "dim")
     return Group(Text.assemble((head, "bold"), f"  {check.category}"), Padding(formula, (0, 0, 0, 2)))

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from codebotler.core.program import TASK_FUNCTION
 from roboeval.mutation.operator import Context, Edits
-from roboeval.mutation.program_tree import ProgramTree, expression, is_pause, rewritten, skill_of, skills_in
+from roboeval.mutation.program_tree import ProgramTree, expression, is_pause, rewrite, skill_of, skills_in
 
 INVERSES: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Eq: ast.NotEq,
@@ -163,7 +163,7 @@ def into_the_loop(program: ProgramTree, _: Context) -> Edits:
         for loop, after in pairwise(block):
             if isinstance(loop, ast.For | ast.While) and skills_in(after):
                 end = loop.body[-1]
-                yield {loop: rewritten(loop, {end: [end, after]}), after: []}
+                yield {loop: rewrite(loop, {end: [end, after]}), after: []}
 
 
 def out_of_the_block(program: ProgramTree, _: Context) -> Edits:
@@ -172,4 +172,4 @@ def out_of_the_block(program: ProgramTree, _: Context) -> Edits:
         match node:
             case ast.For(body=[_, *_, last]) | ast.While(body=[_, *_, last]) | ast.If(body=[_, *_, last]):
                 if skills_in(last) and not isinstance(last, ENDS):
-                    yield {node: [rewritten(node, {last: []}), last]}
+                    yield {node: [rewrite(node, {last: []}), last]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 
 from roboeval.mutation.operator import Context, Edits
-from roboeval.mutation.program_tree import ProgramTree, expression, is_pause, names_in, rewritten, statement
+from roboeval.mutation.program_tree import ProgramTree, expression, is_pause, names_in, rewrite, statement
 
 BOUNDARIES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
 
@@ -119,7 +119,7 @@ def reset_in_the_loop(program: ProgramTree, _: Context) -> Edits:
             if isinstance(loop, ast.For | ast.While):
                 first = loop.body[0]
                 starts = filter(_is_start, block[:at])
-                yield from ({loop: rewritten(loop, {first: [start, first]})} for start in starts)
+                yield from ({loop: rewrite(loop, {first: [start, first]})} for start in starts)
 
 
 def _is_start(node: ast.stmt) -> bool:

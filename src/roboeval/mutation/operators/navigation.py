@@ -10,7 +10,7 @@ from roboeval.mutation.program_tree import (
     ProgramTree,
     argument,
     expression,
-    rewritten,
+    rewrite,
     skill_of,
     statement,
     text_of,
@@ -105,7 +105,7 @@ def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
             match argument(call, 0):
                 case ast.Name(name) if name == loop.target.id and step in set(ast.walk(loop)):
                     together = statement('go_to(" or ".join(rooms))', rooms=loop.iter)
-                    yield {loop: [together, rewritten(loop, {step: []})]}
+                    yield {loop: [together, rewrite(loop, {step: []})]}
 
 
 @where(STAYING_OUT)
@@ -161,13 +161,13 @@ def look_once(program: ProgramTree, _: Context) -> Edits:
     for loop, look in _looks_in_loops(program):
         if text_of(argument(look, 0)) is not None:
             first = statement("seen_once = look", look=look)
-            yield {loop: [first, rewritten(loop, {look: expression("seen_once")})]}
+            yield {loop: [first, rewrite(loop, {look: expression("seen_once")})]}
 
 
 def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
     """Looks twice, and takes it for granted from then on."""
     for loop, look in _looks_in_loops(program):
-        after = rewritten(loop, {look: expression("turns > 2 or look", look=look)})
+        after = rewrite(loop, {look: expression("turns > 2 or look", look=look)})
         after.body.insert(0, statement("turns += 1"))
         yield {loop: [statement("turns = 0"), after]}
 

@@ -1,4 +1,4 @@
-"""Families of tasks: templates from which each seed makes a task to train on or to evaluate with.
+"""Families of tasks: templates that generate a task for each seed, for training or evaluation.
 
-Start with `tasks.py`; `suite.py` makes a suite of the tasks of a split.
+Start with `tasks.py`; `suite.py` builds a suite from the tasks of a split.
 """

@@ -1,4 +1,4 @@
-"""Suites of fresh tasks: those that families make of the seeds of a split, under a name that says which."""
+"""Suites of tasks that families generate for the seeds of a split, such as `families-test-7`."""
 
 from __future__ import annotations
 
@@ -20,26 +20,19 @@ from roboeval.suites.task import Task
 
 SIZE = 1_000_000_000
 SPLITS = {"train": 0, "validation": SIZE, "test": 2 * SIZE}
-"""The first seed of each split, which has so many."""
+"""The first seed of each split; a split has SIZE seeds."""
 
 MOST_TASKS = 100
 NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
 
 
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
-    """The first of `count` seeds of a split; with the next `seed`, all are others.
+    """The first of `count` seeds of a split; a different `seed`, from 0, selects entirely different ones.
 
-    Args:
-        split: one of `SPLITS`.
-        seed: from 0.
-        count: how many, at least 1.
-        what: of which things there are so many, for messages.
-
-    Raises:
-        UserError: there is no such split, or a number is out of range.
+    Raises UserError if the split does not exist or a number is out of range; `what` names the counted things.
     """
     if split not in SPLITS:
-        raise UserError(f'there is no split "{split}"; there is {listed(list(SPLITS))}')
+        raise UserError(f'there is no split "{split}"; use {listed(list(SPLITS))}')
     if count < 1:
         raise UserError(f"the number of {what}s is {count}, but it must be at least 1")
     if not 0 <= seed * count <= SIZE - count:
@@ -50,15 +43,15 @@ def first_seed(split: str, seed: int, count: int, what: str) -> int:
 
 @dataclass(frozen=True)
 class FamilyTasks:
-    """Which tasks of families a suite holds: so many, in turn of each family.
+    """The tasks of families that a suite consists of; families take turns.
 
     Args:
         split: `train`, `validation` or `test`, which share no task.
-        seed: with the next number, all tasks are new.
-        count: how many tasks, 1 to 100; one for each family by default.
+        seed: another seed gives entirely different tasks.
+        count: the number of tasks, 1 to 100; one for each family by default.
 
     Raises:
-        UserError: there is no such split, or a number is out of range.
+        UserError: the split does not exist, or a number is out of range.
     """
 
     split: str
@@ -77,11 +70,11 @@ class FamilyTasks:
         return f"families-{self.split}-{self.seed}" + ("" if usual else f"-{self.count}")
 
     def suite(self, skills: SkillTable = SKILLS) -> Suite:
-        """A suite of these tasks, the same on every machine."""
-        return _suite(self, skills)
+        """Build the suite of these tasks; the result is reproducible."""
+        return _build_suite(self, skills)
 
     def seeds(self) -> Iterator[tuple[str, str, int]]:
-        """The name of each task, its family, and its seed: `BringThing`, and the next one `BringThing-2`."""
+        """Yield the name of each task (`BringThing`, then `BringThing-2`), its family and its seed."""
         first = first_seed(self.split, self.seed, self.count, "task")
         families, numbers = family_names(), Counter[str]()
         for seed in range(first, first + self.count):
@@ -92,7 +85,7 @@ class FamilyTasks:
 
 
 def family_tasks_named(name: str) -> FamilyTasks | None:
-    """What the name of a suite of families means; None if it is no such name."""
+    """Parse the name of a suite of families; None for other names."""
     match = NAME.fullmatch(name)
     if match is None:
         return None
@@ -102,7 +95,7 @@ def family_tasks_named(name: str) -> FamilyTasks | None:
 
 
 @lru_cache(maxsize=8)
-def _suite(which: FamilyTasks, skills: SkillTable) -> Suite:
+def _build_suite(which: FamilyTasks, skills: SkillTable) -> Suite:
     head = suite_file()
     made = {name: trained_task(family, seed) for name, family, seed in sorted(which.seeds())}
     digests = [f"{name} {one.suite.digest}" for name, one in made.items()]
@@ -120,13 +113,13 @@ def _suite(which: FamilyTasks, skills: SkillTable) -> Suite:
 
 
 def _named(name: str, made: TrainedTask) -> Task:
-    """The task under its name in a suite, with the file that is really there."""
+    """Rename a task for its suite, and point it to the file of its family."""
     task = made.suite.tasks[made.name]
     return replace(task, name=name, path=task.path.with_name(f"{name.partition('-')[0]}.yaml"))
 
 
 def _recorded(made: TrainedTask) -> Iterator[InstructionSolutions]:
-    """What the recorded models write: the right program; and for some prompts first a wrong one."""
+    """The programs of the recorded models: right ones, and for hasty ones some wrong ones first."""
     right = Solution(about="right", program=made.solution)
     wrong = [Solution(about=one.about, program=one.program, fails="unknown") for one in made.wrong]
     mixed = (right, *wrong)

@@ -1,4 +1,4 @@
-"""Families of tasks: templates from which each seed makes a task with names, words and worlds of its own."""
+"""Families of tasks: templates that generate a task for each seed, with its own names, words and worlds."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from roboeval.suites.taskfile import read_task
 FOLDER = Path(__file__).parent
 SUITE, WORLDS = "training", 8
 NUMBERS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-SOME = re.compile(r"(\d+) (\w+)")  # so many different words of a pool
+SOME = re.compile(r"(\d+) (\w+)")  # several distinct words of a pool
 MARKS = frozenset("${}|")
 RANGE = re.compile(r"(\d+) to (\d+)")
-EITHER = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several words, which make no difference
+EITHER = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several synonyms
 
-# A report that is taken back is none, whatever the task is.
-TAKES_BACK = (
+# A robot that retracts its report has not reported.
+RETRACTION = (
     r"\b(none|nothing|no part) of (that|this|it|what i)\b"
     r"|(?<!not )(?<!n\Wt )(?<!never )\b(forget|ignore|disregard|scratch|strike)"
     r" (all |any )?(of )?(it|that|this|what i)\b"
@@ -57,22 +57,22 @@ class _Form(BaseModel):
 
 
 class WrongProgram(_Form):
-    """A program that does not do what was asked, or not all of it."""
+    """A program that does not do all of what was asked."""
 
     about: Name
     program: YamlText
 
 
 class FamilyFile(_Form):
-    """A family before names are drawn; `$name` stands for what is chosen.
+    """The template of a family; `$name` is replaced by a value chosen for each seed.
 
     Args:
-        about: what its tasks are, in a sentence.
-        choose: what is drawn for each seed, by name: from a pool of words.yaml (`things`), some from one
-            (`3 rooms`), a number (`2 to 4`), or one of a list. No word is drawn twice.
+        about: a description of its tasks in a sentence.
+        choose: the choices by name: a word of a pool in words.yaml (`things`), several (`3 rooms`), a number
+            (`2 to 4`), or an entry of a list. No word is chosen twice.
         task: a task file without a name. In prompts, `{look|see}` is one of these words.
         solution: a program that is right in all worlds.
-        wrong: programs that are not, each of which earns less than 1.
+        wrong: wrong programs, each with a reward below 1.
     """
 
     about: Name
@@ -84,91 +84,70 @@ class FamilyFile(_Form):
 
 @dataclass(frozen=True)
 class TrainedTask:
-    """A task of a family.
+    """A task of a family."""
 
-    Args:
-        suite: one that holds nothing but it.
-        name: of the family and the seed, such as `BringThing-17`.
-        solution: a program that is right.
-        wrong: programs that are not.
-    """
-
-    suite: Suite
-    name: str
-    solution: str
-    wrong: tuple[WrongProgram, ...]
+    suite: Suite  # a suite with this task only
+    name: str  # the family and the seed, such as `BringThing-17`
+    solution: str  # a right program
+    wrong: tuple[WrongProgram, ...]  # wrong programs
 
     @property
     def prompts(self) -> tuple[str, ...]:
-        """Its phrasings."""
+        """The phrasings of its instruction."""
         return self.suite.tasks[self.name].prompts
 
     def expect_prompt(self, index: int) -> None:
-        """Raise a UserError if it has no phrasing with this number."""
+        """Raise a UserError if there is no prompt with this number."""
         if not 0 <= index < len(self.prompts):
-            raise UserError(f"{self.name} has no prompt {index}; it has {len(self.prompts)}, from 0")
+            raise UserError(f"{self.name} has no prompt {index}; use 0 to {len(self.prompts) - 1}")
 
 
 @cache
 def family_names() -> tuple[str, ...]:
-    """The names of all families that are here, sorted."""
+    """The sorted names of all families that ship with RoboEval."""
     return tuple(sorted(path.stem for path in (FOLDER / "templates").glob("*.yaml")))
 
 
 def family_file(family: str) -> Path:
-    """The file of a family.
-
-    Args:
-        family: one of `family_names()`, or a file of your own, which ends in `.yaml`.
-
-    Raises:
-        UserError: there is no such family.
-    """
+    """Find the file of a family: one of `family_names()`, or a `.yaml` file; raises UserError otherwise."""
     if family.endswith(".yaml") and Path(family).is_file():
         return Path(family)
     if family not in family_names():
-        raise UserError(
-            f'there is no family "{family}"; there is {listed(family_names())}, or a .yaml file of your own'
-        )
+        raise UserError(f'there is no family "{family}"; use {listed(family_names())}, or a .yaml file')
     return FOLDER / "templates" / f"{family}.yaml"
 
 
 def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask:
-    """The task that a family makes of a seed, the same on every machine.
+    """Generate the task of a family for a seed; the result is reproducible.
 
     Args:
-        family: one of `family_names()`, or a file of your own, which ends in `.yaml`; it is read once.
-        seed: any number from 0; names, words and worlds depend on it.
-        worlds: how many to draw at least, 1 to 10,000.
+        family: one of `family_names()`, or a `.yaml` file, which is read only once.
+        seed: an integer from 0, which determines names, words and worlds.
+        worlds: the least number of worlds to sample, 1 to 10,000.
 
     Raises:
-        UserError: there is no such family, its file is wrong, or a number is out of range.
+        UserError: the family does not exist, its file is not valid, or a number is out of range.
     """
     if not 1 <= worlds <= MOST_WORLDS:
         raise UserError(f"the number of worlds is {worlds}, but it must be from 1 to {MOST_WORLDS:,}")
     if type(seed) is not int or seed < 0:
         raise UserError(f"the seed is {seed!r}, but it must be a whole number from 0")
-    return _made(family, seed, worlds)
+    return _generate(family, seed, worlds)
 
 
 def trained_prompts(family: str, seed: int) -> tuple[str, ...]:
-    """The phrasings of `trained_task`, in a small part of its time, since no world is drawn.
+    """Generate only the prompts of `trained_task`, which is much faster because no world is sampled.
 
-    Args:
-        family: one of `family_names()`, or a file of your own, of which `trained_task` has made a task.
-        seed: any number from 0.
-
-    Raises:
-        UserError: there is no such family, or its file is wrong.
+    For a `.yaml` file, call `trained_task` once before, which validates it.
     """
     template = _template(family_file(family))
     random = template.random(seed)
-    return tuple(_phrasings(template, template.chosen(random), random))
+    return tuple(_phrasings(template, template.choose(random), random))
 
 
 @dataclass(frozen=True)
 class _Template:
-    """A family before names are drawn, and the text of its file."""
+    """The template of a family, parsed and as text."""
 
     path: Path
     text: str
@@ -176,30 +155,30 @@ class _Template:
     form: FamilyFile
 
     def random(self, seed: int) -> Random:
-        """What draws everything of a seed."""
-        return Random(f"{self.path.stem} {seed}")  # noqa: S311 - no secret
+        """The random generator of a seed."""
+        return Random(f"{self.path.stem} {seed}")  # noqa: S311 - not for cryptography
 
-    def chosen(self, random: Random) -> dict[str, str]:
-        """What each name stands for."""
-        return dict(_chosen(self.form, self.file, random))
+    def choose(self, random: Random) -> dict[str, str]:
+        """Choose the value of each name."""
+        return dict(_choose(self.form, self.file, random))
 
 
 @lru_cache(maxsize=1_024)
-def _made(family: str, seed: int, worlds: int) -> TrainedTask:
+def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
     template = _template(family_file(family))
     path, random = template.path, template.random(seed)
-    chosen = template.chosen(random)
-    file = YamlFile(_filled(template.text, chosen, path), path)
+    chosen = template.choose(random)
+    file = YamlFile(_fill(template.text, chosen, path), path)
     form = file.validate(FamilyFile)
     _expect_python(form, file)
     name = f"{path.stem}-{seed}"
     content = {"name": name, **form.task}
-    if isinstance(content.get("prompts"), list):  # else the sentence about it comes when the task is read
+    if isinstance(content.get("prompts"), list):  # otherwise, `read_task` reports the error
         content["prompts"] = [*_phrasings(template, chosen, random)]
     task_file = file.part("task", content)
     head = suite_file()
     rules = head.rules
-    task = _without_denial(
+    task = _forbid_retraction(
         read_task(
             task_file,
             path.with_name(f"{name}.yaml"),
@@ -214,61 +193,63 @@ def _made(family: str, seed: int, worlds: int) -> TrainedTask:
     return TrainedTask(suite, name, form.solution, form.wrong)
 
 
-def _without_denial(task: Task) -> Task:
-    """The task with requirements of which none holds once a program has taken back its report.
+def _forbid_retraction(task: Task) -> Task:
+    """Change all requirements so that none holds once a program has retracted its report.
 
-    A requirement of its own would hold at first, and so be worth something to programs that are wrong.
+    A separate requirement would hold from the start and reward wrong programs.
     """
-    stands = parse(f'not tr.Exists(say(r"{TAKES_BACK}"))', skills=SKILLS)
+    no_retraction = parse(f'not tr.Exists(say(r"{RETRACTION}"))', skills=SKILLS)
 
     def strict(one: Requirement) -> Requirement:
-        return replace(one, formula=And((one.formula, stands)))
+        return replace(one, formula=And((one.formula, no_retraction)))
 
     scenarios = (replace(one, require=tuple(map(strict, one.require))) for one in task.scenarios)
     return replace(task, scenarios=tuple(scenarios))
 
 
-# --- what is drawn
+# --- choices
 
 
-def _chosen(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[str, str]]:
-    """What each name in a template stands for."""
+def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[str, str]]:
+    """Choose the value of each name in a template."""
     used: set[str] = set()
 
-    def drawn(words: Sequence[str], count: int) -> list[str]:
+    def sample(words: Sequence[str], count: int) -> list[str]:
         left = [word for word in dict.fromkeys(words) if word not in used]
         if len(left) < count:
-            raise file.wrong(f"{count} words are to be chosen, but only {len(left)} are left", "choose", name)
+            raise file.wrong(f"only {len(left)} words are left, but {count} are needed", "choose", name)
         some = random.sample(left, count)
         if any(MARKS.intersection(word) for word in some):
-            raise file.wrong("a word contains $, {, } or |, which mark choices", "choose", name)
+            raise file.wrong("a word contains $, {, } or |, which are reserved; replace them", "choose", name)
         used.update(some)
         return some
 
     for name, choice in form.choose.items():
         if isinstance(choice, list):
-            yield from _scalar(name, *drawn(choice, 1))
+            yield from _scalar(name, *sample(choice, 1))
         elif match := RANGE.fullmatch(choice):
             least, most = int(match[1]), int(match[2])
             if not least <= most < len(NUMBERS):
-                raise file.wrong("write the smaller number first, and none above 10", "choose", name)
+                raise file.wrong(
+                    "the range is not valid; write two ascending numbers up to 10", "choose", name
+                )
             number = random.randint(least, most)
             yield from ((name, str(number)), (f"{name}_word", NUMBERS[number]))
         elif match := SOME.fullmatch(choice):
-            yield from _list(name, drawn(_pool(match[2], file, name), int(match[1])))
+            yield from _list(name, sample(_pool(match[2], file, name), int(match[1])))
         else:
-            yield from _scalar(name, *drawn(_pool(choice, file, name), 1))
+            yield from _scalar(name, *sample(_pool(choice, file, name), 1))
 
 
 def _pool(pool: str, file: YamlFile, name: str) -> list[str]:
     words = _words()
     if pool not in words:
-        raise file.wrong(f'there are no "{pool}"; there are {listed(list(words))}', "choose", name)
+        raise file.wrong(f'there is no pool "{pool}"; use {listed(list(words))}', "choose", name)
     return words[pool]
 
 
 def _scalar(name: str, word: str) -> Iterator[tuple[str, str]]:
-    """A word, as it begins a sentence or names somebody, with an article, and of several."""
+    """A word, its capitalised form, with an article, and in the plural."""
     article = "an" if word[0] in "aeiou" else "a"
     plural = word + ("es" if word.endswith(("s", "x", "ch", "sh")) else "s")
     yield from ((name, word), (name.capitalize(), word[:1].upper() + word[1:]))
@@ -276,21 +257,21 @@ def _scalar(name: str, word: str) -> Iterator[tuple[str, str]]:
 
 
 def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
-    """Words for a YAML list, in a sentence, as a list in Python, and one by one."""
+    """Words as a YAML list, in a sentence, as a Python list, and one by one."""
     yield from ((name, ", ".join(words)), (f"{name}_and", listed(words)))
     yield f"{name}_quoted", "[" + ", ".join(f'"{word}"' for word in words) + "]"
     for number, word in enumerate(words, 1):
         yield from _scalar(f"{name}_{number}", word)
 
 
-def _filled(text: str, chosen: Mapping[str, str], path: Path) -> str:
-    """A file with what is chosen in place of its names."""
+def _fill(text: str, chosen: Mapping[str, str], path: Path) -> str:
+    """Replace the names in a template by their values."""
     for match in Template.pattern.finditer(text):
         name = match["named"] or match["braced"]
         if match["escaped"] is None and name not in chosen:
-            what = "a dollar stands alone" if name is None else f'"${name}" is not chosen'
+            what = "a dollar sign has no name" if name is None else f'"${name}" has no entry in choose'
             line = text.count("\n", 0, match.start()) + 1
-            raise UserError(f"{what}; write $$ for a dollar", file=path, line=line)
+            raise UserError(f"{what}; write $$ for a dollar sign", file=path, line=line)
     return Template(text).substitute(chosen)
 
 
@@ -299,20 +280,20 @@ def _expect_python(form: FamilyFile, file: YamlFile) -> None:
     wrong = [(one.program, ("wrong", number, "program")) for number, one in enumerate(form.wrong)]
     for program, place in ((form.solution, ("solution",)), *wrong):
         if isinstance(flaw := parsed(program), Flaw):
-            raise file.wrong(f"this program is no Python: {flaw.message}", *place)
+            raise file.wrong(f"this program is not valid Python: {flaw.message}", *place)
 
 
 def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -> Iterator[Any]:
-    """The phrasings with what is chosen, and one word where there were several."""
+    """The prompts with all choices made."""
     for number, prompt in enumerate(template.form.task["prompts"]):
-        if not isinstance(prompt, str):  # the sentence about it comes when the task is read
+        if not isinstance(prompt, str):  # `read_task` reports the error
             yield prompt
             continue
-        filled = _filled(prompt, chosen, template.path)
+        filled = _fill(prompt, chosen, template.path)
         text = " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), filled).split())
         if "{" in text or "}" in text:
             raise template.file.wrong(
-                "write several words, of which one is taken, as {go|drive}", "task", "prompts", number
+                "braces are not balanced; write synonyms as {go|drive}", "task", "prompts", number
             )
         yield text
 
@@ -336,5 +317,5 @@ def _words() -> Mapping[str, list[str]]:
 
 @cache
 def suite_file() -> SuiteFile:
-    """The rules by which tasks of families are judged, and their version."""
+    """The version and the simulation settings of all families."""
     return YamlFile.read(FOLDER / "training.yaml").validate(SuiteFile)

@@ -1,7 +1,7 @@
-// A program, line by line, with its words coloured by what they are; all of it is text.
+// A program with line numbers and coloured syntax; all of it is inserted as text.
 const MOST_COLOURED = 100_000;
 
-// It need be no Python that could run: strings may lack their end.
+// The text may be invalid Python, for example with unterminated strings.
 const words = (keywords, skills) =>
   new RegExp(
     [
@@ -32,7 +32,7 @@ export default {
   methods: {
     *pieces() {
       let end = 0;
-      const coloured = this.program.length <= MOST_COLOURED; // of more, colours are not worth the wait
+      const coloured = this.program.length <= MOST_COLOURED; // colouring longer programs is slow
       for (const found of coloured ? this.program.matchAll(words(this.keywords, this.skills)) : []) {
         yield ["", this.program.slice(end, found.index)];
         yield [Object.keys(found.groups).find((name) => found.groups[name] !== undefined), found[0]];

@@ -1,18 +1,18 @@
-// A list of completions of any length: only those in view are in the page; the rest is fetched before it is reached.
+// A virtual list of completions: only rows in view are on the page; others are fetched before they scroll in.
 const PAGE = 200;
 const BEYOND = 12;
-const LOST = "The tool cannot be reached; is it still running?";
+const LOST = "The server cannot be reached. Is it still running?";
 
 export default {
   props: { source: String, version: Number, base: String, query: String },
   template: `
     <div class="completions">
-      <p id="count" class="quiet" role="status">{{ told }}</p>
+      <p id="count" class="quiet" role="status">{{ status }}</p>
       <div role="table" :aria-rowcount="total + 1" aria-label="Completions" aria-describedby="count">
         <div role="rowgroup" class="completions-head">
           <div role="row" aria-rowindex="1" class="completion">
             <span role="columnheader">Completion</span><span role="columnheader">Verdict</span>
-            <span role="columnheader">Worlds</span><span role="columnheader">What failed first</span>
+            <span role="columnheader">Worlds</span><span role="columnheader">First failure</span>
           </div>
         </div>
         <div ref="view" role="rowgroup" class="completions-view" tabindex="0" aria-label="Completions, in order"
@@ -33,7 +33,7 @@ export default {
         </div>
       </div>
     </div>`,
-  data: () => ({ total: 0, told: "", tall: 44, first: 0, last: 0, pages: {} }),
+  data: () => ({ total: 0, status: "", tall: 44, first: 0, last: 0, pages: {} }),
   computed: {
     shown() {
       const rows = [];
@@ -95,10 +95,10 @@ export default {
         this.pages[page] = found.completions;
         this.stale.delete(page);
         this.total = found.total;
-        this.told = `${found.total.toLocaleString("en")} completion${found.total === 1 ? "" : "s"}`;
+        this.status = `${found.total.toLocaleString("en")} completion${found.total === 1 ? "" : "s"}`;
         this.look();
       } catch (error) {
-        if (turn === this.turn) this.told = error instanceof TypeError ? LOST : error.message;
+        if (turn === this.turn) this.status = error instanceof TypeError ? LOST : error.message;
       } finally {
         if (this.under.get(page) === turn) this.under.delete(page);
       }
@@ -112,7 +112,7 @@ export default {
     signs: (one) => [...one.worlds].map((sign) => (sign === "+" ? ["good", "✓"] : ["bad", sign === "!" ? "!" : "✗"])),
     worlds(one) {
       const good = [...one.worlds].filter((sign) => sign === "+").length;
-      return one.worlds ? `${good} of ${one.worlds.length} worlds satisfied` : "in no world yet";
+      return one.worlds ? `${good} of ${one.worlds.length} worlds satisfied` : "not run in any world yet";
     },
   },
 };

@@ -15,7 +15,7 @@ from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.core.world import Room, World
 from codebotler.rtl import parse
 from made_results import row_of, table_of
-from roboeval.analysis.search import SearchQuery, answer
+from roboeval.analysis.search import TraceQuery, match_row
 from roboeval.cli.views.completions import completion_view
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.failures import Verdict
@@ -129,7 +129,7 @@ def test_a_table_counts_the_events_that_were_not_kept(suite: Suite) -> None:
 @pytest.mark.parametrize("negated", [False, True])
 def test_a_formula_is_undecided_where_the_trace_was_cut(suite: Suite, *, negated: bool) -> None:
     formula = 'tr.Exists(say("bye"))'
-    found = answer(cut_row(suite), SearchQuery(formula, negated), parse(formula))
+    found = match_row(cut_row(suite), TraceQuery(formula, negated), parse(formula))
     assert found.undecided == ((1, "World 0"),)
     assert found.worlds == (((2, "World 1"),) if negated else ())
-    assert len(answer(cut_row(suite), SearchQuery(), None).worlds) == 2
+    assert len(match_row(cut_row(suite), TraceQuery(), None).worlds) == 2
