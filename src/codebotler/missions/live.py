@@ -17,7 +17,7 @@ from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
 from codebotler.core.world import Point
 from codebotler.missions.progress import AT
 from codebotler.robots import base
-from codebotler.robots.base import CancelledError, Picture, RobotLostError
+from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names_of
 from codebotler.simulator.rules import ENDLESS, Rules
@@ -289,9 +289,9 @@ class LiveRobot:
     def _done(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         which = {"number": self._number, "skill": skill.name}
 
-        def told(what: str | Picture) -> None:
+        def told(what: str | CameraPicture) -> None:
             try:
-                if isinstance(what, Picture):
+                if isinstance(what, CameraPicture):
                     self._note("picture", **which, picture=what.data)
                 else:
                     if not self._is_watched and (found := AT.fullmatch(what)):

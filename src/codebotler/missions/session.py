@@ -357,7 +357,7 @@ class MissionSession:
             prompt = prompt.after(before.program, before.problems)
         elif how.repair and before.programless is not None:
             prompt = prompt.after_no_program(before.programless.sentence)
-        task = asyncio.create_task(write_program(model, prompt, heard=self._heard))
+        task = asyncio.create_task(write_program(model, prompt, on_text=self._heard))
         self._asking = (asyncio.get_running_loop(), task)
         try:
             if self._is_stopped():

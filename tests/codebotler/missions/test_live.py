@@ -15,7 +15,7 @@ from codebotler.core.skills.values import TEXT, ValueType, written_call
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CancelledError, Result, RobotLostError
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
@@ -55,7 +55,7 @@ def worker() -> Iterator[Worker]:
 
 def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
     as_written = replace(PAPER, literals="as-written")
-    model = recorded_model("recorded:careful")
+    model = open_recorded("recorded:careful")
     pairs = [
         (model.solution(task.prompts[0], 0).program, task.scenarios[0].world) for task in paper.tasks.values()
     ]

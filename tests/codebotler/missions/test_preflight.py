@@ -23,7 +23,7 @@ from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight, rooms_to_check, unknown_rooms
 from codebotler.missions.store import missions
-from codebotler.models.base import Heard, Reply, Usage, unheard
+from codebotler.models.base import Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, NotReadyError, Result
@@ -117,9 +117,9 @@ class Writing:
     settings: SamplingSettings = field(default_factory=SamplingSettings)
     asked: list[Prompt] = field(default_factory=list)
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         self.asked.append(prompt)
-        heard(self.program)
+        on_text(self.program)
         return Reply(self.program, self.program, Usage(1, 1), float(number), "stop")
 
     async def close(self) -> None: ...

@@ -17,7 +17,7 @@ from codebotler.missions.log import EVENTS, Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import Order
-from codebotler.models.recorded import recorded_model as recorded
+from codebotler.models.recorded import open_recorded as recorded
 from codebotler.robots.base import Result, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated

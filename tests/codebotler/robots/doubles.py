@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.base import Argument, CancelledError, Feedback, Result, no_feedback
+from codebotler.robots.base import Argument, CancelledError, Feedback, Result, ignore_feedback
 from codebotler.robots.clock import Clock
 
 
@@ -31,7 +31,7 @@ class Answering:
         self.cancels = 0
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = no_feedback) -> Result:
+    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = ignore_feedback) -> Result:
         if self.cancels:
             raise CancelledError
         first = str(arguments[0]) if arguments else ""

@@ -21,9 +21,9 @@ from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
-from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.open import open_model
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import open_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Result, Robot
@@ -55,15 +55,15 @@ class Author:
         self.asked: list[Prompt] = []
         self.is_closed = False
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:  # noqa: ARG002 - as models have it
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - as models have it
         self.asked.append(prompt)
         if not self.programs:
             raise ModelError("the model is not there", may_pass=False)
         program = self.programs.pop(0)
-        heard(program[:10])
+        on_text(program[:10])
         if self.waits:
             await asyncio.sleep(60)
-        heard(program[10:])
+        on_text(program[10:])
         return Reply(
             program, program, Usage(), 0.0, "stop", no_program=None if "def" in program else "no-code"
         )
@@ -129,7 +129,7 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
 
 
 def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> None:
-    world, model = World.read(OFFICE), recorded_model("recorded")
+    world, model = World.read(OFFICE), open_recorded("recorded")
     robot = Simulated(world, speed=None)
     with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
         assert len(examples(console)) >= 3
@@ -143,7 +143,7 @@ def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> 
 
 
 def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: Path) -> None:
-    office, model = World.read(OFFICE), recorded_model("recorded")
+    office, model = World.read(OFFICE), open_recorded("recorded")
     for world, count in ((office, 3), (WORLD, 0)):
         robot = Simulated(world, speed=None)
         with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
