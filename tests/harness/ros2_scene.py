@@ -25,8 +25,8 @@ SHORT = Timeouts(patience=3.0, silence=0.5, longest=20.0)
 BUILD = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from ros2_types import built
-print("at", built(sys.argv[2], json.loads(sys.argv[3])))
+from ros2_types import build_package
+print("at", build_package(sys.argv[2], json.loads(sys.argv[3])))
 """
 
 

@@ -141,8 +141,8 @@ def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
 INSTALLED = """
 import sys
 sys.path.insert(0, {worker!r})
-from message_types import action_type
-action = action_type("robot_actions_pkg", {name!r}, {definition!r})()
+from message_types import generate_action
+action = generate_action("robot_actions_pkg", {name!r}, {definition!r})()
 wholes = (action.action_goal, action.action_result, action.action_feedback)
 parts = (action.action_goal.goal, action.action_result.result, action.action_feedback.feedback)
 for part in (action, *wholes, *parts):

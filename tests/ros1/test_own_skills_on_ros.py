@@ -107,6 +107,6 @@ def test_messages_belong_to_the_package_that_a_skill_names(table: SkillTable) ->
 TYPES = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from message_types import message_types
-print(*(spec._type for spec in message_types(json.loads(sys.argv[2])).values()))
+from message_types import action_types
+print(*(spec._type for spec in action_types(json.loads(sys.argv[2])).values()))
 """

@@ -246,7 +246,7 @@ sys.path.insert(0, sys.argv[1])
 import os, threading, time
 import actionlib, rospy
 from sensor_msgs.msg import CompressedImage
-from message_types import message_types
+from message_types import action_types
 
 def look(goal):
     if goal.object == "late":
@@ -264,7 +264,7 @@ def show(data):
 
 picture = b"no picture at all"
 rospy.init_node("eyes", disable_signals=True, log_level=rospy.FATAL)
-spec = message_types([{"type": "IsInRoom", "definition": sys.argv[2]}])["IsInRoom"]
+spec = action_types([{"type": "IsInRoom", "definition": sys.argv[2]}])["IsInRoom"]
 server = actionlib.SimpleActionServer("/is_in_room_server", spec, look, auto_start=False)
 topic = rospy.Publisher("/is_in_room_server/picture", CompressedImage, queue_size=4)
 server.start()

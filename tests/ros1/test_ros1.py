@@ -535,8 +535,8 @@ def test_installed_messages_are_preferred_and_their_feedback_is_told(
 MD5 = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from message_types import message_types
-for name, spec in message_types(json.loads(sys.argv[2])).items():
+from message_types import action_types
+for name, spec in action_types(json.loads(sys.argv[2])).items():
     a = spec()
     for part in (a, a.action_goal, a.action_result, a.action_feedback,
                  a.action_goal.goal, a.action_result.result, a.action_feedback.feedback):

@@ -27,13 +27,13 @@ def robot_names(incomplete: str) -> list[str]:
 RobotOption = Annotated[
     str | None,
     typer.Option(
-        help="The robot: sim by default, another kind from `codebotler robots`, or your own FILE.py:CLASS.",
+        help="The robot: sim by default, a kind from `codebotler robots`, or FILE.py:CLASS.",
         autocompletion=robot_names,
     ),
 ]
 AllOption = Annotated[
     bool,
-    typer.Option("--all", help="Show the robot's actions in each kind of imagined world, not only in one."),
+    typer.Option("--all", help="Show the robot's actions in each kind of world, not in one."),
 ]
 ModelOption = Annotated[
     str | None,
@@ -73,9 +73,7 @@ RetriesOption = Annotated[
 ]
 RepairOption = Annotated[
     bool,
-    typer.Option(
-        "--repair", help="When asking again, show the rejected program and its problems; once by default."
-    ),
+    typer.Option("--repair", help="Ask again with the program and its problems; once by default."),
 ]
 RecordOption = Annotated[
     Path | None, typer.Option(help="Append a line of JSON for each attempt to this file.")

@@ -29,11 +29,7 @@ WHEN_WORDS = {"always": "at any time", "finally": "at the end"}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read the rules in a file, if given, and note how programs could evade them.
-
-    Raises:
-        UserError: the rules are invalid, or name a room that the world lacks.
-    """
+    """Read the rules in a file, if given, and note how programs could evade them; UserError if invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     note_evasions(rules, world, skills)
     return rules
@@ -90,12 +86,7 @@ def is_drive(event: Event) -> bool:
 
 
 def step_sentence(event: Event, room: str = "") -> str:
-    """Describe a step of an example, with all details that a rule may depend on.
-
-    Args:
-        event: the step.
-        room: the room after the previous step; a drive from another room mentions that room.
-    """
+    """Describe a step of an example, and the room of a drive if it is not that after the last step."""
     verb, drives = verb_of(event.kind), is_drive(event)
     any_text = "another room" if drives else "something"
     quote = "" if verb.object else '"'

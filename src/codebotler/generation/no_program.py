@@ -15,21 +15,13 @@ MAX_REFUSAL_CHARACTERS = 200
 
 @dataclass(frozen=True)
 class ProgramlessReply:
-    """A reply without a program.
+    """A reply without a program."""
 
-    Args:
-        kind: why there is no program.
-        sentence: the same for people.
-        text: the complete reply.
-        reasoning: the model's reasoning.
-        higher_limit: a limit that may be high enough, in tokens; None if no limit was reached.
-    """
-
-    kind: NoProgram
-    sentence: str
-    text: str = field(repr=False)
-    reasoning: str = field(repr=False)
-    higher_limit: int | None
+    kind: NoProgram  # why there is no program
+    sentence: str  # the same for people
+    text: str = field(repr=False)  # the complete reply
+    reasoning: str = field(repr=False)  # the model's reasoning
+    higher_limit: int | None  # a limit that may be high enough, in tokens; None if no limit was reached
 
     @property
     def can_repair(self) -> bool:

@@ -21,11 +21,7 @@ class PartialReply:
 
 
 def split_partial(reply: str) -> PartialReply:
-    """Split the beginning of a reply into text and code, for display.
-
-    Code is inside fences, follows a line such as a definition, or starts indented, as a base model continues
-    a function. Reasoning between tags contains no code.
-    """
+    """Split the beginning of a reply into text and code; reasoning between tags contains no code."""
     if CONTINUATION.match(reply) and not REASONING_TAG.match(reply):
         return PartialReply("", reply)
     text: list[str] = []

@@ -32,25 +32,15 @@ class Usage:
 
 @dataclass(frozen=True)
 class Reply:
-    """A model's reply.
+    """A model's reply."""
 
-    Args:
-        text: the complete reply, with tool calls as text; for a refused request the server's message.
-        program: the program in the reply; it may not parse.
-        usage: the number of tokens.
-        latency_s: the seconds from the request to the end of the reply; None if not measured.
-        finish_reason: the server's reason for the end, such as `stop` or `length`; None without one.
-        reasoning: the model's reasoning, where the server shows it.
-        no_program: why the reply has no program; None if it has one, or if that is uncertain.
-    """
-
-    text: str = field(repr=False)
-    program: str = field(repr=False)
-    usage: Usage
-    latency_s: float | None
-    finish_reason: str | None
-    reasoning: str = field(default="", repr=False)
-    no_program: NoProgram | None = None
+    text: str = field(repr=False)  # the complete reply with tool calls, or the message of a refusal
+    program: str = field(repr=False)  # the program in the reply; it may not parse
+    usage: Usage  # the number of tokens
+    latency_s: float | None  # the seconds from the request to the end of the reply; None if not measured
+    finish_reason: str | None  # the server's reason for the end, such as `stop` or `length`; None without one
+    reasoning: str = field(default="", repr=False)  # the model's reasoning, where the server shows it
+    no_program: NoProgram | None = None  # why there is no program; None if there is one, or if uncertain
 
     @property
     def is_cut_off(self) -> bool:
@@ -83,15 +73,8 @@ def make_reply(
 ) -> Reply:
     """Extract the program and build a `Reply`.
 
-    Args:
-        text: the complete reply.
-        usage: the number of tokens.
-        latency_s: the seconds to the end of the reply; None if not measured.
-        finish_reason: the server's reason for the end.
-        opening: the prompt that a base model continues; None for a chat model.
-        reasoning: the reasoning that the server sent apart from the text.
-        known_kind: the kind of reply without a program, if the server reported it outside the text.
-        has_answer: whether the text is the model's answer; only answers can hold a program.
+    `opening` is the prompt that a base model continues; None for a chat model. `known_kind` is the kind of
+    reply without a program, if the server reported it outside the text. Only an answer can hold a program.
     """
     answer = text if has_answer else ""
     found = read_reply(

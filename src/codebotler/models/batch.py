@@ -71,17 +71,7 @@ class BatchModel:
         return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
 
     def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
-        """Parse an answer from a file.
-
-        Args:
-            prompt: the prompt of the request.
-            number: the number of the sample of this prompt, from 0.
-            status: the HTTP status in the file.
-            body: the JSON of the answer.
-
-        Raises:
-            ModelError: the answer is an error.
-        """
+        """Parse the HTTP status and the JSON of an answer; ModelError if the answer is an error."""
         if status < FIRST_ERROR and not _has_choice(body):
             raise error_in_reply(self.name, body)
         short = replace(prompt, messages=prompt.messages[-1:])  # a long request would take time

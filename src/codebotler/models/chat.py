@@ -61,12 +61,8 @@ TRANSPORT_PACKAGES = ("httpx", "httpx2", "httpcore", "httpcore2", "anyio", "ssl"
 class ChatModel:
     """A chat model, named `provider:model` as in pydantic-ai.
 
-    With a base URL `openai:` means `openai-chat:`, since few other servers have the Responses API.
-
-    Args:
-        name: the model's name.
-        settings: the settings of its requests.
-        http_client: a client of the library that the provider uses; None for a new one.
+    With a base URL `openai:` means `openai-chat:`, since few other servers have the Responses API. An
+    `http_client` must be of the library that the provider uses.
     """
 
     def __init__(self, name: str, settings: SamplingSettings, http_client: object = None) -> None:

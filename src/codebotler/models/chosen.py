@@ -24,9 +24,9 @@ DEFAULT_MODEL = "recorded:careful"
 class ChosenModel:
     """A model with its default settings."""
 
-    name: str  # for `open_model`
-    base_url: str | None = None  # of its server; None for the provider's own
-    max_tokens: int | None = None  # for a reply; None for the default
+    name: str  # the argument for `open_model`
+    base_url: str | None = None  # None means the provider's own server
+    max_tokens: int | None = None  # None means the default limit for a reply
 
     def add_server(self, settings: SamplingSettings) -> SamplingSettings:
         """Return the settings with this model's address, and with its limit unless they have one."""

@@ -59,9 +59,6 @@ def classify_reply(
         finish_reason: the server's reason for the end; None without one.
         has_code: whether the reply contains any code.
         known_kind: the kind, if the server reported it outside the text, such as in a field for refusals.
-
-    Raises:
-        EngineError: no isolated process can be started.
     """
     by_reason = _BY_REASON.get((finish_reason or "").lower())
     kind = by_reason if by_reason == "cut-off" else known_kind or by_reason

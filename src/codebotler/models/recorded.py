@@ -131,12 +131,7 @@ def is_recorded(name: str) -> bool:
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open a recorded model.
-
-    Args:
-        name: `recorded` or `recorded:careful`, `recorded:hasty`, or `recorded:FOLDER` for your own files.
-        folder: a folder of further files for it.
-    """
+    """Open `recorded`, `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`, with a further folder."""
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():
         own = _read(Path(short))

@@ -32,17 +32,11 @@ MODEL_HINT = "set OPENAI_API_KEY or another provider's key, or start a model ser
 
 @dataclass(frozen=True)
 class UsableModel:
-    """A model that can be used.
+    """A model that can be used."""
 
-    Args:
-        name: the value for `--model`.
-        why: the reason that it can be used, such as `OPENAI_API_KEY is set`.
-        base_url: the value for `--base-url`; None if not needed.
-    """
-
-    name: str
-    why: str
-    base_url: str | None = None
+    name: str  # the value for `--model`
+    why: str  # the reason that it can be used, such as `OPENAI_API_KEY is set`
+    base_url: str | None = None  # the value for `--base-url`; None if not needed
 
     @property
     def is_recorded(self) -> bool:

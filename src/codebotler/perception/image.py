@@ -34,15 +34,7 @@ ENCODINGS: Mapping[str, tuple[str, str, int]] = {
 
 
 def image_of(data: bytes, name: str = "the picture") -> Image.Image:
-    """Decode a JPEG, PNG or WebP file, upright and in RGB.
-
-    Args:
-        data: the bytes of the file.
-        name: its name in error messages.
-
-    Raises:
-        UserError: the file has another format, is damaged, or is too large.
-    """
+    """Decode a JPEG, PNG or WebP file, upright and in RGB; UserError, with the name, if that fails."""
     if not data:
         raise UserError(f"{name} is empty")
     if len(data) > MAX_IMAGE_BYTES:
@@ -73,12 +65,7 @@ def read_image(path: Path) -> Image.Image:
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
     """Decode a sensor_msgs/CompressedImage, or a sensor_msgs/Image of a common encoding.
 
-    Args:
-        message: the fields, with `data` in base64.
-        name: its name in error messages.
-
-    Raises:
-        UserError: the message contains no picture, or is too large.
+    The message has `data` in base64; UserError, with the name, if it contains no picture or a huge one.
     """
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:

@@ -134,39 +134,22 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True)
 class Readiness:
-    """Whether robots of one kind can be used on this machine.
+    """Whether robots of one kind can be used on this machine."""
 
-    Args:
-        name: the kind: sim, pyrobosim, ros1, rosbridge or ros2.
-        works: whether they can be used, as far as is known without connecting.
-        missing: the missing part, as a phrase; empty if nothing is missing.
-        mend: the command that installs the missing part, if there is one.
-        note: a remark for users, such as how to choose the address.
-    """
-
-    name: str
-    works: bool
-    missing: str = ""
-    mend: str = ""
-    note: str = ""
+    name: str  # the kind: sim, pyrobosim, ros1, rosbridge or ros2
+    works: bool  # whether they can be used, as far as is known without connecting
+    missing: str = ""  # the missing part, as a phrase; empty if nothing is missing
+    mend: str = ""  # the command that installs the missing part, if there is one
+    note: str = ""  # a remark for users, such as how to choose the address
 
 
 @dataclass(frozen=True)
 class Options:
-    """Options for opening a robot; each kind uses some of them.
+    """Options for opening a robot; each kind uses some of them."""
 
-    Args:
-        world: the world of a simulated robot.
-        speed: seconds of the robot's clock per real second; None if waiting takes no real time.
-        address: the address, such as the URI of a ROS master or rosbridge; empty for the default.
-        ros_python: the Python of the robot's ROS installation.
-        skills: the skills that the robot may be asked to perform.
-        connection: the interface of a robot on ROS; None if it has an action for each skill.
-    """
-
-    world: World | None = None
-    speed: float | None = 1.0
-    address: str = ""
-    ros_python: Path = ROS_PYTHON
-    skills: SkillTable = SKILLS
-    connection: Connection | None = None
+    world: World | None = None  # the world of a simulated robot
+    speed: float | None = 1.0  # clock seconds per real second; None if waiting takes no real time
+    address: str = ""  # the address, such as the URI of a ROS master or rosbridge; empty for the default
+    ros_python: Path = ROS_PYTHON  # the Python of the robot's ROS installation
+    skills: SkillTable = SKILLS  # the skills that the robot may be asked to perform
+    connection: Connection | None = None  # the calls of a robot on ROS; None for an action per skill

@@ -97,14 +97,9 @@ class PlacesMapping(_PlacesForm):
 
 
 def read_places(source: object, at: YamlFile) -> Places:
-    """Read the places of a robot.
+    """Read the places of a robot; UserError if a file is invalid.
 
-    Args:
-        source: the name of a plain file, a mapping for another file, or a list of these.
-        at: the file with this source under `places`; paths are relative to its folder.
-
-    Raises:
-        UserError: the source or a file is invalid.
+    The source, from `places` in the file `at`, is the name of a file, a mapping, or a list of these.
     """
     found: dict[str, NamedPlace] = {}
     frames: list[str] = []

@@ -18,7 +18,6 @@ from codebotler.robots.base import (
     CancelledError,
     Feedback,
     NotReadyError,
-    Options,
     Result,
     ignore_feedback,
 )
@@ -26,7 +25,7 @@ from codebotler.robots.places import NamedPlace, Places
 from codebotler.robots.ros.connection import SkillCall
 from codebotler.robots.ros.keepout import keepout_messages
 from codebotler.robots.ros.motion import Pose
-from codebotler.robots.ros.robot import STOP_BY_HAND, RosRobot, Timeouts
+from codebotler.robots.ros.robot import STOP_BY_HAND, RosRobot
 from codebotler.simulator.rule_guard import Rule
 
 POLL_SECONDS = 0.05
@@ -39,27 +38,13 @@ class ConnectedRobot(RosRobot):
     After a stop, its pose or velocity shows whether it stands still; the answer to a cancel does not.
     """
 
-    def __init__(
-        self,
-        name: str,
-        address: str,
-        script: str,
-        options: Options,
-        environment: Mapping[str, str],
-        *,
-        waits: Timeouts | None = None,
-    ) -> None:
-        super().__init__(name, address, script, options, environment, waits=waits)
+    def _prepare(self) -> None:
         self.has_pose = self.connection.pose is not None
         self._detectors: dict[str, Detector] = {}
         self._looking = threading.Lock()  # one detector at a time
 
     def connect(self) -> None:
-        """Open the detectors, and connect.
-
-        Raises:
-            NotReadyError: a part is missing, or the poses are not in the frame of the places.
-        """
+        """Open the detectors, and connect; NotReadyError also for poses in another frame than the places."""
         self.disconnect()
         for _, model in self.connection.cameras.values():
             if model not in self._detectors:
@@ -81,13 +66,7 @@ class ConnectedRobot(RosRobot):
     def perform(
         self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback
     ) -> Result:
-        """Answer from places and pose, look at a picture, or have the robot perform the skill.
-
-        Raises:
-            RobotError: the robot cannot do it.
-            CancelledError: the skill was cancelled; `failed_stop` shows whether the robot stands still.
-            RobotLostError: the robot or the worker died, or does not answer.
-        """
+        """Answer from places and pose, look at a picture, or have the robot perform the skill."""
         connection = self.connection
         if skill in connection.cameras:
             topic, model = connection.cameras[skill]
@@ -113,11 +92,7 @@ class ConnectedRobot(RosRobot):
         return f"it was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report each pose until the connection ends, and None while the pose is unknown.
-
-        Returns:
-            whether the robot has poses.
-        """
+        """Report poses until the connection ends, None for an unknown one; return whether there are any."""
         worker = self._worker
 
         def watch() -> None:

@@ -27,29 +27,17 @@ PLACE_SKILLS = {"get_all_rooms": False, "get_current_location": True}
 
 @dataclass(frozen=True)
 class SkillCall:
-    """The action, service or topic that performs a skill.
+    """The action, service or topic that performs a skill."""
 
-    Args:
-        kind: action, service or topic.
-        name: its name.
-        type: the message type, such as `nav2_msgs/action/NavigateToPose`.
-        request: the fields of the message to send; in texts, `$NAME` is the argument of that name.
-        definition: the text of the .action file; empty if the robot's ROS has the type.
-        result: the path of the field that the skill returns; empty for no result.
-        success: the path of a field that must be true; empty for none.
-        reason: the path of the field with the reason of a failure; empty for the usual names.
-        failure: the kind of error for failures without a kind.
-    """
-
-    kind: CallKind
-    name: str
-    type: str
-    request: Values = field(default_factory=dict)
-    definition: str = ""
-    result: str = ""
-    success: str = ""
-    reason: str = ""
-    failure: str = ""
+    kind: CallKind  # action, service or topic
+    name: str  # its name
+    type: str  # the message type, such as `nav2_msgs/action/NavigateToPose`
+    request: Values = field(default_factory=dict)  # fields; `$NAME` is an argument
+    definition: str = ""  # the text of the .action file; empty if the robot's ROS has the type
+    result: str = ""  # the path of the field that the skill returns; empty for no result
+    success: str = ""  # the path of a field that must be true; empty for none
+    reason: str = ""  # the path of the field with the reason of a failure; empty for the usual names
+    failure: str = ""  # the kind of error for failures without a kind
 
     def fields(self, values: Values) -> Any:  # noqa: ANN401 - a message
         """Fill in the variables of the request."""
@@ -95,7 +83,7 @@ class Connection:
         pose: the topic of its poses.
         velocity: the topic of its velocities.
         packages: folders of packages with messages that its ROS may lack.
-        cameras: for each skill that looks at a picture, the topic and the detector's model.
+        cameras: topics and detector models by skill.
         keepout: the topics of Nav2's keepout mask and of its description.
     """
 

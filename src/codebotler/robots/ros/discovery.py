@@ -95,12 +95,7 @@ def discover_offers(robot: str, address: str, python: Path) -> list[str]:
 
 
 def draft_connection(robot: str, offers: Iterable[str]) -> str:
-    """Return a draft for `--connect`; incomplete and unmapped offers are comments.
-
-    Args:
-        robot: ros1 or ros2.
-        offers: from `discover_offers`.
-    """
+    """Return a draft for `--connect`, from `discover_offers`; incomplete and unmapped offers are comments."""
     by_form = {re.sub("/(action|srv|msg)/", "/", offer): offer for offer in sorted(offers)}
     forms = [
         form

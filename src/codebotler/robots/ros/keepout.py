@@ -18,13 +18,9 @@ EMPTY_MASK = ((0.0, 0.0), (MASK_RESOLUTION, MASK_RESOLUTION))  # an empty mask r
 def keepout_messages(
     rules: Sequence[Rule], rooms: Sequence[Room], frame: str = "map", topic: str = "/keepout_filter_mask"
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Build a nav_msgs/OccupancyGrid and a nav2_msgs/CostmapFilterInfo.
+    """Build a nav_msgs/OccupancyGrid for a latched topic, and its nav2_msgs/CostmapFilterInfo.
 
-    Args:
-        rules: the rules; those of the form `always: not tr.Exists(inside(...))` matter.
-        rooms: the rooms with their footprints.
-        frame: the frame of the footprints.
-        topic: the latched topic of the grid.
+    Only rules of the form `always: not tr.Exists(inside(...))` have an effect; `frame` is that of footprints.
     """
     patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]

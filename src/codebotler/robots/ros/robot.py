@@ -84,6 +84,10 @@ class RosRobot:
         self._stopped, self._number = True, 0
         self._send_lock = threading.Lock()  # requests before a stop are sent before it
         self._rescue_lock = threading.RLock()
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Set further attributes of a subclass."""
 
     def connect(self) -> None:
         """Start a worker, wait for the action servers, and set the clock to 0.

@@ -73,11 +73,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills; return whether this has started a master.
-
-        Raises:
-            NotReadyError: ROS is missing, or no master answers and none can be started.
-        """
+        """Offer the skills; return whether this has started a master; NotReadyError if there can be none."""
         worker = self._worker = self._ros1_servers() if self._ros == 1 else self._ros2_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)

@@ -39,8 +39,8 @@ class Ros2Graph:
     def enter(self, *, is_rescue: bool = False) -> bool:
         """Start our node; return whether a dead worker has left a node with its name.
 
-        A lock allows one worker per machine. Workers of two machines that start together notice each other
-        and stop. A rescue does not wait, since the tool has killed the other worker.
+        Workers of two machines that start together notice each other and stop. A rescue does not wait, since
+        the tool has killed the other worker.
         """
         self._lock = self._take_lock()
         self._is_left_behind = is_rescue or self._has_dead_twin()
