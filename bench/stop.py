@@ -24,7 +24,15 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, events_of
 from codebotler.missions.mission import Mission
-from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Result, Robot, ignore_feedback
+from codebotler.robots.base import (
+    CancelledError,
+    Feedback,
+    Options,
+    Robot,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
+)
 from codebotler.robots.open import check_readiness, open_robot
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
@@ -61,7 +69,9 @@ class Timed(Simulated):
         self.told = self.told or time.perf_counter()
         super().cancel()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = ignore_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Remember when it was ended."""
         try:
             return super().perform(skill, arguments, told)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from codebotler.models.base import Model
     from codebotler.models.batch import BatchModel
 
-Command = TypeVar("Command", bound=Callable[..., object])
+CommandT = TypeVar("CommandT", bound=Callable[..., object])
 
 TemperatureOption = Annotated[
     float | None,
@@ -58,7 +58,7 @@ PresetOption = Annotated[
         metavar="NAME",
     ),
 ]
-SeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
+ModelSeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
 TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
 
 
@@ -72,7 +72,7 @@ def model_settings(
     reasoning_effort: EffortOption = None,
     extra_body: ExtraBodyOption = None,
     settings: PresetOption = None,
-    seed: SeedOption = None,
+    seed: ModelSeedOption = None,
     timeout: TimeoutOption = SamplingSettings.timeout,
 ) -> SamplingSettings:
     """Return the settings of the options; UserError if two options contradict each other."""
@@ -125,10 +125,10 @@ def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
         note(f"{model.name} takes no {' or '.join(unsent).replace('_', '-')}; none is sent")
 
 
-def inherit_options(called: Callable[..., object]) -> Callable[[Command], Command]:
+def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], CommandT]:
     """Add all options of a function to a command that passes them on as `**options`."""
 
-    def extended(command: Command) -> Command:
+    def extended(command: CommandT) -> CommandT:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
         named = [one for one in own.values() if one.kind is not one.VAR_KEYWORD and one.name not in inherited]
         first = [one for one in named if one.kind is not one.KEYWORD_ONLY]

@@ -91,8 +91,8 @@ def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
         except RobotError as error:
             outcome = f"fails with {error.kind}: {str(error).removeprefix(f'{row.name}: ')}"
         event = robot.trace[-1] if robot.trace else None
-        told = [fact for fact in robot.facts if not (isinstance(fact, Lot) and fact.statement == row.call)]
-        facts = tuple(fact.sentence for fact in told)
+        drawn = [fact for fact in robot.facts if not (isinstance(fact, Lot) and fact.statement == row.call)]
+        facts = tuple(fact.sentence for fact in drawn)
         found.setdefault(outcome, SkillTrial(outcome, facts, event))
     return list(found.values())
 

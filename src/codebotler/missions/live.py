@@ -262,7 +262,7 @@ class LiveRobot:
             return None
         return next((room for room in self._room_map.rooms if room.strip().casefold() == told), None)
 
-    def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
+    def _logged(self, skill: Skill, given: list[base.RobotArgument], event: Event | None) -> base.RobotResult:
         """The robot's answer or its error, logged."""
         self._number += 1
         which = {"number": self._number, "skill": skill.name}
@@ -286,7 +286,7 @@ class LiveRobot:
         self._check_end()
         return result
 
-    def _done(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
+    def _done(self, skill: Skill, given: list[base.RobotArgument], event: Event | None) -> base.RobotResult:
         which = {"number": self._number, "skill": skill.name}
 
         def told(what: str | CameraPicture) -> None:
@@ -318,7 +318,7 @@ class LiveRobot:
             raise StoppedError
 
 
-def answered(skill: Skill, result: base.Result) -> base.Result:
+def answered(skill: Skill, result: base.RobotResult) -> base.RobotResult:
     """A robot's answer; raises RobotLostError if it does not fit the skill."""
     if not skill.returns.fits(result):
         expected = skill.returns.annotation
@@ -335,13 +335,13 @@ def _told(broken: RuleViolationError) -> dict[str, object]:
     return {"rule": rule.name, "says": rule.says, "formula": str(rule.formula), **what}
 
 
-def _text(argument: Argument) -> base.Argument:
+def _text(argument: Argument) -> base.RobotArgument:
     if not isinstance(argument, tuple):
         return argument
     return tuple(each.text if isinstance(each, Option) else each for each in argument)
 
 
-def _position(result: base.Result, event: Event) -> int:
+def _position(result: base.RobotResult, event: Event) -> int:
     """The number of the chosen option; its case and blanks may differ. Raises RobotError if it is none."""
     heard = str(result)
     for same in (str, lambda text: text.strip().casefold()):

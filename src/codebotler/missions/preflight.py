@@ -14,7 +14,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import answered
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
-from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -35,7 +35,7 @@ def preflight(
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
-    def told(skill: str, what: str) -> Result:
+    def told(skill: str, what: str) -> RobotResult:
         if skill not in can:
             return None
         try:

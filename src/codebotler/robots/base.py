@@ -16,12 +16,13 @@ from codebotler.robots.clock import Clock
 if TYPE_CHECKING:
     from codebotler.robots.ros.connection import Connection
 
-Argument: TypeAlias = Scalar | tuple[Scalar, ...]
+RobotArgument: TypeAlias = Scalar | tuple[Scalar, ...]
 """An argument of a skill: a single value, a list of values, or the options of a question."""
 
-Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
+RobotResult: TypeAlias = Scalar | list[str] | list[Scalar] | None
 """The result of a skill; for a question, the text of the chosen option."""
 
+STOP_BY_HAND = "STOP THE ROBOT BY HAND"
 ROS_PYTHON = Path("/usr/bin/python3")
 """The usual Python of a robot's ROS installation."""
 
@@ -84,8 +85,8 @@ class Robot(Protocol):
         """
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback, /
-    ) -> Result:
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback, /
+    ) -> RobotResult:
         """Execute a skill to its end; call it from one thread at a time.
 
         Args:

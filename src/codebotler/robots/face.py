@@ -16,11 +16,11 @@ from codebotler.core.words import counted
 from codebotler.core.world import Point
 from codebotler.robots.base import (
     AnswerError,
-    Argument,
     CancelledError,
     Feedback,
-    Result,
     Robot,
+    RobotArgument,
+    RobotResult,
     ignore_feedback,
 )
 from codebotler.robots.clock import Clock
@@ -209,8 +209,8 @@ class RobotWithFace:
         self._face.open()
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback
-    ) -> Result:
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Speak, or have the other robot perform the skill."""
         spoken = _speech_of(self.skills[skill])
         if spoken is None:

@@ -19,19 +19,19 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import plain
 from codebotler.core.words import listed
 from codebotler.robots.base import (
-    Argument,
+    STOP_BY_HAND,
     CancelledError,
     Feedback,
     NotReadyError,
     Options,
-    Result,
+    RobotArgument,
     RobotLostError,
+    RobotResult,
     ignore_feedback,
 )
 from codebotler.robots.clock import Clock
 
 STOP_SECONDS = 5.0  # for an async `stop`
-STOP_BY_HAND = "STOP THE ROBOT BY HAND"
 
 
 def is_own(name: str) -> bool:
@@ -105,7 +105,9 @@ class OwnRobot:
                 raise NotReadyError(f"{self.name} did not connect: {_describe(error)}") from error
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], _: Feedback = ignore_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], _: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Call the method of a skill.
 
         Raises:
@@ -121,7 +123,7 @@ class OwnRobot:
         given = [parameter.type.wanted(one) for parameter, one in zip(row.parameters, arguments, strict=True)]
         self._is_busy = True
         try:
-            result: Result = plain(self._finish(self._methods[skill](*given)))
+            result: RobotResult = plain(self._finish(self._methods[skill](*given)))
         except Exception as error:
             self._expect_no_stop()
             kind = type(error).__name__

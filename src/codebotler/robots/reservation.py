@@ -22,7 +22,7 @@ from codebotler.core.files import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
 DEFAULT_PORTS = {"ws": 80, "wss": 443, "http": 80, "https": 443}
-LOOPBACK = "127.0.0.1"
+LOOPBACK_ADDRESS = "127.0.0.1"
 
 
 class Reservation:
@@ -155,9 +155,9 @@ def normalize_address(address: str) -> str:
 
 def _normalize_host(host: str) -> str:
     if host in {"localhost", socket.gethostname().lower()}:
-        return LOOPBACK
+        return LOOPBACK_ADDRESS
     with suppress(ValueError):  # a name, not a number
         number = ip_address(host)
         number = getattr(number, "ipv4_mapped", None) or number
-        return LOOPBACK if number.is_loopback or number.is_unspecified else number.compressed
+        return LOOPBACK_ADDRESS if number.is_loopback or number.is_unspecified else number.compressed
     return host

@@ -14,12 +14,12 @@ from codebotler.core.trace import Option
 from codebotler.core.world import World, laid_out
 from codebotler.robots.base import (
     ROS_PYTHON,
-    Argument,
     CancelledError,
     Feedback,
     Options,
     Readiness,
-    Result,
+    RobotArgument,
+    RobotResult,
     ignore_feedback,
 )
 from codebotler.robots.clock import Clock
@@ -74,8 +74,8 @@ class Simulated:
         self.clock.restart()
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback
-    ) -> Result:
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Execute a skill; it takes time.
 
         Raises:
@@ -120,7 +120,7 @@ class Simulated:
             raise CancelledError
 
 
-def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[RobotArgument]) -> RobotResult:
     """Perform a skill in the simulator, with texts for options."""
     taken = robot.skills[skill].parameters
     given = [

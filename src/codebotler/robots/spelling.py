@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from codebotler.core.unicode import composed
-from codebotler.robots.base import Argument, Feedback, Result, Robot, ignore_feedback
+from codebotler.robots.base import Feedback, Robot, RobotArgument, RobotResult, ignore_feedback
 
 
 class SpellingRobot:
@@ -20,8 +20,8 @@ class SpellingRobot:
         return getattr(self._robot, name)
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback
-    ) -> Result:
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Execute a skill."""
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)

@@ -16,7 +16,7 @@ from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.models.recorded import open_recorded
-from codebotler.robots.base import CancelledError, Result, RobotLostError
+from codebotler.robots.base import CancelledError, RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.rules import PAPER
@@ -38,7 +38,7 @@ class Notes(list[tuple[str, dict[str, object]]]):
         return [event for event, _ in self]
 
 
-def live(answer: Callable[[str, str], Result] = lambda *_: None) -> tuple[LiveRobot, Notes]:
+def live(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> tuple[LiveRobot, Notes]:
     notes = Notes()
     return LiveRobot(Answering(answer), notes, place="hall"), notes
 
@@ -194,7 +194,7 @@ def test_robots_own_words_are_kept() -> None:
     ],
 )
 def test_answer_that_the_skill_does_not_have_loses_the_robot(
-    skill: str, arguments: list[str], answer: Result
+    skill: str, arguments: list[str], answer: RobotResult
 ) -> None:
     robot, _ = live(giving(answer))
     with pytest.raises(RobotLostError, match=f"answered {skill} with"):
@@ -231,7 +231,7 @@ def test_nothing_starts_after_a_stop() -> None:
 
 
 def test_robot_that_answers_after_a_stop_is_not_believed() -> None:
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         robot.stop()
         return True
 
@@ -242,7 +242,7 @@ def test_robot_that_answers_after_a_stop_is_not_believed() -> None:
 
 
 def test_error_after_a_stop_does_not_reach_the_program() -> None:
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         robot.stop()
         raise RobotError("GoToInvalidLocation", "the goal was cancelled")
 

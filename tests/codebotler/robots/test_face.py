@@ -19,7 +19,7 @@ from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import missing_skills
-from codebotler.robots.base import AnswerError, Argument, CancelledError, Options
+from codebotler.robots.base import AnswerError, CancelledError, Options, RobotArgument
 from codebotler.robots.face import (
     ASK_TIMEOUT,
     Face,
@@ -219,7 +219,7 @@ def test_a_stop_takes_the_question_back_at_once_and_nothing_more_is_spoken() -> 
         with pytest.raises(AnswerError, match="it was withdrawn"):
             face.answer(number, 0)
     assert isinstance(ended[0], CancelledError)
-    calls: list[tuple[str, list[Argument]]] = [
+    calls: list[tuple[str, list[RobotArgument]]] = [
         ("say", ["hello"]),
         ("ask", ["ann", "Tea?", ("Yes",)]),
         ("go_to", ["kitchen"]),

@@ -26,7 +26,7 @@ from codebotler.models.open import open_model
 from codebotler.models.recorded import open_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.robots.base import CancelledError, Result, Robot
+from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
@@ -440,7 +440,7 @@ def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> N
             super().cancel()
             told.set()
 
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         if not told.wait(10):
             return ["hall"]
         raise CancelledError
@@ -586,7 +586,7 @@ def test_viewers_are_woken_at_each_change(console: Console) -> None:
 
 def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
     """What a viewer does not read does not pile up anywhere: a view is all there is."""
-    answers: dict[str, Result] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
+    answers: dict[str, RobotResult] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
     robot = Answering(lambda skill, _: answers.get(skill))
     with desk_of(tmp_path, robot) as console:
         approved(console, "def task_program():\n    for n in range(300):\n        say(str(n))\n")

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 from codebotler.core.errors import UserError, install_command
 from codebotler.robots.base import (
     ROS_PYTHON,
-    Argument,
     Feedback,
     Options,
     Readiness,
-    Result,
+    RobotArgument,
+    RobotResult,
     ignore_feedback,
 )
 from codebotler.robots.simulated import Simulated, perform_at_once
@@ -50,8 +50,8 @@ class Pyrobosim(Simulated):
         }
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback
-    ) -> Result:
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Execute a skill; it takes time."""
         self._wait(0.0)
         self._update()

@@ -13,19 +13,20 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Point
 from codebotler.perception import Detector, PerceptionError, boxed, image_from_ros, jpeg_of, open_detector
 from codebotler.robots.base import (
-    Argument,
+    STOP_BY_HAND,
     CameraPicture,
     CancelledError,
     Feedback,
     NotReadyError,
-    Result,
+    RobotArgument,
+    RobotResult,
     ignore_feedback,
 )
 from codebotler.robots.places import NamedPlace, Places
 from codebotler.robots.ros.connection import SkillCall
 from codebotler.robots.ros.keepout import keepout_messages
 from codebotler.robots.ros.motion import Pose
-from codebotler.robots.ros.robot import STOP_BY_HAND, RosRobot
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.simulator.rule_guard import Rule
 
 POLL_SECONDS = 0.05
@@ -64,8 +65,8 @@ class ConnectedRobot(RosRobot):
             raise NotReadyError(sentence)
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback
-    ) -> Result:
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Answer from places and pose, look at a picture, or have the robot perform the skill."""
         connection = self.connection
         if skill in connection.cameras:

@@ -178,7 +178,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     whole, ros = _full_type(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
     definition = ros.definition if ros is not None and is_ours else ""
-    return SkillCall(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]
+    return SkillCall(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]  # kind is a str here
 
 
 def _full_type(kind: str, text: str) -> str:

@@ -12,15 +12,16 @@ from pathlib import Path
 from codebotler.core.errors import RobotError
 from codebotler.robots.base import (
     ROS_PYTHON,
-    Argument,
+    STOP_BY_HAND,
     CameraPicture,
     CancelledError,
     Feedback,
     NotReadyError,
     Options,
     Readiness,
-    Result,
+    RobotArgument,
     RobotLostError,
+    RobotResult,
     ignore_feedback,
 )
 from codebotler.robots.clock import Clock
@@ -29,7 +30,6 @@ from codebotler.robots.ros.connection import Connection, SkillCall, Values, defa
 from codebotler.robots.ros.worker import RosWorker, WorkerMessage, find_missing
 
 USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
-STOP_BY_HAND = "STOP THE ROBOT BY HAND"
 NOT_CANCELLED = f"its goals could not be cancelled: {STOP_BY_HAND}"
 CANCEL_SECONDS = 1.0  # for the worker to send a cancel
 NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
@@ -105,8 +105,8 @@ class RosRobot:
         self.clock.restart()
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = ignore_feedback
-    ) -> Result:
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Send a goal and wait for its end.
 
         Raises:
@@ -117,13 +117,13 @@ class RosRobot:
         names = (parameter.name for parameter in self.skills[skill].parameters)
         return self._call(skill, dict(zip(names, arguments, strict=True)), feedback)
 
-    def _call(self, skill: str, values: Values, feedback: Feedback) -> Result:
+    def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
         """Perform a skill by its call, with values for the call's variables."""
         call = self.connection.calls.get(skill)
         if call is None:
             raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
         request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
-        result: Result = call.answer(self._request(call, request, feedback))
+        result: RobotResult = call.answer(self._request(call, request, feedback))
         return result
 
     def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:

@@ -13,7 +13,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import World
-from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
+from codebotler.robots.base import ROS_PYTHON, CancelledError, RobotArgument, RobotLostError
 from codebotler.robots.ros.connection import default_connection
 from codebotler.robots.ros.robot import calls_data
 from codebotler.robots.ros.ros1 import master_uri
@@ -151,7 +151,7 @@ class VirtualRobot:
             self._show("  " + " ".join(str(part) for part in ending.values()))
             worker.send({**ending, "id": number})
 
-    def _ending(self, skill: str, arguments: Sequence[Argument]) -> WorkerMessage:
+    def _ending(self, skill: str, arguments: Sequence[RobotArgument]) -> WorkerMessage:
         try:
             return {"do": "succeed", "value": self._body.perform(skill, arguments)}
         except RobotError as error:
