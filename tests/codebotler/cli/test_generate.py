@@ -164,7 +164,7 @@ def test_the_prompt_for_a_local_model_says_which_form_it_is() -> None:
     [
         ("nonsense", ['"nonsense"', "recorded, "]),
         ("hf:", ['"hf:"', "recorded, "]),
-        ("recorded:lazy", ['"recorded:lazy"', "recorded:careful, "]),
+        ("recorded:lazy", ['"recorded:lazy"', "recorded:careful or "]),
     ],
 )
 def test_no_prompt_is_shown_for_a_model_that_is_none(model: str, named: list[str]) -> None:
