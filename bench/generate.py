@@ -25,7 +25,7 @@ from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers.openai import OpenAIProvider
 from pydantic_ai.settings import ModelSettings
 
-from codebotler.models.chat import messages_of
+from codebotler.models.chat import to_messages
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.sampling import SamplingSettings
@@ -41,7 +41,7 @@ def bare_chat(url: str) -> Callable[[], Awaitable[object]]:
     """A request with pydantic-ai alone."""
     model = OpenAIChatModel("m", provider=OpenAIProvider(base_url=url))
     asked = ModelSettings(temperature=0.2, top_p=0.95, max_tokens=512, max_retries=0)
-    messages: list[ModelMessage] = messages_of(prompt_for(INSTRUCTION).messages)
+    messages: list[ModelMessage] = to_messages(prompt_for(INSTRUCTION).messages)
 
     async def ask() -> object:
         async with model_request_stream(model, messages, model_settings=asked) as stream:
@@ -76,7 +76,7 @@ def bare_completions(url: str) -> Callable[[], Awaitable[object]]:
 def ours(name: str, url: str) -> Callable[[], Awaitable[object]]:
     """Our path from the instruction to the program."""
     model = RateLimited(open_model(name, SamplingSettings(base_url=url)), token_budget=10**9)
-    return lambda: model.reply(prompt_for(INSTRUCTION), number=0, heard=lambda _piece: None)
+    return lambda: model.reply(prompt_for(INSTRUCTION), number=0, on_text=lambda _piece: None)
 
 
 async def paired(count: int, *asks: Callable[[], Awaitable[object]]) -> list[list[float]]:

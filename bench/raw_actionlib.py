@@ -15,11 +15,11 @@ sys.path.insert(0, sys.argv[1])
 import actionlib
 import rospy
 
-from message_types import message_types
+from message_types import action_types
 
 rospy.init_node("raw", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
 action = json.loads(sys.argv[2])
-spec = message_types([action])[action["type"]]
+spec = action_types([action])[action["type"]]
 client = actionlib.ActionClient(action["server"], spec)
 client.wait_for_server()
 goal = type(spec().action_goal.goal)

@@ -20,10 +20,10 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options, Robot
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.ros.connection import default_connection
 from codebotler.robots.ros.robot import calls_data
 from codebotler.robots.ros.virtual import VirtualRobot
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 
 GOALS = int(os.environ.get("GOALS", "500"))
 ROUNDS = 5
@@ -36,9 +36,9 @@ WORLD = World((Room("hall"), Room("kitchen")), "hall")
 def raw(robot: VirtualRobot, goals: int) -> list[float]:
     """The seconds that each goal takes by actionlib's own client."""
     script = str(Path(__file__).with_name("raw_actionlib.py"))
-    action = json.dumps(calls_data(connection_of(SKILLS))["say"])
+    action = json.dumps(calls_data(default_connection(SKILLS))["say"])
     done = subprocess.run(
-        [str(ROS_PYTHON), script, str(WORKERS), action, str(goals)],
+        [str(ROS_PYTHON), script, str(WORKERS_FOLDER), action, str(goals)],
         env={**os.environ, "ROS_MASTER_URI": robot.address},
         stdout=subprocess.PIPE,
         check=True,

@@ -20,13 +20,13 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room, World
 from codebotler.robots.base import NotReadyError, Options, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.ros2 import python_of
+from codebotler.robots.ros.ros2 import choose_python
 from codebotler.robots.ros.virtual import VirtualRobot
 
 CONNECTIONS = int(os.environ.get("CONNECTIONS", "200"))
 GOALS = int(os.environ.get("GOALS", "10"))
 IDLE = 10  # connections
-PYTHON = Path(os.environ.get("ROS2_PYTHON") or python_of())
+PYTHON = Path(os.environ.get("ROS2_PYTHON") or choose_python())
 WORLD = World((Room("hall"), Room("kitchen")), "hall")
 LOST = (NotReadyError, RobotError, RobotLostError)
 

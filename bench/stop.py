@@ -24,14 +24,22 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, events_of
 from codebotler.missions.mission import Mission
-from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Result, Robot, no_feedback
-from codebotler.robots.open import all_readiness, open_robot
+from codebotler.robots.base import (
+    CancelledError,
+    Feedback,
+    Options,
+    Robot,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
+)
+from codebotler.robots.open import check_readiness, open_robot
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.ros2 import NEEDS, python_of
+from codebotler.robots.ros.ros2 import ROS2_MODULES, choose_python
 from codebotler.robots.ros.virtual import VirtualRobot
-from codebotler.robots.ros.worker import WORKERS, lacks
+from codebotler.robots.ros.worker import WORKERS_FOLDER, find_missing
 from codebotler.robots.simulated import Simulated
 
 STOPS = int(os.environ.get("STOPS", "50"))
@@ -39,7 +47,7 @@ AIM = 100.0
 PROGRAM = "def task_program():\n    go_to('far away')\n"
 WORLD = World((Room("here", stand_at=(0.0, 0.0)), Room("far away", stand_at=(1e5, 0.0))), "here")
 TESTS = Path(__file__).parents[1] / "tests" / "ros2"
-ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or python_of())
+ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or choose_python())
 NAV2 = """
 places: places.yaml
 packages: [{packages}]
@@ -61,7 +69,9 @@ class Timed(Simulated):
         self.told = self.told or time.perf_counter()
         super().cancel()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = no_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Remember when it was ended."""
         try:
             return super().perform(skill, arguments, told)
@@ -198,7 +208,7 @@ def by_nav2(home: Path) -> Iterator[Times]:
     (home / "places.yaml").write_text("places: {far away: {x: 9, y: 9}}\n")
     options = Options(ros_python=ROS2_PYTHON, skills=SKILLS, connection=read_connection(path, SKILLS))
     with subprocess.Popen(
-        [str(ROS2_PYTHON), str(stand_in), str(WORKERS)],
+        [str(ROS2_PYTHON), str(stand_in), str(WORKERS_FOLDER)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -244,8 +254,8 @@ def main() -> int:
             report("simulated, Mission.stop", list(by_call(home))),
             report("simulated, Ctrl-C", list(by_signal(home))),
         ]
-        works = {kind.name: kind.works for kind in all_readiness()}
-        works |= {"nav2": lacks(ROS2_PYTHON, NEEDS) == []}
+        works = {kind.name: kind.works for kind in check_readiness()}
+        works |= {"nav2": find_missing(ROS2_PYTHON, ROS2_MODULES) == []}
         for name, rows in (("ros1", by_ros1), ("pyrobosim", by_pyrobosim), ("nav2", by_nav2)):
             if works[name]:
                 hold.append(report(f"{name}, Mission.stop", list(rows(home))))

@@ -15,7 +15,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from codebotler.core.files import to_line
-from codebotler.models.no_program import IN_WORDS
+from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from command_line import forked
 from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer
@@ -177,7 +177,7 @@ def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
     with serving(few_runs) as server:
         page = opened(server, f"runs/hasty/{name}")
         expect(page.locator(".facts .state")).to_have_text("no program: cut-off")
-        expect(page.locator(".worlds-of .trouble")).to_have_text(IN_WORDS["cut-off"])
+        expect(page.locator(".worlds-of .trouble")).to_have_text(NO_PROGRAM_SENTENCES["cut-off"])
         expect(page.locator(".world-of")).to_have_count(0)
         reply = page.locator(".reply")
         expect(reply).to_contain_text("512 of the reply")

@@ -16,8 +16,8 @@ from playwright.sync_api import expect
 
 from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.face import without_speech
-from codebotler.robots.ros.ros1 import MEND, NEEDS
-from codebotler.robots.ros.worker import lacks
+from codebotler.robots.ros.ros1 import INSTALL_ROS1, ROS1_MODULES
+from codebotler.robots.ros.worker import find_missing
 from faces import SPEAKING
 from pageserver import WORLD, PageServer
 from ros_graph import Graph
@@ -39,9 +39,9 @@ WAITS = """def task_program():
 
 @pytest.fixture
 def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
-    missing = lacks(ROS_PYTHON, (*NEEDS, "rosmaster"))
+    missing = find_missing(ROS_PYTHON, (*ROS1_MODULES, "rosmaster"))
     if missing is None or missing:
-        pytest.skip(f"{ROS_PYTHON} lacks {missing or 'Python'}: {MEND}")
+        pytest.skip(f"{ROS_PYTHON} lacks {missing or 'Python'}: {INSTALL_ROS1}")
     for name, value in (("ROS_HOME", "ros"), ("ROS_LOG_DIR", "ros/log")):
         monkeypatch.setenv(name, str(tmp_path / value))
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")

@@ -11,22 +11,22 @@ from typing import Any
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import Options
 from codebotler.robots.ros import ros2
-from codebotler.robots.ros.robot import RosRobot, Waits
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros_graph import Process
 
 HERE = Path(__file__).parents[1] / "ros2"
 SERVER = HERE / "ros2_action_servers.py"
 PROFILE = HERE / "loopback.xml"
-ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or ros2.python_of())
-SHORT = Waits(patience=3.0, silence=0.5, longest=20.0)
+ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or ros2.choose_python())
+SHORT = Timeouts(patience=3.0, silence=0.5, longest=20.0)
 
 
 BUILD = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from ros2_types import built
-print("at", built(sys.argv[2], json.loads(sys.argv[3])))
+from ros2_types import build_package
+print("at", build_package(sys.argv[2], json.loads(sys.argv[3])))
 """
 
 
@@ -34,7 +34,7 @@ def installed(package: str, definitions: dict[str, str]) -> str:
     """Build a package unless that was done before; what is on the path if it is installed."""
     actions = {f"action/{name}": text for name, text in definitions.items()}
     done = subprocess.run(
-        [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS), package, json.dumps(actions)],
+        [str(ROS2_PYTHON), "-c", BUILD, str(WORKERS_FOLDER), package, json.dumps(actions)],
         capture_output=True,
         text=True,
         check=True,
@@ -62,12 +62,12 @@ class Scene:
 
     def serve_as(self, actions: list[list[str]]) -> Process:
         """An action server for each type, name and definition."""
-        server = Process(SERVER, str(WORKERS), json.dumps(actions), python=ROS2_PYTHON)
+        server = Process(SERVER, str(WORKERS_FOLDER), json.dumps(actions), python=ROS2_PYTHON)
         self.processes.append(server)
         server.expect("ready")
         return server
 
-    def robot(self, waits: Waits = SHORT, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
+    def robot(self, waits: Timeouts = SHORT, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
         skills = options.pop("skills", None) or SkillTable(tuple(self.served))  # others would be waited for
         robot = ros2.robot(Options(ros_python=ROS2_PYTHON, skills=skills, **options), waits)
         self.robots.append(robot)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 
@@ -39,7 +39,7 @@ class Scripted:
     most: int = 0
     closed: bool = False
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         self.asked.append((prompt.instruction, number))
         self.under_way += 1
         self.most = max(self.most, self.under_way)
@@ -50,7 +50,7 @@ class Scripted:
             if self.seconds:
                 await asyncio.sleep(random.uniform(0, 2 * self.seconds))
             text = self.text.format(number=number)
-            heard(text)
+            on_text(text)
             self._note("answered", prompt, number)
             return Reply(text, text, Usage(100, 10), self.seconds, "stop")
         finally:

@@ -14,7 +14,7 @@ import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
 
-from message_types import message_types
+from message_types import action_types
 
 ABORTS = {
     "abort": "the door is shut",
@@ -114,7 +114,7 @@ if "KNOWS_LATE" in os.environ:
     know_late(float(os.environ["KNOWS_LATE"]))
 rospy.init_node("servers", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
 actions = json.loads(sys.argv[2])
-specs = message_types([{"type": kind, "definition": text} for kind, _, text in actions])
+specs = action_types([{"type": kind, "definition": text} for kind, _, text in actions])
 servers = [Server(name, specs[kind]) for kind, name, _ in actions]
 tell("ready")
 sys.stdin.read()

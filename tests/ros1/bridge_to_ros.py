@@ -17,7 +17,7 @@ import genpy.message
 import rospy
 
 from channel import SetupError
-from message_types import as_data, installed, message_types
+from message_types import action_types, as_data, import_type
 
 LOCK = threading.Lock()
 SUBSCRIBED: dict[str, Any] = {}
@@ -29,7 +29,7 @@ def tell(**message: Any) -> None:
 
 
 def known_types() -> dict[str, Any]:
-    specs = message_types(json.loads(sys.argv[2])).values()
+    specs = action_types(json.loads(sys.argv[2])).values()
     made = [spec() for spec in specs]
     parts = [type(part) for a in made for part in (a.action_goal, a.action_result, a.action_feedback)]
     return {
@@ -41,7 +41,7 @@ def type_of(kind: str, types: dict[str, Any], folder: str = "msg") -> Any:
     if kind in types:
         return types[kind]
     try:
-        return installed(kind, folder)
+        return import_type(kind, folder)
     except SetupError:
         tell(op="status", level="error", msg=f"Unable to import {kind}")
         return None

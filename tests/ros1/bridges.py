@@ -17,9 +17,9 @@ from websockets.sync.server import ServerConnection, serve
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.ros.connection import default_connection
 from codebotler.robots.ros.robot import calls_data
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 
 ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
 
@@ -73,11 +73,11 @@ def over_ros(
         skills: whose messages it knows.
         table: all of them.
     """
-    actions = [action for skill, action in calls_data(connection_of(table)).items() if skill in skills]
+    actions = [action for skill, action in calls_data(default_connection(table)).items() if skill in skills]
 
     def handle(connection: ServerConnection) -> None:
         with subprocess.Popen(
-            [str(ROS_PYTHON), str(ROS_SIDE), str(WORKERS), json.dumps(actions)],
+            [str(ROS_PYTHON), str(ROS_SIDE), str(WORKERS_FOLDER), json.dumps(actions)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

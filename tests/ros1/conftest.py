@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros.ros1 import MEND, NEEDS
-from codebotler.robots.ros.worker import lacks
+from codebotler.robots.ros.ros1 import INSTALL_ROS1, ROS1_MODULES
+from codebotler.robots.ros.worker import find_missing
 from ros_graph import Graph
 
 HERE = Path(__file__).parent
@@ -17,10 +17,10 @@ HERE = Path(__file__).parent
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     messages = ("move_base_msgs", "nav_msgs", "sensor_msgs", "std_srvs", "tf2_msgs")
-    missing = lacks(ROS_PYTHON, (*NEEDS, "rosmaster", *messages))
+    missing = find_missing(ROS_PYTHON, (*ROS1_MODULES, "rosmaster", *messages))
     if missing is None or missing:
         packages = " ".join(f"python3-{name.replace('_', '-')}" for name in messages)
-        reason = f"{ROS_PYTHON} lacks {missing or 'Python'}: {MEND} {packages}"
+        reason = f"{ROS_PYTHON} lacks {missing or 'Python'}: {INSTALL_ROS1} {packages}"
         for item in items:
             if HERE in item.path.parents:
                 item.add_marker(pytest.mark.skip(reason=reason))

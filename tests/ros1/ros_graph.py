@@ -18,8 +18,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import ros1
-from codebotler.robots.ros.robot import RosRobot, Waits
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 
 HERE = Path(__file__).parent
 MASTER = HERE / "ros_master.py"
@@ -100,13 +100,15 @@ class Graph:
     def serve(self, *skills: Skill, **environment: str) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
         actions = [[s.ros.type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
-        server = Process(SERVER, str(WORKERS), json.dumps(actions), environment=environment, master=self.uri)
+        server = Process(
+            SERVER, str(WORKERS_FOLDER), json.dumps(actions), environment=environment, master=self.uri
+        )
         self.processes.append(server)
         server.expect("ready")
         return server
 
-    def robot(self, waits: Waits | None = None, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
-        short = Waits(patience=1.5, silence=1.5, longest=20.0)
+    def robot(self, waits: Timeouts | None = None, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
+        short = Timeouts(patience=1.5, silence=1.5, longest=20.0)
         robot = ros1.robot(Options(address=self.uri, **options), waits or short)
         self.robots.append(robot)
         return robot
@@ -139,8 +141,8 @@ def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
 INSTALLED = """
 import sys
 sys.path.insert(0, {worker!r})
-from message_types import action_type
-action = action_type("robot_actions_pkg", {name!r}, {definition!r})()
+from message_types import generate_action
+action = generate_action("robot_actions_pkg", {name!r}, {definition!r})()
 wholes = (action.action_goal, action.action_result, action.action_feedback)
 parts = (action.action_goal.goal, action.action_result.result, action.action_feedback.feedback)
 for part in (action, *wholes, *parts):
@@ -153,6 +155,6 @@ def installed(folder: Path, name: str, definition: str) -> str:
     package = folder / "robot_actions_pkg" / "msg"
     package.mkdir(parents=True)
     package.with_name("__init__.py").touch()
-    code = INSTALLED.format(worker=str(WORKERS), name=name, definition=definition)
+    code = INSTALLED.format(worker=str(WORKERS_FOLDER), name=name, definition=definition)
     (package / "__init__.py").write_text(code)
     return str(folder)

@@ -14,11 +14,11 @@ import pytest
 from bridges import bridge, over_ros
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
-from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
+from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.ros import ros1, rosbridge
 from codebotler.robots.ros.connected import ConnectedRobot
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.robot import RosRobot, Timeouts
 from ros_graph import HERE, LONG, Graph, Process, started
 
 CONNECTION = """\
@@ -48,7 +48,7 @@ def open_door(sim: Simulation) -> None:
     \"\"\"Open the door.\"\"\"
 """
 SAY = "skills: {say: {topic: /speech, type: std_msgs/String, message: {data: $message}}}"
-WAITS = Waits(patience=3.0, silence=1.5, longest=20.0)
+WAITS = Timeouts(patience=3.0, silence=1.5, longest=20.0)
 BOTH = pytest.mark.parametrize("kind", ["ros1", "rosbridge"])
 
 
@@ -106,7 +106,7 @@ def test_skills_are_what_the_file_maps(robots: Robots, kind: str) -> None:
     assert robot.missing == {}
     assert robot.perform("get_all_rooms", []) == ["dock", "lab", "moon", "mars"]
     assert robot.perform("get_current_location", []) == "dock"
-    reported: list[str | Picture] = []
+    reported: list[str | CameraPicture] = []
     robot.perform("go_to", ["Lab"], reported.append)
     assert told(move_base, "goal") == [2.0, 0.0, 1.57, "map"]
     assert any(str(one).startswith("at (1.") for one in reported)

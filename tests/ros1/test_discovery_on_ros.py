@@ -7,7 +7,7 @@ import yaml
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import ROS_PYTHON, NotReadyError
-from codebotler.robots.ros.discovery import first_connection, offers_of
+from codebotler.robots.ros.discovery import discover_offers, draft_connection
 from ros_graph import HERE, Graph, Process
 
 
@@ -15,7 +15,7 @@ def test_file_has_what_robots_offer(graph: Graph) -> None:
     graph.serve(SKILLS["is_in_room"])
     graph.processes.append(offers := Process(HERE / "ros1_offers.py", master=graph.uri))
     offers.expect("ready")
-    text = first_connection("ros1", offers_of("ros1", graph.uri, ROS_PYTHON))
+    text = draft_connection("ros1", discover_offers("ros1", graph.uri, ROS_PYTHON))
     assert yaml.safe_load(text) == {
         "robot": "ros1",
         "pose": {"topic": "/amcl_pose"},
@@ -36,9 +36,9 @@ def test_file_has_what_robots_offer(graph: Graph) -> None:
 
 def test_graph_without_nodes_is_said(graph: Graph) -> None:
     with pytest.raises(NotReadyError, match=graph.uri):
-        offers_of("ros1", graph.uri, ROS_PYTHON)
+        discover_offers("ros1", graph.uri, ROS_PYTHON)
 
 
 def test_missing_master_is_said() -> None:
     with pytest.raises(NotReadyError, match="no ROS master"):
-        offers_of("ros1", "http://localhost:1", ROS_PYTHON)
+        discover_offers("ros1", "http://localhost:1", ROS_PYTHON)

@@ -14,7 +14,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import CancelledError
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.ros1 import MEND
+from codebotler.robots.ros.ros1 import INSTALL_ROS1
 from error_tables import errors_on, unsaid
 from ros_graph import Graph, Process, free_port, installed, started
 
@@ -23,7 +23,7 @@ PAGE, ROS2 = ((DOCS / name).read_text() for name in ("ros1.md", "ros.md"))
 
 
 def test_the_packages_are_those_that_are_needed() -> None:
-    assert re.sub(r" \\\n +", " ", PAGE).count(MEND) == 1
+    assert re.sub(r" \\\n +", " ", PAGE).count(INSTALL_ROS1) == 1
 
 
 def test_two_commands_are_the_whole_path(tmp_path: Path) -> None:

@@ -17,10 +17,10 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import rosbridge
-from codebotler.robots.ros.connection import connection_of
-from codebotler.robots.ros.robot import RosRobot, Waits, calls_data
+from codebotler.robots.ros.connection import default_connection
+from codebotler.robots.ros.robot import RosRobot, Timeouts, calls_data
 from codebotler.robots.ros.virtual import VirtualRobot
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros_graph import Graph
 
 SKILLS = """
@@ -59,7 +59,7 @@ def table_(tmp_path: Path) -> SkillTable:
 def robot_(request: pytest.FixtureRequest, graph: Graph, table: SkillTable) -> Iterator[RosRobot]:
     virtual = VirtualRobot(World((Room("hall"),), "hall"), speed=None, port=graph.port, skills=table)
     virtual.start()
-    waits = Waits(patience=10.0, silence=5.0, longest=20.0)
+    waits = Timeouts(patience=10.0, silence=5.0, longest=20.0)
     if request.param == "ros1":
         yield graph.robot(waits, skills=table)
     else:
@@ -88,11 +88,11 @@ def test_values_of_every_type_go_there_and_back(robot: RosRobot) -> None:
 def test_messages_belong_to_the_package_that_a_skill_names(table: SkillTable) -> None:
     actions = [
         action
-        for name, action in calls_data(connection_of(table)).items()
+        for name, action in calls_data(default_connection(table)).items()
         if name in {"mix", "sum_up", "say"}
     ]
     said = subprocess.run(
-        [str(ROS_PYTHON), "-c", TYPES, str(WORKERS), json.dumps(actions)],
+        [str(ROS_PYTHON), "-c", TYPES, str(WORKERS_FOLDER), json.dumps(actions)],
         capture_output=True,
         text=True,
         check=True,
@@ -107,6 +107,6 @@ def test_messages_belong_to_the_package_that_a_skill_names(table: SkillTable) ->
 TYPES = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from message_types import message_types
-print(*(spec._type for spec in message_types(json.loads(sys.argv[2])).values()))
+from message_types import action_types
+print(*(spec._type for spec in action_types(json.loads(sys.argv[2])).values()))
 """

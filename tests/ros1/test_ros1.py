@@ -19,10 +19,17 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, RosAction, Skill
 from codebotler.core.skills.values import TRUTH_TYPE, ValueType
-from codebotler.robots.base import ROS_PYTHON, CancelledError, NotReadyError, Options, Picture, RobotLostError
+from codebotler.robots.base import (
+    ROS_PYTHON,
+    CameraPicture,
+    CancelledError,
+    NotReadyError,
+    Options,
+    RobotLostError,
+)
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.robot import RosRobot, Waits
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
 
 
@@ -152,7 +159,7 @@ def test_server_that_dies_in_a_goal_is_noticed_and_may_come_back(graph: Graph) -
 def test_goal_that_does_not_end_is_cancelled(graph: Graph, goal: str, named: str) -> None:
     server = graph.serve(GO_TO)
     longest = 1.0 if goal == "never" else 20.0
-    robot = graph.robot(waits=Waits(patience=1.5, silence=3.0, longest=longest))
+    robot = graph.robot(waits=Timeouts(patience=1.5, silence=3.0, longest=longest))
     robot.connect()
     with pytest.raises(RobotLostError, match=named):
         robot.perform("go_to", [goal])
@@ -214,7 +221,7 @@ def test_cancel_right_after_a_goal_always_ends_it(graph: Graph) -> None:
 
 def test_cancel_while_a_server_is_waited_for(graph: Graph) -> None:
     graph.serve(GO_TO)
-    robot = graph.robot(waits=Waits(patience=2.0))
+    robot = graph.robot(waits=Timeouts(patience=2.0))
     robot.connect()
     with started(lambda: robot.perform("say", ["hello"])) as ended:
         while robot._number == 0:
@@ -264,7 +271,7 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None
 
 def test_stop_works_where_the_worker_hangs(graph: Graph) -> None:
     server = graph.serve(GO_TO)
-    robot = graph.robot(waits=Waits(patience=LONG))  # too long for its silence to be noticed
+    robot = graph.robot(waits=Timeouts(patience=LONG))  # too long for its silence to be noticed
     robot.connect()
     with started(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
@@ -277,7 +284,7 @@ def test_stop_works_where_the_worker_hangs(graph: Graph) -> None:
 
 def test_stop_works_where_the_worker_hangs_before_it_took_the_goal(graph: Graph) -> None:
     graph.serve(*SKILLS.rows)
-    robot = graph.robot(waits=Waits(patience=LONG))
+    robot = graph.robot(waits=Timeouts(patience=LONG))
     robot.connect()
     assert robot._worker is not None
     os.kill(robot._worker._process.pid, signal.SIGSTOP)
@@ -382,7 +389,7 @@ def test_goal_that_is_cancelled_before_it_is_sent_never_is(graph: Graph, tmp_pat
     server = graph.serve(SAY)
     script = tmp_path / "cancelled.py"
     script.write_text(CANCELLED)
-    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKERS)}
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKERS_FOLDER)}
     robot = RosRobot("ros1", graph.uri, str(script), Options(), environment)
     robot.connect()
     with pytest.raises(CancelledError):
@@ -433,7 +440,7 @@ class Late(Ros1Worker):
         left_behind = super().connect(start)
         other = "import rospy; rospy.init_node('codebotler', disable_signals=True); rospy.sleep({LONG})"
         self.other = subprocess.Popen([sys.executable, "-c", other])
-        while not self.graph.is_left():
+        while not self.graph.has_left():
             time.sleep(0.01)
         return left_behind
     def missing(self):
@@ -448,8 +455,8 @@ def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_pa
     graph.serve(GO_TO)
     script = tmp_path / "late.py"
     script.write_text(LATE)
-    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKERS)}
-    robot = RosRobot("ros1", graph.uri, str(script), Options(), environment, waits=Waits(patience=LONG))
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKERS_FOLDER)}
+    robot = RosRobot("ros1", graph.uri, str(script), Options(), environment, waits=Timeouts(patience=LONG))
     began = time.monotonic()
     with pytest.raises(NotReadyError, match="node called /codebotler"):
         robot.connect()
@@ -519,7 +526,7 @@ def test_installed_messages_are_preferred_and_their_feedback_is_told(
     graph.serve(GO_TO, SAY)
     robot = graph.robot()
     robot.connect()
-    told: list[str | Picture] = []
+    told: list[str | CameraPicture] = []
     robot.perform("go_to", ["feedback"], told.append)
     assert told == ["near: the hall"]
     robot.perform("say", ["hello"])
@@ -528,8 +535,8 @@ def test_installed_messages_are_preferred_and_their_feedback_is_told(
 MD5 = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from message_types import message_types
-for name, spec in message_types(json.loads(sys.argv[2])).items():
+from message_types import action_types
+for name, spec in action_types(json.loads(sys.argv[2])).items():
     a = spec()
     for part in (a, a.action_goal, a.action_result, a.action_feedback,
                  a.action_goal.goal, a.action_result.result, a.action_feedback.feedback):
@@ -548,7 +555,7 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
 
     actions = [{"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None]
     said = subprocess.run(
-        [str(ROS_PYTHON), "-c", MD5, str(WORKERS), json.dumps(actions)],
+        [str(ROS_PYTHON), "-c", MD5, str(WORKERS_FOLDER), json.dumps(actions)],
         capture_output=True,
         text=True,
         check=True,
@@ -576,6 +583,6 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
         assert made[f"{name}Action"][0] == action
 
 
-@pytest.mark.parametrize("path", sorted(p for p in WORKERS.glob("*.py") if "rosbridge" not in p.name))
+@pytest.mark.parametrize("path", sorted(p for p in WORKERS_FOLDER.glob("*.py") if "rosbridge" not in p.name))
 def test_workers_are_read_by_python_3_8(path: Path) -> None:
     ast.parse(path.read_text(), feature_version=(3, 8))

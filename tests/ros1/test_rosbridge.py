@@ -22,17 +22,17 @@ from websockets.sync.server import ServerConnection
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
+from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import rosbridge
-from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.robot import RosRobot, Timeouts
 from processes import are_gone, children_of
 from ros_graph import GO_TO, SAY, Graph, free_port, started
 
-WAITS = Waits(patience=5.0, silence=1.5, longest=20.0)
+WAITS = Timeouts(patience=5.0, silence=1.5, longest=20.0)
 
 
-def behind(address: str, waits: Waits | None = None) -> RosRobot:
+def behind(address: str, waits: Timeouts | None = None) -> RosRobot:
     return rosbridge.robot(Options(address=address), waits)
 
 
@@ -121,7 +121,7 @@ def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: RosRobot) ->
 
 def test_server_that_sends_no_result_is_noticed(graph: Graph, double: Bridge) -> None:
     graph.serve(GO_TO)
-    robot = behind(double.address, Waits(patience=4.0))
+    robot = behind(double.address, Timeouts(patience=4.0))
     robot.connect()
     with pytest.raises(RobotLostError, match=r"/go_to_server .*no result .*4 s"):
         robot.perform("go_to", ["no result"])
@@ -147,7 +147,7 @@ def test_messages_that_the_robot_does_not_know_are_said(graph: Graph) -> None:
 
 def test_robot_that_does_not_stop_is_said_not_to(graph: Graph, double: Bridge) -> None:
     server = graph.serve(GO_TO)
-    robot = behind(double.address, Waits(patience=2.0))
+    robot = behind(double.address, Timeouts(patience=2.0))
     robot.connect()
     with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
         server.expect("goal", "never, whatever you say")
@@ -243,14 +243,14 @@ def heard() -> list[dict[str, Any]]:
 @pytest.fixture
 def second(heard: list[dict[str, Any]]) -> Iterator[RosRobot]:
     with bridge(like_ros_2(heard)) as double:
-        robot = behind(double.address, Waits(patience=1.0, longest=2.0))
+        robot = behind(double.address, Timeouts(patience=1.0, longest=2.0))
         robot.connect()
         yield robot
         robot.disconnect()
 
 
 def test_stand_in_for_ros_2_executes_goals(second: RosRobot, heard: list[dict[str, Any]]) -> None:
-    told: list[str | Picture] = []
+    told: list[str | CameraPicture] = []
     assert second.perform("ask", ["ann", "tea?", ("yes", "no")], told.append) == "yes"
     assert told == ["near: the hall"]
     sent = heard[-1]
@@ -297,7 +297,7 @@ def test_message_that_is_none_is_survived_and_shown(
             connection.send(json.dumps(message))
 
     with bridge(handle) as double:
-        robot = behind(double.address, Waits(patience=1.0))
+        robot = behind(double.address, Timeouts(patience=1.0))
         robot.connect()
         with pytest.raises(RobotLostError, match=r"no action server .*/say_server") as error:
             robot.perform("say", ["hello"])

@@ -18,11 +18,11 @@ from codebotler.core.errors import RobotError
 from codebotler.core.trace import Status
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros.virtual import VirtualRobot
-from codebotler.robots.simulated import ROBOT_RULES
+from codebotler.robots.simulated import SIMULATED_RULES, Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
@@ -84,11 +84,11 @@ def test_goals_wait_for_each_other_and_one_that_waits_can_be_cancelled(virtual: 
 def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
     paper: Suite, graph: Graph
 ) -> None:
-    model = recorded_model("recorded:careful")
+    model = open_recorded("recorded:careful")
     tasks = [(task.name, task.prompts[0], task.scenarios[0].world) for task in paper.tasks.values()]
     programs = [model.solution(instruction, 0).program for _, instruction, _ in tasks]
     worlds = [world for _, _, world in tasks]
-    simulated = list(run(zip(programs, worlds, strict=True), workers=1, rules=ROBOT_RULES))
+    simulated = list(run(zip(programs, worlds, strict=True), workers=1, rules=SIMULATED_RULES))
     assert len(tasks) == 16
 
     virtual = VirtualRobot(worlds[0], speed=SPEED, port=graph.port)
@@ -97,9 +97,10 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
     worker = Worker()
     try:
         for (name, _, world), program, expected in zip(tasks, programs, simulated, strict=True):
-            virtual._body = virtual._at_start(world)
+            virtual._body = Simulated(world, speed=SPEED)
+            virtual._body.connect()
             robot.connect()
-            live = LiveRobot(robot, lambda *_, **__: None, clock_starts=ROBOT_RULES.clock_starts)
+            live = LiveRobot(robot, lambda *_, **__: None, clock_starts=SIMULATED_RULES.clock_starts)
             outcome = worker.run_live(program, live)
             assert outcome.status == Status.FINISHED == expected.status, (name, outcome)
             assert outcome.trace == expected.trace, name

@@ -12,8 +12,8 @@ import pytest
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.reservation import lock_folder
-from codebotler.robots.ros.ros2 import INSTALL, NEEDS
-from codebotler.robots.ros.worker import lacks
+from codebotler.robots.ros.ros2 import INSTALL_ROS2, ROS2_MODULES
+from codebotler.robots.ros.worker import find_missing
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
 
 HERE = Path(__file__).parent
@@ -21,9 +21,9 @@ DOMAINS = range(41, 100)  # each test process has a graph of its own
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    missing = lacks(ROS2_PYTHON, NEEDS)
+    missing = find_missing(ROS2_PYTHON, ROS2_MODULES)
     if missing is None or missing:
-        reason = f"{ROS2_PYTHON} lacks {missing or 'Python'}: {INSTALL}"
+        reason = f"{ROS2_PYTHON} lacks {missing or 'Python'}: {INSTALL_ROS2}"
         for item in items:
             if HERE in item.path.parents:
                 item.add_marker(pytest.mark.skip(reason=reason))

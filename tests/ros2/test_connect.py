@@ -16,11 +16,11 @@ from codebotler.checking.rules import read_rules
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.missions.progress import AT
-from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
+from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros.connected import ConnectedRobot
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.robot import Waits
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.robot import Timeouts
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, SHORT, Scene
 from ros_graph import LONG, Process, started
 
@@ -64,12 +64,12 @@ class Robots:
         self.scene, self.folder = scene, folder
 
     def nav2(self, *options: str) -> Process:
-        process = Process(STAND_IN, str(WORKERS), *options, python=ROS2_PYTHON)
+        process = Process(STAND_IN, str(WORKERS_FOLDER), *options, python=ROS2_PYTHON)
         self.scene.processes.append(process)
         process.expect("ready")
         return process
 
-    def robot(self, connection: str = CONNECTION, waits: Waits = SHORT) -> ConnectedRobot:
+    def robot(self, connection: str = CONNECTION, waits: Timeouts = SHORT) -> ConnectedRobot:
         for name, text in {"robot.yaml": connection, "places.yaml": PLACES, "door.py": SKILLS}.items():
             (self.folder / name).write_text(text)
         table = skills_from(self.folder / "door.py")
@@ -100,7 +100,7 @@ def test_skills_are_what_the_file_maps(robots: Robots) -> None:
     assert robot.missing == {}
     assert robot.perform("get_all_rooms", []) == ["dock", "lab", "cellar", "hall", "shaft", "moon"]
     assert robot.perform("get_current_location", []) == "dock"
-    reported: list[str | Picture] = []
+    reported: list[str | CameraPicture] = []
     robot.perform("go_to", ["Lab"], reported.append)
     assert told(nav2, "goal") == [2.0, 0.0, 1.57]
     assert any(str(one).startswith("at (1.") for one in reported)
@@ -243,7 +243,7 @@ def test_planner_keeps_out_of_rooms_that_rules_forbid(robots: Robots) -> None:
     robot.keep_out(read_rules(robots.folder / "rules.yaml"))
     width, height, cells = told(nav2, "mask")
     assert [width, height, cells] == [40, 60, 40 * 60]  # 2 m by 3 m
-    reported: list[str | Picture] = []
+    reported: list[str | CameraPicture] = []
     robot.perform("go_to", ["hall"], reported.append)
     way = [tuple(map(float, match)) for one in reported for match in re.findall(AT, str(one))]
     assert len(way) > 5

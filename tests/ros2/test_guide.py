@@ -19,8 +19,8 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room
 from codebotler.robots.base import CancelledError
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.keepout import keepout as keepout_mask
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.keepout import keepout_messages as keepout_mask
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from error_tables import errors_on, unsaid
 from ros2_scene import ROS2_PYTHON, Scene, installed
 from ros_graph import GO_TO, Process, started
@@ -98,7 +98,9 @@ def test_robot_of_the_page_is_connected_by_its_file(scene: Scene, tmp_path: Path
     for name, text in {**texts, "door.py": door, "deliver.py": program}.items():
         (tmp_path / name).write_text(text)
     shutil.copytree(HERE / "nav2_msgs", tmp_path / "nav2_msgs")
-    nav2 = Process(HERE / "nav2_stand_in.py", str(WORKERS), "--acceleration=9", option, python=ROS2_PYTHON)
+    nav2 = Process(
+        HERE / "nav2_stand_in.py", str(WORKERS_FOLDER), "--acceleration=9", option, python=ROS2_PYTHON
+    )
     scene.processes.append(nav2)
     nav2.expect("ready")
     done = subprocess.run(
@@ -130,8 +132,8 @@ def test_files_of_the_page_are_read(tmp_path: Path) -> None:
     (tmp_path / "door.py").write_text(blocks(NAV2, "python")[0])
     table = skills_from(tmp_path / "door.py")
     (camera,) = (block for block in blocks(NAV2, "yaml") if block.startswith("skills:"))
-    (keepout,) = (block for block in blocks(NAV2, "yaml") if block.startswith("keepout:"))
-    for text in (camera, robot + keepout):
+    (keepout_messages,) = (block for block in blocks(NAV2, "yaml") if block.startswith("keepout:"))
+    for text in (camera, robot + keepout_messages):
         (tmp_path / "robot.yaml").write_text(text)
         assert read_connection(tmp_path / "robot.yaml", table).skills(table)
     (rule,) = (block for block in blocks(NAV2, "yaml") if block.startswith("rules:"))

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import HERE, ROS2_PYTHON
 from ros_graph import Process
 
@@ -23,9 +23,9 @@ class Nav2:
     """The stand-in, and its client."""
 
     def __init__(self, *options: str) -> None:
-        arguments = (str(WORKERS), *QUICK, *options)
+        arguments = (str(WORKERS_FOLDER), *QUICK, *options)
         self.robot = Process(HERE / "nav2_stand_in.py", *arguments, python=ROS2_PYTHON)
-        self.client = Process(HERE / "nav2_client.py", str(WORKERS), python=ROS2_PYTHON)
+        self.client = Process(HERE / "nav2_client.py", str(WORKERS_FOLDER), python=ROS2_PYTHON)
 
     def do(self, *what: object) -> None:
         write(self.client, json.dumps(what))

@@ -16,9 +16,9 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.robots.base import Picture
+from codebotler.robots.base import CameraPicture
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from halves import encoded, has_frame, rows, sees
 from ros2_scene import ROS2_PYTHON, Scene
 from ros_graph import Process
@@ -49,7 +49,7 @@ def process(scene: Scene, script: Path, *arguments: str) -> Process:
 @pytest.fixture
 def eyes(scene: Scene) -> Process:
     assert LOOK.ros is not None
-    eyes = process(scene, HERE / "ros2_eyes.py", str(WORKERS), json.dumps(LOOK.ros.definition))
+    eyes = process(scene, HERE / "ros2_eyes.py", str(WORKERS_FOLDER), json.dumps(LOOK.ros.definition))
     eyes.expect("ready")
     return eyes
 
@@ -59,13 +59,13 @@ def test_any_server_may_show_what_it_sees(scene: Scene) -> None:
     robot = scene.robot(skills=SkillTable((LOOK,)))
     robot.connect()
 
-    def told(label: str) -> list[str | Picture]:
-        heard: list[str | Picture] = []
+    def told(label: str) -> list[str | CameraPicture]:
+        heard: list[str | CameraPicture] = []
         assert robot.perform("is_in_room", [label], heard.append) is False
         return heard
 
-    assert told("late") == [Picture(bytes(8))]
-    assert told("three") == [Picture(bytes(8))] * 3
+    assert told("late") == [CameraPicture(bytes(8))]
+    assert told("three") == [CameraPicture(bytes(8))] * 3
     (left_out,) = told("huge")
     assert isinstance(left_out, str)
     assert "3,000,000 bytes" in left_out
@@ -105,10 +105,10 @@ def test_connected_camera_becomes_an_answer_and_a_picture(
         monkeypatch.setenv("OPENAI_BASE_URL", model.url)
         robot = scene.robot(skills=SkillTable((LOOK,)), connection=read_connection(path, SKILLS))
         robot.connect()
-        shown: list[str | Picture] = []
+        shown: list[str | CameraPicture] = []
         assert robot.perform("is_in_room", ["mug"], shown.append) is True
         (picture,) = shown
-        assert isinstance(picture, Picture)
+        assert isinstance(picture, CameraPicture)
         assert has_frame(picture.data)
         assert robot.perform("is_in_room", ["cat"]) is False
         robot.disconnect()

@@ -16,10 +16,10 @@ import pytest
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
+from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.robot import RosRobot, Waits
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, Scene, installed
 from ros_graph import GO_TO, SAY, started
 
@@ -115,7 +115,7 @@ def test_robot_that_answers_after_a_stop_answers_in_vain(scene: Scene) -> None:
 
 def test_robot_that_does_not_stop_is_said_not_to(scene: Scene) -> None:
     server = scene.serve(GO_TO)
-    robot = scene.robot(Waits(patience=1.0, silence=0.5, longest=20.0))
+    robot = scene.robot(Timeouts(patience=1.0, silence=0.5, longest=20.0))
     robot.connect()
     with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
         server.expect("goal", "never, whatever you say")
@@ -126,7 +126,7 @@ def test_robot_that_does_not_stop_is_said_not_to(scene: Scene) -> None:
 
 def test_goal_that_does_not_end_is_cancelled(scene: Scene) -> None:
     server = scene.serve(GO_TO)
-    robot = scene.robot(Waits(patience=1.5, silence=0.5, longest=1.0))
+    robot = scene.robot(Timeouts(patience=1.5, silence=0.5, longest=1.0))
     robot.connect()
     with pytest.raises(RobotLostError, match=r"/go_to_server .*\b1 s\b.*cancelled"):
         robot.perform("go_to", ["never"])
@@ -136,7 +136,7 @@ def test_goal_that_does_not_end_is_cancelled(scene: Scene) -> None:
 
 def test_goal_of_which_the_server_takes_no_notice(scene: Scene) -> None:
     scene.serve(SAY)
-    robot = scene.robot(Waits(patience=1.0, silence=0.5, longest=20.0))
+    robot = scene.robot(Timeouts(patience=1.0, silence=0.5, longest=20.0))
     robot.connect()
     with pytest.raises(RobotLostError, match=r"accept the goal .*1 s"):
         robot.perform("say", ["ignore"])
@@ -155,7 +155,7 @@ def test_missing_server_is_known_before_motion_and_looked_for_again(scene: Scene
 
 def test_robot_without_any_server_is_not_ready(scene: Scene) -> None:
     with pytest.raises(NotReadyError, match=r"no action server .*/"):
-        scene.robot(Waits(patience=0.5, silence=0.5, longest=20.0), skills=SKILLS).connect()
+        scene.robot(Timeouts(patience=0.5, silence=0.5, longest=20.0), skills=SKILLS).connect()
 
 
 def test_server_that_dies_in_a_goal_is_noticed_and_may_come_back(scene: Scene) -> None:
@@ -280,7 +280,7 @@ def test_installed_package_is_preferred_and_its_feedback_is_told(
     scene.serve_as([["robot_actions_pkg/action/GoTo", "/go_to_server", definition]])
     robot = scene.robot(skills=SkillTable((GO_TO,)))
     robot.connect()
-    told: list[str | Picture] = []
+    told: list[str | CameraPicture] = []
     robot.perform("go_to", ["feedback"], told.append)
     assert told == ["near: the hall"]
 
@@ -310,6 +310,6 @@ def test_address_is_a_domain() -> None:
         open_robot("ros2", Options(address="robot"))
 
 
-@pytest.mark.parametrize("path", sorted(WORKERS.glob("ros2_*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(WORKERS_FOLDER.glob("ros2_*.py")), ids=lambda path: path.stem)
 def test_workers_are_read_by_python_3_8(path: Path) -> None:
     ast.parse(path.read_text(), feature_version=(3, 8))

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.robots.ros.worker import WORKERS
+from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import HERE, ROS2_PYTHON
 
 SCRIPT = """
@@ -45,7 +45,7 @@ GRID = "nav_msgs/msg/OccupancyGrid"
 def filled(names: list[str], *fillings: tuple[str, str, dict[str, Any]], folders: list[Path]) -> list[Any]:
     """What messages hold, or why they cannot, after they went over the wire."""
     asked = json.dumps([names, [str(folder) for folder in folders], fillings])
-    command = [str(ROS2_PYTHON), "-c", SCRIPT, str(WORKERS), asked]
+    command = [str(ROS2_PYTHON), "-c", SCRIPT, str(WORKERS_FOLDER), asked]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         raise AssertionError(done.stderr)

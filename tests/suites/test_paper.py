@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.models.recorded import Solution, recorded_model
+from codebotler.models.recorded import Solution, open_recorded
 from roboeval.evaluation.failures import CLASSES, NO_PROGRAM
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
@@ -77,7 +77,7 @@ def shape(program: str) -> str:
 @each_task
 @each_model
 def test_programs_were_thought_out_differently(task: Task, model: str) -> None:
-    replies = recorded_model(f"recorded:{model}").replies
+    replies = open_recorded(f"recorded:{model}").replies
     shapes = [frozenset(shape(reply.program) for reply in replies[prompt]) for prompt in task.prompts]
     differing = max(
         len(group)
@@ -90,7 +90,7 @@ def test_programs_were_thought_out_differently(task: Task, model: str) -> None:
 
 @each_model
 def test_every_prompt_has_recorded_programs(paper: Suite, model: str) -> None:
-    replies = recorded_model(f"recorded:{model}").replies
+    replies = open_recorded(f"recorded:{model}").replies
     prompts = {prompt for task in paper.tasks.values() for prompt in task.prompts}
     assert prompts <= set(replies)
     assert len(prompts) == 80
@@ -101,7 +101,7 @@ def test_every_prompt_has_recorded_programs(paper: Suite, model: str) -> None:
 def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Solution, dict[str, Any]]]]:
     def judged(model: str) -> Iterator[tuple[Completion, Solution, dict[str, Any]]]:
         completions = list(recorded_completions(f"recorded:{model}", paper))
-        replies = recorded_model(f"recorded:{model}")
+        replies = open_recorded(f"recorded:{model}")
         for completion, row in zip(completions, evaluate(completions, paper, workers=2), strict=True):
             assert completion.instruction is not None
             yield completion, replies.solution(completion.instruction, completion.index), {**row}

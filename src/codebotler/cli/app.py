@@ -1,4 +1,4 @@
-"""The command line of CodeBotler: the commands about programs, and the list of all."""
+"""The commands about programs, and the list of all commands."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import typer
 
 from codebotler.cli import options
 from codebotler.cli.ending import obey
-from codebotler.cli.model_options import model_settings, with_options_of
+from codebotler.cli.model_options import inherit_options, model_settings
 from codebotler.cli.operating import connect, missions, robots, run, serve_page, virtual_robot
 from codebotler.core.terminal import note, noting_all
 
 
-@with_options_of(model_settings)
+@inherit_options(model_settings)
 def generate(
-    instruction: Annotated[str, typer.Argument(help="What the robot should do, in plain words.")],
+    instruction: Annotated[str, typer.Argument(help="The robot's task, in plain words.")],
     model: options.ModelOption = None,
     world: options.WorldOption = None,
     retries: options.RetriesOption = None,
@@ -32,15 +32,15 @@ def generate(
 
     The exit status is 1 if the check finds problems.
     """
-    from codebotler.cli.generate import show, write
+    from codebotler.cli.generate import print_prompt, write
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
-    from codebotler.models.chosen import chosen_model
+    from codebotler.models.chosen import choose_model
     from codebotler.prompts import prompt_for
 
-    chosen = chosen_model(model, base_url)
-    settings = chosen.with_its_server(model_settings(**sampling))
+    chosen = choose_model(model, base_url)
+    settings = chosen.add_server(model_settings(**sampling))
     table = skills_from(*(skills or ()))
     known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
@@ -51,7 +51,7 @@ def generate(
         rules=[rule.says for rule in house_rules],
     )
     if show_prompt:
-        show(prompt, chosen.name)
+        print_prompt(prompt, chosen.name)
         return
     tries = int(repair) if retries is None else retries
     accepted = write(
@@ -69,11 +69,13 @@ def generate(
 
 
 def check(
-    program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
+    program: Annotated[
+        str, typer.Argument(help="A file, or - for standard input, which may be a model's reply.")
+    ],
     world: options.WorldOption = None,
     connect: options.ConnectOption = None,
     samples: Annotated[
-        int, typer.Option(min=1, max=10_000, help="How many imagined worlds to run it in.")
+        int, typer.Option(min=1, max=10_000, help="The number of imagined worlds for the check.")
     ] = 5,
     seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     strict: Annotated[
@@ -85,13 +87,13 @@ def check(
     ] = False,
     shows_all: options.AllOption = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
-    workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, help="The number of programs to run in parallel.")] = 1,
     rules: options.RulesOption = None,
     skills: options.SkillsOption = None,
 ) -> None:
     """Look for problems in a program before a robot runs it.
 
-    It reads the program and runs it in imagined worlds. The exit status is 1 if there are problems.
+    This runs the program in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
     from codebotler.cli.check import check_view, read_program
@@ -101,9 +103,9 @@ def check(
     from codebotler.simulator.sampled_robot import RoomMap
 
     table = skills_from(*(skills or ()))
-    _, connection = options.connected(connect, None, table)
+    _, connection = options.read_connect_option(connect, None, table)
     table = table if connection is None else connection.skills(table)
-    known = options.world_or_office("", world, table, connection)
+    known = options.read_world("", world, table, connection)
     house_rules = rules_for(known, rules, table)
     source = read_program(program)
     room_map = None if known is None else (RoomMap.of_places if world is None else RoomMap.of)(known)
@@ -134,7 +136,7 @@ def rules(
 ) -> None:
     """Show house rules with examples, and likely mistakes.
 
-    For each rule, it finds a shortest example that keeps it and one that breaks it.
+    For each rule, this finds a short example that keeps it and one that breaks it.
     """
     from codebotler.checking.rule_review import reviewed
     from codebotler.checking.rules import read_rules
@@ -148,7 +150,7 @@ def rules(
     known = None if world is None else read_world(world, table)
     note_evasions(house_rules, known, table)
     if not any(rule.inside for rule in house_rules):
-        note("goto is about destinations: a robot may drive through other rooms, unless a rule uses inside")
+        note("goto covers destinations only; to keep the robot from driving through a room, use inside")
     with busy("looking for examples"):
         found = reviewed(house_rules, known)
     if json:
@@ -159,10 +161,10 @@ def rules(
 
 def skills(
     file: Annotated[
-        Path | None, typer.Argument(help="A Python file of your own skills, which is run.")
+        Path | None, typer.Argument(help="A Python file of your own skills; it is executed.")
     ] = None,
     new: Annotated[
-        Path | None, typer.Option("--new", help="Write a commented start of such a file.", metavar="FILE")
+        Path | None, typer.Option("--new", help="Write a template for such a file.", metavar="FILE")
     ] = None,
     ros_package: Annotated[
         Path | None,
@@ -176,46 +178,46 @@ def skills(
 ) -> None:
     """Show skills as models see them, and try them.
 
-    Each example is called in 40 imagined worlds.
+    This calls each example in 40 imagined worlds.
     """
-    from codebotler.cli.skills import NEW, data, view, write_new
+    from codebotler.cli.skills import SKILLS_TEMPLATE, skills_data, skills_view, write_new
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.ros_package import write_ros_packages
     from codebotler.core.terminal import print_json, print_rich
 
     if new is not None:
-        write_new(new, NEW.format(name=new))
-        note(f"{new} is written; `codebotler skills {new}` shows what is in it")
+        write_new(new, SKILLS_TEMPLATE.format(name=new))
+        note(f"wrote {new}; `codebotler skills {new}` shows its skills")
         return
     table = skills_from(*([] if file is None else [file]))
     if ros_package is not None:
         written = write_ros_packages(table, ros_package)
-        note(f"written: {', '.join(map(str, written))}; build them with colcon")
+        note(f"wrote {', '.join(map(str, written))}; build them with colcon")
     elif json:
-        print_json(data(table))
+        print_json(skills_data(table))
     else:
-        print_rich(view(table))
+        print_rich(skills_view(table))
 
 
 def models(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """List the models that you can use here.
+    """List the models that you can use now.
 
-    It looks for keys in the environment, and for model servers on this machine.
+    This looks for keys in the environment, and for model servers on this machine.
     """
     from dataclasses import asdict
 
     from codebotler.cli.views import models_view
     from codebotler.core.terminal import print_json, print_rich
-    from codebotler.models.chosen import chosen_model
-    from codebotler.models.usable import usable_models
+    from codebotler.models.chosen import choose_model
+    from codebotler.models.usable import find_usable_models
 
-    found = usable_models()
+    found = find_usable_models()
     if json:
         print_json([asdict(model) for model in found])
     else:
-        print_rich(models_view(found, chosen_model()))
+        print_rich(models_view(found, choose_model()))
 
 
 app = options.command_line(

@@ -1,4 +1,4 @@
-"""`codebotler check`: reads a program, and shows what a check found."""
+"""`codebotler check`: read a program, and show the result of the check."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import RunError
 from codebotler.prompts.extract import program_in
 
-INPUT = "standard input"
-AROUND = 1
-"""Lines that are shown before and after one that is to blame."""
-
-MOST_ROOMS = 12
+STANDARD_INPUT = "standard input"
+CONTEXT_LINES = 1
+"""Lines shown before and after a line with a problem."""
+MAX_ROOMS_SHOWN = 12
 
 
 def read_program(name: str) -> str:
-    """The program in a file, or on standard input (`-`), where it may be a model's whole reply."""
+    """Read a program from a file; or from standard input (`-`), also out of a model's reply."""
     if name != "-":
         if not name:
             raise UserError("the file name is empty; name a file, or - for standard input")
@@ -34,27 +33,24 @@ def read_program(name: str) -> str:
         if not text.strip():
             raise UserError("it contains no program", file=name)
         return text
-    text = text_of(sys.stdin.buffer.read(MOST_FILE_BYTES + 1), INPUT)
+    text = text_of(sys.stdin.buffer.read(MOST_FILE_BYTES + 1), STANDARD_INPUT)
     if not text.strip():
-        raise UserError("is empty; pipe a program or a model's reply into it", file=INPUT)
+        raise UserError("is empty; pipe a program or a model's reply into it", file=STANDARD_INPUT)
     return program_in(text)
 
 
 def check_view(found: Check, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
-    """What a check found, for a person: the verdict, the problems, and what the robot would do.
-
-    By default that is shown in one imagined world, with `shows_all` in one of each kind.
-    """
+    """Show the verdict, the problems, and the actions in one sampled world, or in one of each kind."""
     parts: list[RenderableType] = [_verdict(found, name)]
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
-    parts += [Text(), _rooms(found), *_in_vain(found)]
-    kinds = _kinds(found)
+    parts += [Text(), _rooms(found), *_vain_searches(found)]
+    kinds = _distinct_samples(found)
     for sample in kinds if shows_all else kinds[:1]:
         parts += [Text(), *_sample(sample)]
     if len(kinds) > 1 and not shows_all:
-        parts += [Text(), Text(f"this is 1 of {len(kinds)} different courses; --all shows them", "dim")]
+        parts += [Text(), Text(f"this is 1 of {len(kinds)} different outcomes; --all shows them", "dim")]
     return Group(*parts)
 
 
@@ -63,23 +59,23 @@ def _verdict(found: Check, name: str) -> Text:
     if not count:
         verdict = Text.assemble(("accepted", "bold green"), f": no problem in {visible(name)}")
     else:
-        what = "1 problem" if count == 1 else f"{count} problems"
-        verdict = Text.assemble(("rejected", "bold red"), f": {what} in {visible(name)}")
+        problems = "1 problem" if count == 1 else f"{count} problems"
+        verdict = Text.assemble(("rejected", "bold red"), f": {problems} in {visible(name)}")
     if not found.samples:
-        ran = "it was not run"
+        run = "it was not run"
     elif not any(sample.draws for sample in found.samples):
-        ran = "it does the same in every world"
+        run = "it does the same in every world"
     else:
         worlds = f"{len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}"
-        ran = f"run in {worlds}, where people and things are put by chance"
-    return verdict.append(f"\n{ran}", "dim")
+        run = f"run in {worlds} with random people and objects"
+    return verdict.append(f"\n{run}", "dim")
 
 
 def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
     yield Text(shortened(problem.sentence), "red")
     if problem.line is None:
         return
-    first, last = max(1, problem.line - AROUND), min(len(lines), problem.line + AROUND)
+    first, last = max(1, problem.line - CONTEXT_LINES), min(len(lines), problem.line + CONTEXT_LINES)
     width = len(str(last))
     for number in range(first, last + 1):
         mark, style = (">", "bold") if number == problem.line else (" ", "dim")
@@ -88,31 +84,26 @@ def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
 
 
 def _rooms(found: Check) -> Text:
-    shown = [f'"{shortened(room, 60)}"' for room in found.rooms[:MOST_ROOMS]]
+    shown = [f'"{shortened(room, 60)}"' for room in found.rooms[:MAX_ROOMS_SHOWN]]
     left = len(found.rooms) - len(shown)
     rooms = ", ".join([*shown, *([f"and {left} more"] if left > 0 else [])])
     if not found.rooms_are_guessed:
         return Text(f"rooms: {rooms}", "dim")
-    told = f"rooms named by the program: {rooms}"
-    return Text(f"{told}\nto find misspelled rooms, add --world FILE", "yellow")
+    return Text(f"rooms named by the program: {rooms}\nto find misspelled rooms, add --world FILE", "yellow")
 
 
-def _in_vain(found: Check) -> Iterator[Text]:
+def _vain_searches(found: Check) -> Iterator[Text]:
     count = sum(sample.in_vain for sample in found.samples)
     if 0 < count < len(found.samples):
         often = f"{count} of {len(found.samples)} worlds"
         yield Text(
-            f"in {often} the robot waits or searches without success, which is not counted as a problem",
+            f"in {often} the robot waits or searches without success; that is no problem",
             "dim",
         )
 
 
-def _kinds(found: Check) -> list[Sample]:
-    """A sample of each kind of world in which the robot does something else.
-
-    First come those that show a problem, and then what says most about what the robot is to do: those that
-    end well, the longest first.
-    """
+def _distinct_samples(found: Check) -> list[Sample]:
+    """Return one sample for each different behaviour: problems first, then long successful runs."""
 
     def rank(sample: Sample) -> tuple[bool, bool, bool, int]:
         outcome = sample.outcome
@@ -135,5 +126,5 @@ def _sample(sample: Sample) -> Iterator[RenderableType]:
     steps = steps_of(sample.outcome.trace, has_places=True)
     yield storyboard(steps, set())
     if sample.outcome.error is not None:
-        told = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
-        yield Padding(Text(told, "red"), (0, 0, 0, 4))
+        error = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
+        yield Padding(Text(error, "red"), (0, 0, 0, 4))

@@ -91,7 +91,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
 
 def _unknown_instruction(error: UnknownInstructionError) -> str:
     """The closest instructions are whole, to be copied."""
-    from codebotler.models.usable import how_to_use_a_model
+    from codebotler.models.usable import suggest_model
 
     told = f'{error.model} has no program for "{shortened(error.instruction, 200)}"'
     if error.closest:
@@ -100,7 +100,7 @@ def _unknown_instruction(error: UnknownInstructionError) -> str:
         [
             told,
             *(f"  {closest}" for closest in error.closest),
-            f"for other instructions, {how_to_use_a_model()}",
+            f"for other instructions, {suggest_model()}",
         ]
     )
 

@@ -1,4 +1,4 @@
-"""`codebotler generate`: asks a model for a program, and again while there are problems."""
+"""`codebotler generate`: ask a model for a program, and again while it has problems."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_source, shortened, visible
 from codebotler.core.words import brief
 from codebotler.core.world import World
-from codebotler.generation.generate import Attempt, ignore, write_checked_program
+from codebotler.generation.generate import Attempt, ignore_attempt, write_checked_program
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.preflight import with_closest_here
 from codebotler.models.open import kind_of, open_model
-from codebotler.models.recorded import NOTICE, UnknownInstructionError, is_recorded
+from codebotler.models.recorded import RECORDED_NOTICE, UnknownInstructionError, is_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
-MOST_SAID = 300  # characters of a reply without a program
+MAX_REPLY_SHOWN = 300  # characters of a reply without a program
 
 
 def write(
@@ -37,45 +37,42 @@ def write(
     repair: bool,
     record: Path | None,
 ) -> bool:
-    """Have a model write a program, print it, and say whether the check accepts it."""
+    """Have a model write a program, and print it; return whether the check accepts it."""
     with ExitStack() as recording:
         with busy(f"asking {model}"):
-            asked = open_model(model, settings)
-            note_down = recording.enter_context(recorder(record, asked.name))
+            opened = open_model(model, settings)
+            record_attempt = recording.enter_context(open_recorder(record, opened.name))
 
-            def tried(attempt: Attempt) -> None:
-                note_down(attempt)
-                _tell(attempt, retries + 1)
+            def on_attempt(attempt: Attempt) -> None:
+                record_attempt(attempt)
+                _note_attempt(attempt, retries + 1)
 
             room_map = None if world is None else RoomMap.of(world)
             try:
-                made = write_checked_program(
-                    asked,
+                generation = write_checked_program(
+                    opened,
                     prompt,
                     room_map=room_map,
                     house_rules=house_rules,
                     skills=skills,
                     retries=retries,
                     repair=repair,
-                    tried=tried,
+                    on_attempt=on_attempt,
                 )
             except UnknownInstructionError as error:
                 raise with_closest_here(error, room_map) from None
-        if made.programless is None:
-            print_source(made.program)
-    if is_recorded(asked.name):
-        note(NOTICE)
-    return not made.problems
+        if generation.programless is None:
+            print_source(generation.program)
+    if is_recorded(opened.name):
+        note(RECORDED_NOTICE)
+    return not generation.problems
 
 
 @contextmanager
-def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None]]:
-    """Adds attempts to a file, each when it has ended; without a file, nothing.
-
-    An OSError comes at the end, so that the program is printed all the same.
-    """
+def open_recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None]]:
+    """Yield a function that appends attempts to a file, if given; raise its OSError only at the end."""
     if path is None:
-        yield ignore
+        yield ignore_attempt
         return
     expect_replaceable(path, b"{")
     failed: OSError | None = None
@@ -94,10 +91,10 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
         raise failed
 
 
-def _tell(attempt: Attempt, most: int) -> None:
+def _note_attempt(attempt: Attempt, most: int) -> None:
     which = f"attempt {attempt.number + 1} of {most}" if most > 1 else "the program"
     if attempt.programless is not None:
-        tell_programless(attempt.programless, f"attempt {attempt.number + 1} of {most}: " if most > 1 else "")
+        note_programless(attempt.programless, f"attempt {attempt.number + 1} of {most}: " if most > 1 else "")
     elif attempt.problems:
         note(f"{which} has {'problems' if len(attempt.problems) > 1 else 'a problem'}:")
         for problem in attempt.problems:
@@ -106,16 +103,16 @@ def _tell(attempt: Attempt, most: int) -> None:
         note(f"{which} is accepted")
 
 
-def tell_programless(none: ProgramlessReply, which: str = "") -> None:
-    """Say why there is no program, and what the reply says instead."""
+def note_programless(none: ProgramlessReply, which: str = "") -> None:
+    """Note why there is no program, and quote the reply."""
     hint = "" if none.higher_limit is None else f" --max-tokens {none.higher_limit} sets a higher limit."
     note(f"{which}{visible(none.sentence)}{hint}")
     if none.kind != "refusal" and none.text.strip():
-        note(f"  it says: {shortened(brief(none.text, MOST_SAID))}")
+        note(f"  it says: {shortened(brief(none.text, MAX_REPLY_SHOWN))}")
 
 
-def show(prompt: Prompt, model: str) -> None:
-    """Print what a model is asked: the messages of a chat, or the one text that base models go on from."""
+def print_prompt(prompt: Prompt, model: str) -> None:
+    """Print the prompt: the messages of a chat, or the text that base models continue."""
     kind = kind_of(model)
     if kind == "completions":
         print_source(prompt.text)

@@ -1,4 +1,4 @@
-"""`codebotler missions`: lists missions, shows one, writes one as MCAP."""
+"""`codebotler missions`: list missions, show one, write one as MCAP."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def show_missions(home: Path, *, json: bool) -> None:
 
 
 def show_mission(home: Path, name: str, *, json: bool) -> None:
-    """Print what happened in a mission; `last` names the last one."""
+    """Print the events of a mission; `last` names the last one."""
     recover(home)
     folder = find(home, name)
     summary, events = Summary.read(folder), events_of(folder)

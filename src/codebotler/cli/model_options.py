@@ -1,4 +1,4 @@
-"""Options that say how a model is asked, for all commands that ask one."""
+"""Options for the settings of a model."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ from codebotler.models.sampling import PAPER_MAX_TOKENS, SamplingSettings
 
 if TYPE_CHECKING:
     from codebotler.models.base import Model
+    from codebotler.models.batch import BatchModel
 
-if TYPE_CHECKING:
-    from codebotler.models.batch import BatchModel  # which imports large libraries
-
-Command = TypeVar("Command", bound=Callable[..., object])
+CommandT = TypeVar("CommandT", bound=Callable[..., object])
 
 TemperatureOption = Annotated[
     float | None,
@@ -60,7 +58,7 @@ PresetOption = Annotated[
         metavar="NAME",
     ),
 ]
-SeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
+ModelSeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
 TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
 
 
@@ -74,21 +72,23 @@ def model_settings(
     reasoning_effort: EffortOption = None,
     extra_body: ExtraBodyOption = None,
     settings: PresetOption = None,
-    seed: SeedOption = None,
+    seed: ModelSeedOption = None,
     timeout: TimeoutOption = SamplingSettings.timeout,
 ) -> SamplingSettings:
-    """The settings that options name; raises UserError where two of them contradict each other."""
+    """Return the settings of the options; UserError if two options contradict each other."""
     if settings not in {None, "paper"}:
         raise UserError(f'there are no settings "{settings}"; use --settings paper, or leave it out')
     if settings is not None and (
         no_temperature or no_top_p or (temperature, top_p, max_tokens) != (None,) * 3
     ):
-        raise UserError("--settings paper sets the temperature, top-p and the limit; leave out your own")
+        raise UserError(
+            "--settings paper sets the temperature, top-p and the token limit; leave out your own"
+        )
     if settings is not None:
         max_tokens = PAPER_MAX_TOKENS
     return SamplingSettings(
-        temperature=_sampling("temperature", temperature, is_left_out=no_temperature),
-        top_p=_sampling("top_p", top_p, is_left_out=no_top_p),
+        temperature=_choose("temperature", temperature, is_left_out=no_temperature),
+        top_p=_choose("top_p", top_p, is_left_out=no_top_p),
         max_tokens=max_tokens,
         seed=seed,
         timeout=timeout,
@@ -97,10 +97,10 @@ def model_settings(
     )
 
 
-def _sampling(name: str, value: float | None, *, is_left_out: bool) -> float | None:
+def _choose(name: str, value: float | None, *, is_left_out: bool) -> float | None:
     option = name.replace("_", "-")
     if is_left_out and value is not None:
-        raise UserError(f"--{option} and --no-{option} exclude each other; give one of them")
+        raise UserError(f"--{option} and --no-{option} exclude each other; use one of them")
     default: float = getattr(SamplingSettings, name)
     return None if is_left_out else default if value is None else value
 
@@ -116,7 +116,7 @@ def _json_object(text: str) -> dict[str, Any]:
 
 
 def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
-    """Say which settings a model does not take, so that they are not sent."""
+    """Note the settings that a model does not support, and that are not sent."""
     from codebotler.models.recorded import is_recorded
 
     names = ("temperature", "top_p", "seed")
@@ -125,10 +125,10 @@ def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
         note(f"{model.name} takes no {' or '.join(unsent).replace('_', '-')}; none is sent")
 
 
-def with_options_of(called: Callable[..., object]) -> Callable[[Command], Command]:
-    """Give a command all options of a function to which it passes them on as `**options`."""
+def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], CommandT]:
+    """Add all options of a function to a command that passes them on as `**options`."""
 
-    def extended(command: Command) -> Command:
+    def extended(command: CommandT) -> CommandT:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
         named = [one for one in own.values() if one.kind is not one.VAR_KEYWORD and one.name not in inherited]
         first = [one for one in named if one.kind is not one.KEYWORD_ONLY]

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 import typer
 
 from codebotler.cli import options
-from codebotler.cli.model_options import model_settings, options_for, with_options_of
+from codebotler.cli.model_options import inherit_options, model_settings, options_for
 from codebotler.core.terminal import note, print_text
 
 
-@with_options_of(options.robot_settings)
-@with_options_of(model_settings)
+@inherit_options(options.robot_settings)
+@inherit_options(model_settings)
 def run(
     program: Annotated[
         str,
@@ -37,14 +37,14 @@ def run(
     from codebotler.cli import run
     from codebotler.cli.run import Request
     from codebotler.core.files import home
-    from codebotler.models.chosen import chosen_model
+    from codebotler.models.chosen import choose_model
     from codebotler.models.open import open_model
     from codebotler.robots.open import open_robot
 
-    chosen = chosen_model(model, base_url)
+    chosen = choose_model(model, base_url)
     kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
     request = Request(program, chosen.name, yes, despite_problems, shows_all, rules)
-    asked = chosen.with_its_server(model_settings(**options_for(model_settings, shared)))
+    asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     options.note_office(kind, shared["world"])
     body = open_robot(kind, settings)
     raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
@@ -83,7 +83,7 @@ def missions(
 
 
 def robots(
-    ros_python: options.RosPythonOption = options.ROS_PYTHON,
+    ros_python: options.RosPythonOption = options.DEFAULT_ROS_PYTHON,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """List the kinds of robots, and which of them work here.
@@ -94,9 +94,9 @@ def robots(
 
     from codebotler.cli.views import robots_view
     from codebotler.core.terminal import print_json, print_rich
-    from codebotler.robots.open import all_readiness
+    from codebotler.robots.open import check_readiness
 
-    found = all_readiness(ros_python)
+    found = check_readiness(ros_python)
     if json:
         print_json([asdict(kind) for kind in found])
     else:
@@ -110,7 +110,7 @@ def connect(
     out: Annotated[Path | None, typer.Option(help="Write to this new file.", metavar="FILE")] = None,
     robot: Annotated[str, typer.Option(help="The robot's ROS: ros2 or ros1.")] = "ros2",
     address: options.AddressOption = "",
-    ros_python: options.RosPythonOption = options.ROS_PYTHON,
+    ros_python: options.RosPythonOption = options.DEFAULT_ROS_PYTHON,
 ) -> None:
     """Write a first file for --connect, from what a robot offers.
 
@@ -119,12 +119,12 @@ def connect(
     from codebotler.cli.skills import write_new
     from codebotler.core.errors import UserError
     from codebotler.core.terminal import busy, print_source
-    from codebotler.robots.ros.discovery import first_connection, offers_of
+    from codebotler.robots.ros.discovery import discover_offers, draft_connection
 
     if not discover:
         raise UserError("add --discover: it looks at the robot, and writes a first file for --connect")
     with busy("looking at the robot"):
-        text = first_connection(robot, offers_of(robot, address, ros_python))
+        text = draft_connection(robot, discover_offers(robot, address, ros_python))
     if out is None:
         print_source(text)
     else:
@@ -132,8 +132,8 @@ def connect(
         note(f"{out} is written; read it, and add what its first lines say is missing")
 
 
-@with_options_of(options.robot_settings)
-@with_options_of(model_settings)
+@inherit_options(options.robot_settings)
+@inherit_options(model_settings)
 def serve_page(
     host: options.HostOption = "127.0.0.1",
     port: options.PortOption = None,
@@ -163,7 +163,7 @@ def serve_page(
     """
     from codebotler.cli.run import tell_missing
     from codebotler.core.files import home
-    from codebotler.models.chosen import chosen_model, opener
+    from codebotler.models.chosen import choose_model, make_opener
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
     from codebotler.web.access import Access, PageAddress
@@ -176,8 +176,8 @@ def serve_page(
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
     options.note_office(kind, shared["world"])
-    models = tuple(model or dict.fromkeys((chosen_model().name, "recorded:careful", "recorded:hasty")))
-    opened = opener(models, base_url, model_settings(**options_for(model_settings, shared)))
+    models = tuple(model or dict.fromkeys((choose_model().name, "recorded:careful", "recorded:hasty")))
+    opened = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
     shown = Face(face_timeout) if face else None
     body = open_robot(kind, settings) if shown is None else open_with_face(kind, settings, shown)
     tell_missing(body)
@@ -199,7 +199,7 @@ def virtual_robot(
     ] = 1.0,
     ros_python: Annotated[
         Path, typer.Option(help="The Python that has rclpy, or rospy, actionlib and rosmaster.")
-    ] = options.ROS_PYTHON,
+    ] = options.DEFAULT_ROS_PYTHON,
     skills: options.SkillsOption = None,
 ) -> None:
     """Offer a simulated robot's skills on ROS 1 or 2.

@@ -1,4 +1,4 @@
-"""Options shared by several commands, and what both command lines begin with."""
+"""Options shared by several commands, and the start of both command lines."""
 
 from __future__ import annotations
 
@@ -20,33 +20,29 @@ if TYPE_CHECKING:
 
 
 def robot_names(incomplete: str) -> list[str]:
-    """Shell completion of kinds of robots."""
-    from codebotler.robots.open import KINDS
+    """Complete the kinds of robots for a shell."""
+    from codebotler.robots.open import ROBOT_MODULES
 
-    return [name for name in KINDS if name.startswith(incomplete)]
+    return [name for name in ROBOT_MODULES if name.startswith(incomplete)]
 
 
 RobotOption = Annotated[
     str | None,
     typer.Option(
-        help="Which robot: sim by default, another that `codebotler robots` lists, or yours: FILE.py:CLASS.",
+        help="The robot: sim by default, a kind from `codebotler robots`, or FILE.py:CLASS.",
         autocompletion=robot_names,
     ),
 ]
-
-
 AllOption = Annotated[
     bool,
-    typer.Option(
-        "--all", help="Show what the robot would do in each kind of imagined world, not only in one."
-    ),
+    typer.Option("--all", help="Show the robot's actions in each kind of world, not in one."),
 ]
 ModelOption = Annotated[
     str | None,
     typer.Option(
         help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, completions:NAME, "
         "or hf:PATH; by default that of CODEBOTLER_MODEL or config.yaml, or else recorded. "
-        "`codebotler models` lists what works here."
+        "`codebotler models` lists usable ones."
     ),
 ]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file with the rooms.")]
@@ -54,7 +50,7 @@ RulesOption = Annotated[
     Path | None,
     typer.Option(
         envvar="CODEBOTLER_RULES",
-        help="A file of house rules that every program must keep to.",
+        help="A file of house rules for all programs.",
         metavar="FILE",
     ),
 ]
@@ -62,7 +58,7 @@ SkillsOption = Annotated[
     list[Path] | None,
     typer.Option(
         "--skills",
-        help="A Python file of your own skills, which is run; may be given several times.",
+        help="A Python file of your own skills, which is executed; may be repeated.",
         metavar="FILE",
     ),
 ]
@@ -71,19 +67,19 @@ MapOption = Annotated[
     typer.Option(help="The world file, for the robot and for the map; by default an office for --robot sim."),
 ]
 ModelsOption = Annotated[
-    list[str] | None, typer.Option(help="A model that may write programs; may be given several times.")
+    list[str] | None, typer.Option(help="A model that may write programs; may be repeated.")
 ]
-FaceTimeoutOption = Annotated[float, typer.Option(min=1, help="Seconds that people have to answer there.")]
+FaceTimeoutOption = Annotated[float, typer.Option(min=1, help="Seconds for an answer there.")]
 RetriesOption = Annotated[
-    int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
+    int | None, typer.Option(min=0, help="How often to ask again if the check finds problems.")
 ]
 RepairOption = Annotated[
     bool,
-    typer.Option(
-        "--repair", help="When asking again, show the rejected program and its problems; once by default."
-    ),
+    typer.Option("--repair", help="Ask again with the program and its problems; once by default."),
 ]
-RecordOption = Annotated[Path | None, typer.Option(help="Add a line of JSON for every attempt to this file.")]
+RecordOption = Annotated[
+    Path | None, typer.Option(help="Append a line of JSON for each attempt to this file.")
+]
 ShowPromptOption = Annotated[
     bool, typer.Option("--show-prompt", help="Print the prompt without asking a model.")
 ]
@@ -91,7 +87,7 @@ BaseUrlOption = Annotated[
     str | None, typer.Option(help="The address of the model's server, such as http://localhost:8000/v1.")
 ]
 RosPythonOption = Annotated[Path, typer.Option(help="The Python of the robot's ROS installation.")]
-ROS_PYTHON = Path("/usr/bin/python3")
+DEFAULT_ROS_PYTHON = Path("/usr/bin/python3")
 SpeedOption = Annotated[
     float,
     typer.Option(
@@ -101,15 +97,13 @@ SpeedOption = Annotated[
 ConnectOption = Annotated[
     Path | None,
     typer.Option(
-        help="A file that says what a robot on ROS offers for each skill; --robot is then that of the file.",
+        help="A file with the calls for a ROS robot's skills; it also determines --robot.",
         metavar="FILE",
     ),
 ]
 AddressOption = Annotated[
     str,
-    typer.Option(
-        help="If not the default: a ROS_DOMAIN_ID, the URI of a ROS master, or ws://HOST:PORT of a rosbridge."
-    ),
+    typer.Option(help="A ROS_DOMAIN_ID, the URI of a ROS master, or ws://HOST:PORT of a rosbridge."),
 ]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
@@ -118,14 +112,12 @@ PortOption = Annotated[
         min=0, max=65535, help="The port, by default the first free one from 8080; 0: any free one."
     ),
 ]
-NameOption = Annotated[
-    list[str] | None, typer.Option(help="Another host name for the page, besides its address.")
-]
+NameOption = Annotated[list[str] | None, typer.Option(help="An additional host name for the page.")]
 BehindProxyOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Where a reverse proxy offers the page: https://HOST, with :PORT and /PATH if it has them; "
-        "may be given several times. By default the list behind_proxy of config.yaml.",
+        help="The address at a reverse proxy, such as https://HOST:PORT/PATH; may be repeated. "
+        "By default the list behind_proxy of config.yaml.",
         metavar="ADDRESS",
     ),
 ]
@@ -134,13 +126,13 @@ NoTokenOption = Annotated[
     bool,
     typer.Option(
         "--no-token",
-        help="Let anyone on this machine in without a token; not with --host or --behind-proxy.",
+        help="Let anyone on this machine in; not with --host or --behind-proxy.",
     ),
 ]
 
 
 class RobotSettings(NamedTuple):
-    """What the options of a command say about its robot."""
+    """The robot that the options of a command describe."""
 
     kind: str
     options: Options
@@ -154,7 +146,7 @@ def robot_settings(
     speed: SpeedOption = 1.0,
     connect: ConnectOption = None,
     address: AddressOption = "",
-    ros_python: RosPythonOption = ROS_PYTHON,
+    ros_python: RosPythonOption = DEFAULT_ROS_PYTHON,
     rules: RulesOption = None,
     skills: SkillsOption = None,
 ) -> RobotSettings:
@@ -164,48 +156,49 @@ def robot_settings(
     from codebotler.robots.base import Options
 
     table = skills_from(*(skills or ()))
-    kind, connection = connected(connect, robot, table)
-    known = world_or_office(kind, world, table, connection)
+    kind, connection = read_connect_option(connect, robot, table)
+    known = read_world(kind, world, table, connection)
     rooms = [] if known is None else [room.name for room in known.rooms]
     house_rules = () if rules is None else read_rules(rules, table, rooms)
     opened = Options(known, speed or None, address, ros_python, table, connection)
     return RobotSettings(kind, opened, house_rules)
 
 
-def connected(file: Path | None, robot: str | None, skills: SkillTable) -> tuple[str, Connection | None]:
-    """The kind of robot, and what it offers where a file says that."""
+def read_connect_option(
+    file: Path | None, robot: str | None, skills: SkillTable
+) -> tuple[str, Connection | None]:
+    """Return the kind of robot, and the connection in a file, if given."""
     if file is None:
         return robot or "sim", None
     from codebotler.robots.ros.connection_file import read_connection
 
     connection = read_connection(file, skills)
     if robot not in {None, connection.robot}:
-        raise UserError(f"it connects a robot of the kind {connection.robot}, not {robot}", file=file)
+        raise UserError(f"it connects {connection.robot}, not {robot}; leave out --robot", file=file)
     return connection.robot, connection
 
 
-def world_or_office(
+def read_world(
     robot: str, file: Path | None, skills: SkillTable, connection: Connection | None = None
 ) -> World | None:
-    """The world in the file that is named, or else a robot's places, or an office for the simulated robot."""
-    from codebotler.core.world_file import read_world
+    """Read the world file, if given; else return the robot's places, or an office for the simulated robot."""
+    from codebotler.core import world_file
     from codebotler.robots.simulated import OFFICE
 
     if file is None and connection is not None:
         return None if connection.places is None else connection.places.world()
-
     file = OFFICE if file is None and robot == "sim" else file
-    return None if file is None else read_world(file, skills)
+    return None if file is None else world_file.read_world(file, skills)
 
 
 def note_office(robot: str, file: Path | None) -> None:
-    """Say that the simulated robot works in an office where no file names a world."""
+    """Note that the simulated robot uses the example office, if there is no world file."""
     if file is None and robot == "sim":
         note("the robot works in an example office; --world FILE names another world")
 
 
 def command_line(name: str, about: str) -> typer.Typer:
-    """A command line without commands yet, which shows its version, or else what there is."""
+    """Create a command line without commands, which shows its version or its help."""
     app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 
     @app.callback(invoke_without_command=True, help=about)

@@ -1,4 +1,4 @@
-"""`codebotler rules`: shows each house rule with examples, and warns of likely mistakes."""
+"""`codebotler rules`: show each house rule with examples, and warn about likely mistakes."""
 
 from __future__ import annotations
 
@@ -23,34 +23,30 @@ from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.simulator.rule_guard import Rule
 
-MADE_UP = ("", "x")  # texts in examples that stand for any other
-ASPECTS = {"always": "at any time", "finally": "at the end"}
+ANY_TEXT = ("", "x")  # in examples, these mean any text
+WHEN_WORDS = {"always": "at any time", "finally": "at the end"}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """The rules in a file, if one is named, with remarks on what evades them.
-
-    Raises:
-        UserError: they cannot be read, or name a room that the world lacks.
-    """
+    """Read the rules in a file, if given, and note how programs could evade them; UserError if invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     note_evasions(rules, world, skills)
     return rules
 
 
 def rooms_of(world: World | None) -> list[str]:
-    """The names of the rooms of a world; none without one."""
+    """Return the names of the rooms of a world, if there is one."""
     return [] if world is None else [room.name for room in world.rooms]
 
 
 def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable) -> None:
-    """Say how programs could evade rules; UserError if one cannot hold in the rooms of the world."""
+    """Note how programs could evade rules; UserError if a rule cannot hold in the rooms of the world."""
     for sentence in evasions(rules, rooms_of(world), skills):
         note(sentence)
 
 
 def review_view(found: Sequence[Review]) -> RenderableType:
-    """The rules, each with its examples and warnings."""
+    """Show rules with their examples and warnings."""
     parts: list[RenderableType] = []
     for one in found:
         parts += [*_rule(one), Text()]
@@ -61,7 +57,7 @@ def _rule(one: Review) -> Iterator[RenderableType]:
     rule = one.rule
     refused = "; a program may catch the refusal" if rule.refuse else ""
     yield Text.assemble((rule.name, "bold"), f"  {visible(rule.says)}")
-    yield Text(f"  {ASPECTS[rule.when]}{refused}: {rule.formula}", "dim")
+    yield Text(f"  {WHEN_WORDS[rule.when]}{refused}: {rule.formula}", "dim")
     for title, style, trace in (("keeps it", "green", one.keeps), ("breaks it", "red", one.breaks)):
         if trace is not None:
             yield Text(f"  {title}", style)
@@ -71,14 +67,14 @@ def _rule(one: Review) -> Iterator[RenderableType]:
 
 
 def steps_view(trace: Trace) -> RenderableType:
-    """The steps of an example, numbered."""
+    """Show the numbered steps of an example."""
     table = grid("right", "left")
     if not trace:
         table.add_row(Text(), Text("the robot does nothing", "dim"))
-    here = ""
+    room = ""
     for number, event in enumerate(trace, 1):
-        table.add_row(Text(str(number), "dim"), Text(step_sentence(event, here)))
-        here = event.text if is_drive(event) else event.place
+        table.add_row(Text(str(number), "dim"), Text(step_sentence(event, room)))
+        room = event.text if is_drive(event) else event.place
     return table
 
 
@@ -88,36 +84,31 @@ def is_drive(event: Event) -> bool:
     return row is not None and row.is_drive
 
 
-def step_sentence(event: Event, here: str = "") -> str:
-    """A step of an example, with all that a rule may speak of; any text will do where it is made up.
-
-    Args:
-        event: the step.
-        here: the room that the steps before it tell; a drive from another one says so.
-    """
+def step_sentence(event: Event, room: str = "") -> str:
+    """Describe a step of an example, and the room of a drive if it is not that after the last step."""
     drives = is_drive(event)
-    made_up = "another room" if drives else "something"
+    any_text = "another room" if drives else "something"
     quote = "" if verb(event.kind).object else '"'
-    given = [made_up if t in MADE_UP else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
-    told = [verb_phrase(event.kind, "third", given, "")]
-    offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in MADE_UP]
+    given = [any_text if t in ANY_TEXT else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
+    parts = [verb_phrase(event.kind, "third", given, "")]
+    offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in ANY_TEXT]
     more = len(event.options) - len(offered)
     offered += [f"{more} {'more' if offered else 'options'}"] if more > 1 else []
-    told += [f"offering {listed(offered)}"] if offered else []
-    told += [f'of "{visible(event.to)}"'] if event.to and event.to not in MADE_UP else []
+    parts += [f"offering {listed(offered)}"] if offered else []
+    parts += [f'of "{visible(event.to)}"'] if event.to and event.to not in ANY_TEXT else []
     where = "from" if drives else "in"
-    is_told = event.place in MADE_UP or (drives and event.place == here)
-    told += [] if is_told else [f"{where} {visible(event.place)}"]
-    held = "something" if event.holding in MADE_UP else f'"{visible(event.holding)}"'
-    told += [f"holding {held}"] if event.holding else []
+    is_known = event.place in ANY_TEXT or (drives and event.place == room)
+    parts += [] if is_known else [f"{where} {visible(event.place)}"]
+    held = "something" if event.holding in ANY_TEXT else f'"{visible(event.holding)}"'
+    parts += [f"holding {held}"] if event.holding else []
     if event.found is not None:
-        told.append(f"and {'finds it' if event.found else 'does not find it'}")
-    told += [f'and hears "{visible(event.answer)}"'] if event.answer is not None else []
-    return " ".join(told)
+        parts.append(f"and {'finds it' if event.found else 'does not find it'}")
+    parts += [f'and hears "{visible(event.answer)}"'] if event.answer is not None else []
+    return " ".join(parts)
 
 
 def review_data(found: Sequence[Review]) -> list[dict[str, object]]:
-    """The same as plain data."""
+    """Return rules with their examples and warnings as plain data."""
     return [
         {
             "name": one.rule.name,

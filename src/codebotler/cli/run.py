@@ -11,8 +11,8 @@ from pathlib import Path
 from codebotler.checking.check import check
 from codebotler.checking.problems import Check
 from codebotler.cli.check import check_view, read_program
-from codebotler.cli.generate import tell_programless
-from codebotler.cli.views import Watcher, ending, source_view
+from codebotler.cli.generate import note_programless
+from codebotler.cli.views import EventPrinter, ending_view, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
@@ -24,7 +24,7 @@ from codebotler.missions.session import MissionSession
 from codebotler.missions.store import recover
 from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
-from codebotler.models.recorded import NOTICE, is_recorded
+from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
@@ -105,7 +105,7 @@ def run(
     try:
         view = _prepared(session)
         if view.programless is not None:
-            tell_programless(view.programless)
+            note_programless(view.programless)
             session.reject(view.programless.sentence)
         elif _is_approved(session, view, robot, request):
             return _watched(session, view, robot, request)
@@ -150,7 +150,7 @@ def _show_check(view: SessionView, request: Request) -> None:
     assert view.check is not None, "the program is checked"
     if not request.is_program:
         if is_recorded(view.author):
-            note(NOTICE)
+            note(RECORDED_NOTICE)
         print_rich(source_view(view.program))
     name = request.what if request.is_program and request.what != "-" else "the program"
     print_rich(check_view(view.check, view.program, name, shows_all=request.shows_all))
@@ -175,14 +175,14 @@ def _is_approved(session: MissionSession, view: SessionView, robot: Robot, reque
 
 def _watched(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> int:
     """Run the program before the user's eyes."""
-    with _stopped_by_signals(session) as got, Watcher(robot.name) as watcher:
+    with _stopped_by_signals(session) as got, EventPrinter(robot.name) as watcher:
         session.on_event = watcher
         with suppress(MissionError):  # it was stopped before it could run
             session.approve(view.digest, despite_problems=request.despite_problems)
         view = session.wait_until(lambda _: False)
     if session.error is not None:
         raise session.error
-    print_rich(ending(view))
+    print_rich(ending_view(view))
     if view.state is State.STOPPED and got:
         return SIGNAL_EXIT_BASE + got[0]
     return 0 if view.state is State.DONE else 1

@@ -1,4 +1,4 @@
-"""`codebotler skills`: shows skills as models see them, tries each, and begins a file of your own."""
+"""`codebotler skills`: show skills as models see them, try them, and write a template."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from codebotler.prompts.rendering import stub
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.sampled_robot import Lot, RoomMap, SampledRobot
 
-TRIES = 40  # worlds in which each skill is tried
-ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
-NEW = '''\
-"""This robot's further skills; `codebotler skills {name}` shows it as a model sees it."""
+WORLD_COUNT = 40  # for each skill
+EXAMPLE_ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
+SKILLS_TEMPLATE = '''\
+"""Further skills of this robot; `codebotler skills {name}` shows them as models see them."""
 
 from codebotler import Simulation, skill
 
@@ -42,7 +42,7 @@ from codebotler import Simulation, skill
 )
 def open_door(sim: Simulation, door: str) -> bool:  # str, int, float, bool, Literal, an Enum, lists
     """Open a door of the room; False if it did not move."""
-    # What the simulation does. A fact is in a world file under `truths`; otherwise it is drawn by lot.
+    # The simulation. A world file lists facts under `truths`; all others are random.
     if sim.truth(f"{{door}} is locked"):
         sim.fail("DoorLocked")
     return sim.truth(f"{{door}} opens")
@@ -51,36 +51,36 @@ def open_door(sim: Simulation, door: str) -> bool:  # str, int, float, bool, Lit
 @skill(verb="measure the temperature")
 def temperature(sim: Simulation) -> float:
     """Measure the temperature in the room, in degrees Celsius."""
-    ...  # nothing is simulated: the result is drawn by lot
+    ...  # there is no simulation, so the result is random
 '''
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What has come of a skill in some of the worlds in which it was tried."""
+class SkillTrial:
+    """The outcome of a skill in some of the sampled worlds."""
 
-    outcome: str  # in words
+    outcome: str  # as a phrase
     facts: tuple[str, ...]  # of the first of these worlds
     event: Event | None
 
 
 def write_new(path: Path, text: str) -> None:
-    """Write a file; a UserError if there is such a file."""
+    """Write a file; UserError if it exists."""
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise UserError("it is there already; choose another name", file=path) from None
+        raise UserError("it exists already; choose another name", file=path) from None
 
 
-def tried(row: Skill, skills: SkillTable) -> list[Trial]:
-    """What comes of the example of a skill in imagined worlds, each different outcome once."""
+def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
+    """Call the example of a skill in sampled worlds; return each different outcome once."""
     arguments = _example(row)
-    found: dict[str, Trial] = {}
-    before = [one for one in skills.rows[: skills.rows.index(row)] if one not in SKILLS.rows]
-    for number in range(TRIES):
-        robot = SampledRobot(ROOMS, FactSampler(0, number), skills=skills)
-        for one in before if number % 2 else ():  # which it may need
+    found: dict[str, SkillTrial] = {}
+    earlier = [one for one in skills.rows[: skills.rows.index(row)] if one not in SKILLS.rows]
+    for number in range(WORLD_COUNT):
+        robot = SampledRobot(EXAMPLE_ROOMS, FactSampler(0, number), skills=skills)
+        for one in earlier if number % 2 else ():  # the skill may depend on them
             with suppress(RobotError):
                 robot.perform(one.name, _example(one))
         try:
@@ -91,14 +91,14 @@ def tried(row: Skill, skills: SkillTable) -> list[Trial]:
         except RobotError as error:
             outcome = f"fails with {error.kind}: {str(error).removeprefix(f'{row.name}: ')}"
         event = robot.trace[-1] if robot.trace else None
-        told = [fact for fact in robot.facts if not (isinstance(fact, Lot) and fact.statement == row.call)]
-        facts = tuple(fact.sentence for fact in told)
-        found.setdefault(outcome, Trial(outcome, facts, event))
+        drawn = [fact for fact in robot.facts if not (isinstance(fact, Lot) and fact.statement == row.call)]
+        facts = tuple(fact.sentence for fact in drawn)
+        found.setdefault(outcome, SkillTrial(outcome, facts, event))
     return list(found.values())
 
 
 def _example(row: Skill) -> list[Any]:
-    """The arguments of the example, by position; a UserError if it is no call of the skill."""
+    """Return the arguments of the example, by position; UserError if it is no call of the skill."""
     node = parse_expression(row.call)
     if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == row.name):
         row.wrong(f"the example of {row.name} is no call of it: {row.call}")
@@ -118,8 +118,8 @@ def _example(row: Skill) -> list[Any]:
     return given
 
 
-def view(skills: SkillTable) -> RenderableType:
-    """The skills that are not the paper's, or all of these, as models see them, and what comes of each."""
+def skills_view(skills: SkillTable) -> RenderableType:
+    """Show the user's skills, or else the paper's, as models see them, with their outcomes."""
     own = [row for row in skills.rows if row not in SKILLS.rows]
     return Group(*_lines(own or SKILLS.rows, skills))
 
@@ -128,7 +128,7 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
     for number, row in enumerate(rows):
         yield Text("\n" if number else "", end="")
         yield Syntax(stub(row), "python", theme="ansi_dark", background_color="default", word_wrap=True)
-        trials = tried(row, skills)
+        trials = try_skill(row, skills)
         by_lot = [one for one in trials if one.outcome.startswith("returns ") and not one.facts]
         if len(by_lot) > 1:
             values = listed([one.outcome.removeprefix("returns ") for one in by_lot], "or")
@@ -143,8 +143,8 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
                 yield Text(visible(f"    in words: {phrase(trial.event, 'past')}"), "dim")
 
 
-def data(skills: SkillTable) -> list[dict[str, Any]]:
-    """The same as plain data."""
+def skills_data(skills: SkillTable) -> list[dict[str, Any]]:
+    """Return the skills and their outcomes as plain data."""
     return [
         {
             "name": row.name,
@@ -152,7 +152,7 @@ def data(skills: SkillTable) -> list[dict[str, Any]]:
             "doc": row.doc,
             "example": row.call,
             "fails": dict(row.fails),
-            "tried": [{"outcome": one.outcome, "facts": list(one.facts)} for one in tried(row, skills)],
+            "tried": [{"outcome": one.outcome, "facts": list(one.facts)} for one in try_skill(row, skills)],
         }
         for row in skills.rows
     ]

@@ -1,4 +1,4 @@
-"""Missions and robots, drawn on a terminal."""
+"""Views of missions, models and robots for a terminal."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from codebotler.missions.log import Line, State, Summary
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import event_text, title
 from codebotler.models.chosen import ChosenModel
-from codebotler.models.usable import SETUP, UsableModel
+from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness
 
-STYLES: Mapping[State, str] = {
+STATE_STYLES: Mapping[State, str] = {
     State.DONE: "bold green",
     State.FAILED: "bold red",
     State.STOPPED: "bold yellow",
@@ -36,12 +36,12 @@ EVENT_STYLES: Mapping[str, str] = {
     "late": "yellow",
     "log": "yellow",
 }
-LATEST = 999_999.95  # seconds that are written out, in ten characters with their unit
-CLEAR = "\r\x1b[2K"
+MAX_PLAIN_SECONDS = 999_999.95  # longer times use an exponent, to fit ten characters
+CLEAR_LINE = "\r\x1b[2K"
 
 
-class Watcher:
-    """Prints events as they happen; on a terminal, the feedback of a skill takes one line."""
+class EventPrinter:
+    """Prints events as they happen; on a terminal, feedback overwrites its line."""
 
     def __init__(self, robot: str) -> None:
         self._console = console(highlight=False)
@@ -64,25 +64,25 @@ class Watcher:
             return
         passing = line["event"] == "feedback" and self._console.is_terminal
         self._end_line()
-        time = Text(f"{_at(line):>10}  " if line["event"] in {"skill", "sleep"} else " " * 12, "dim")
+        time = Text(f"{_time_text(line):>10}  " if line["event"] in {"skill", "sleep"} else " " * 12, "dim")
         self._console.print(time + text, end="" if passing else "\n", soft_wrap=True)
         self._console.file.flush()
         self._is_half = passing
 
     def _end_line(self) -> None:
         if self._is_half:
-            self._console.file.write(CLEAR)
+            self._console.file.write(CLEAR_LINE)
             self._is_half = False
 
 
-def _at(line: Line) -> str:
-    """When it was, by the robot's clock."""
+def _time_text(line: Line) -> str:
+    """Return the time of an event by the robot's clock."""
     clock = float(line["clock"])
-    return f"{clock:.1f} s" if clock < LATEST else f"{clock:.1e} s"
+    return f"{clock:.1f} s" if clock < MAX_PLAIN_SECONDS else f"{clock:.1e} s"
 
 
 def _event_line(line: Line) -> Text:
-    """An event as a styled line; empty if there is nothing to read."""
+    """Return an event as a styled line; empty if it has no text."""
     text = Text(event_text(line), EVENT_STYLES.get(line["event"], ""))
     if line["event"] == "state":
         text.stylize("bold", 0, len(line["state"]))
@@ -91,11 +91,11 @@ def _event_line(line: Line) -> Text:
     return text
 
 
-def ending(ended: Summary | SessionView) -> Group:
-    """How a mission ended, and how to see it again, in a line that is not broken, to be pasted."""
+def ending_view(ended: Summary | SessionView) -> Group:
+    """Show the end of a mission, and the command that shows it again, on one line for copying."""
     state = ended.state
-    assert state is not None, "it has begun"
-    text = Text.assemble((state, STYLES.get(state, "bold")), _why(ended))
+    assert state is not None, "the mission has begun"
+    text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))
     if state is State.STOPPED:
         text.append("\nthe robot has stopped")
     again = f"`codebotler missions {ended.id}` shows this mission again"
@@ -110,7 +110,7 @@ def _why(ended: Summary | SessionView) -> str:
 
 
 def list_view(summaries: Sequence[Summary]) -> RenderableType:
-    """All missions, a line each."""
+    """Show all missions, a line each."""
     if not summaries:
         return Text("there are no missions yet", "dim")
     table = grid("left", "left", "left", "left")
@@ -118,7 +118,7 @@ def list_view(summaries: Sequence[Summary]) -> RenderableType:
         state = summary.state
         table.add_row(
             summary.id,
-            Text(state, STYLES.get(state, "bold")),
+            Text(state, STATE_STYLES.get(state, "bold")),
             summary.robot,
             Text(
                 shortened(title(summary), 100)
@@ -129,7 +129,7 @@ def list_view(summaries: Sequence[Summary]) -> RenderableType:
 
 
 def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
-    """One mission: what it was about, and what happened when."""
+    """Show a mission with its events."""
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:
         head.append(f"\n{shortened(summary.instruction)}")
@@ -140,36 +140,36 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
     before: Text | None = None
     for line in events:
         text = _event_line(line)
-        if text and text != before:  # another program, while one is drafted, is no other state
+        if text and text != before:  # editing a draft repeats its state
             before = text if line["event"] == "state" else None
             at = datetime.fromtimestamp(line["time"]).astimezone()
-            table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_at(line), "dim"), text)
+            table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_time_text(line), "dim"), text)
     state = summary.state
     problems = [Text(f"problem: {shortened(problem)}", "red") for problem in summary.problems]
     program = Group(Text(), source_view(summary.program))
-    end = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))
+    end = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(summary))
     return Group(head, program, *problems, table, Text(), end)
 
 
 def source_view(program: str) -> Group:
-    """A program as it stands, without breaks in its lines, and an empty line."""
+    """Show a program without line breaks, and an empty line."""
     lines = [f"    {visible(text.expandtabs(4))}\n" for text in program.splitlines()]
     return Group(Text("".join(lines), no_wrap=True, overflow="ignore"))
 
 
 def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
-    """Which models can be asked here, with the options for each, and which is asked by default."""
+    """Show the usable models with their options, and the default model."""
     table = grid("left", "left")
     for model in models:
         table.add_row(Text(model.options, "bold"), Text(model.why, "dim"))
     lines = [f"default model: {visible(chosen.name)}"]
     if all(model.is_recorded for model in models):
-        lines.append(f"for other instructions, {SETUP}")
+        lines.append(f"for other instructions, {MODEL_HINT}")
     return Group(table, Text(), *map(Text, lines))
 
 
 def robots_view(kinds: Sequence[Readiness]) -> Table:
-    """Which robots work here, and what is missing for the others."""
+    """Show which robots work here, and what is missing for the others."""
     table = grid("left", "left", "left")
     for kind in kinds:
         works = Text("works", "green") if kind.works else Text("unavailable", "red")

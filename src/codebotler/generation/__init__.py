@@ -1,4 +1,1 @@
-"""From an instruction to a program: ask a model, check what it wrote, ask again if that has problems.
-
-Start with `generate.py`.
-"""
+"""Generate programs from instructions; start with `generate.py`."""

@@ -1,4 +1,4 @@
-"""From an instruction to a program: ask a model, check what it wrote, ask again if that has problems."""
+"""Ask a model for a program, check it, and ask again if it has problems."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
-from codebotler.generation.no_program import ProgramlessReply, programless
-from codebotler.models.base import Heard, Model, Reply, unheard
+from codebotler.generation.no_program import ProgramlessReply, describe_programless
+from codebotler.models.base import Model, Reply, TextListener, ignore_text
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.sampling import SamplingSettings
@@ -24,21 +24,21 @@ from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]
-"""The problems of a program, each in a sentence; none if it is accepted."""
+"""Returns the problems of a program, a sentence each; none if the program is accepted."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One reply of a model and the problems found in it."""
+    """One reply of a model and its problems."""
 
     number: int  # of the sample, from 0
-    prompt: Prompt = field(repr=False)  # for a repair, with the previous program and its problems
+    prompt: Prompt = field(repr=False)  # a repair includes the previous program and its problems
     reply: Reply = field(repr=False)
-    problems: tuple[str, ...]  # one sentence each; empty if it was accepted, or not checked
-    programless: ProgramlessReply | None = None  # what there is to say where the reply holds no program
+    problems: tuple[str, ...]  # empty if the program was accepted or not checked
+    programless: ProgramlessReply | None = None  # set if the reply has no program
 
     def data(self, model: str) -> dict[str, Any]:
-        """The attempt as a row of JSON."""
+        """Return the attempt as plain data for a row of JSON."""
         return {
             "instruction": self.prompt.instruction,
             "model": model,
@@ -51,13 +51,9 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Generation:
-    """All attempts at a program, in order; the last one is the result.
+    """All attempts at a program, in order; the last one is the result."""
 
-    Args:
-        attempts: at least one.
-    """
-
-    attempts: tuple[Attempt, ...]
+    attempts: tuple[Attempt, ...]  # at least one
 
     def __repr__(self) -> str:
         attempts, problems = counted(len(self.attempts), "attempt"), counted(len(self.problems), "problem")
@@ -65,46 +61,46 @@ class Generation:
 
     @property
     def program(self) -> str:
-        """The program of the last attempt; empty if its reply holds none."""
+        """The program of the last attempt; empty if its reply has none."""
         return "" if self.programless else self.attempts[-1].reply.program
 
     @property
     def programless(self) -> ProgramlessReply | None:
-        """The description of the last reply, if it holds no program."""
+        """The description of the last reply, if it has no program."""
         return self.attempts[-1].programless
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """The problems of that program, or why there is none."""
+        """The problems of the last program, or why there is none."""
         return self.attempts[-1].problems
 
 
-def ignore(_attempt: Attempt) -> None:
-    """Do nothing with an attempt."""
+def ignore_attempt(_attempt: Attempt) -> None:
+    """Ignore the attempt."""
 
 
 async def write_program(
     model: Model,
     prompt: Prompt,
-    problems_of: Checker | None = None,
+    find_problems: Checker | None = None,
     *,
     retries: int = 0,
     repair: bool = False,
-    heard: Heard = unheard,
-    tried: Callable[[Attempt], None] = ignore,
+    on_text: TextListener = ignore_text,
+    on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until the check accepts a program (rejection sampling; paper, section V); closes the model.
+    """Ask a model until the check accepts a program (rejection sampling; paper, section V); close the model.
 
-    Each further request is another sample; as a repair, it holds the rejected program and its problems, or
-    why the reply holds none.
+    Each further request is another sample; as a repair, it includes the rejected program and its problems,
+    or why the reply has no program.
     """
     attempts: list[Attempt] = []
     limited, request = RateLimited(model, concurrency=1), prompt
     try:
         for number in range(retries + 1):
-            reply = await limited.reply(request, number=number, heard=heard)
-            attempts.append(await _attempt(number, request, reply, model.settings, problems_of))
-            tried(attempts[-1])
+            reply = await limited.reply(request, number=number, on_text=on_text)
+            attempts.append(await _attempt(number, request, reply, model.settings, find_problems))
+            on_attempt(attempts[-1])
             if not attempts[-1].problems:
                 break
             if repair:
@@ -115,12 +111,12 @@ async def write_program(
 
 
 async def _attempt(
-    number: int, prompt: Prompt, reply: Reply, settings: SamplingSettings, problems_of: Checker | None
+    number: int, prompt: Prompt, reply: Reply, settings: SamplingSettings, find_problems: Checker | None
 ) -> Attempt:
-    """A reply and its problems; one without a program has no other problem."""
-    if (none := programless(reply, settings)) is not None:
+    """Check a reply; a missing program is its only problem."""
+    if (none := describe_programless(reply, settings)) is not None:
         return Attempt(number, prompt, reply, (none.sentence,), none)
-    found = () if problems_of is None else await asyncio.to_thread(problems_of, reply.program)
+    found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
     return Attempt(number, prompt, reply, tuple(found))
 
 
@@ -140,28 +136,30 @@ def write_checked_program(
     skills: SkillTable = SKILLS,
     retries: int = 0,
     repair: bool = False,
-    tried: Callable[[Attempt], None] = ignore,
+    on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until a program passes the check in sampled worlds; also inside of an event loop."""
+    """Ask a model until a program passes the check in sampled worlds; also works inside an event loop."""
     with WorkerPool(1) as pool:
 
-        def problems_of(program: str) -> list[str]:
+        def find_problems(program: str) -> list[str]:
             found = check(
                 program, rooms=rooms, room_map=room_map, pool=pool, house_rules=house_rules, skills=skills
             )
             return [problem.sentence for problem in found.problems]
 
-        def result() -> Generation:
+        def write() -> Generation:
             return asyncio.run(
-                write_program(model, prompt, problems_of, retries=retries, repair=repair, tried=tried)
+                write_program(
+                    model, prompt, find_problems, retries=retries, repair=repair, on_attempt=on_attempt
+                )
             )
 
         try:
             asyncio.get_running_loop()
         except RuntimeError:
-            return result()
-        with ThreadPoolExecutor(1) as beside:  # in a notebook
-            return beside.submit(result).result()
+            return write()
+        with ThreadPoolExecutor(1) as executor:  # a notebook runs an event loop in this thread
+            return executor.submit(write).result()
 
 
 def generate(
@@ -174,29 +172,27 @@ def generate(
     settings: SamplingSettings | None = None,
     skills: SkillTable = SKILLS,
 ) -> Generation:
-    """Have a model write a program, check it in sampled worlds, and wait for the result.
+    """Have a model write a program, and check it in sampled worlds.
 
-    A program with problems is returned all the same, with them: its last attempt counts.
+    If all attempts have problems, return the last one with its problems.
 
     Args:
-        instruction: what the robot is to do, in plain words.
+        instruction: the robot's task, in plain words.
         model: the model's name, such as `recorded` or `openai-chat:gpt-5.1`.
-        rooms: the names of all rooms, for the model and for the check; without them, the rooms are those that
-            the program goes to.
-        retries: how many times to ask again for a program with problems, at least 0; by default once with
-            `repair`, else never.
+        rooms: the names of all rooms, for the model and the check; by default those that the program visits.
+        retries: how many times to ask again after problems, at least 0; by default 1 with `repair`, else 0.
         repair: whether to ask again with the program and its problems in the request.
-        settings: how the model is asked, such as its temperature and its server; the defaults if None.
-        skills: what the robot can do; `skills_from` reads further ones from a file.
+        settings: the model's settings, such as its temperature and server; the defaults if None.
+        skills: the robot's skills; `skills_from` reads further ones from a file.
 
     Raises:
-        UserError: there is no such model, or an argument is out of its range.
-        ModelError: a reply did not arrive, or not all of it.
+        UserError: the model does not exist, or an argument is out of range.
+        ModelError: no complete reply arrived.
         EngineError: no isolated process could be started.
     """
     tries = int(repair) if retries is None else retries
     if tries < 0:
-        raise UserError(f"the number of retries is {tries}, but must be at least 0")
+        raise UserError(f"the number of retries is {tries}; it must be at least 0")
     prompt = prompt_for(instruction, rooms=rooms or (), skills=skills)
-    asked = open_model(model, settings or SamplingSettings())
-    return write_checked_program(asked, prompt, rooms=rooms, retries=tries, repair=repair, skills=skills)
+    opened = open_model(model, settings or SamplingSettings())
+    return write_checked_program(opened, prompt, rooms=rooms, retries=tries, repair=repair, skills=skills)

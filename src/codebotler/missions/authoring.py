@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from codebotler.generation.generate import Generation, write_program
 from codebotler.missions.view import SessionView
-from codebotler.models.base import Heard, Model
+from codebotler.models.base import Model, TextListener
 from codebotler.models.open import open_model
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.robots.base import Robot
@@ -30,14 +30,14 @@ class ModelAuthor:
         self._request: tuple[asyncio.AbstractEventLoop, asyncio.Task[Generation]] | None = None
         self._is_cancelled = False
 
-    def write(self, prompt: Prompt, heard: Heard) -> tuple[str, Generation]:
+    def write(self, prompt: Prompt, on_text: TextListener) -> tuple[str, Generation]:
         """Ask for a program; return it with the model's name, or raise asyncio.CancelledError."""
         if self.max_tokens is None or self._model is None:
             self._model = self._open_model(self._name)
         if self.max_tokens is not None:
             settings = replace(self._model.settings, max_tokens=self.max_tokens)
             self._model = open_model(self._model.name, settings)
-        return self._model.name, asyncio.run(self._write(self._model, prompt, heard))
+        return self._model.name, asyncio.run(self._write(self._model, prompt, on_text))
 
     def cancel(self) -> None:
         """End the request that is under way, and let no other begin."""
@@ -46,8 +46,8 @@ class ModelAuthor:
             with suppress(RuntimeError):  # the reply has arrived
                 request[0].call_soon_threadsafe(request[1].cancel)
 
-    async def _write(self, model: Model, prompt: Prompt, heard: Heard) -> Generation:
-        task = asyncio.create_task(write_program(model, prompt, heard=heard))
+    async def _write(self, model: Model, prompt: Prompt, on_text: TextListener) -> Generation:
+        task = asyncio.create_task(write_program(model, prompt, on_text=on_text))
         self._request = (asyncio.get_running_loop(), task)
         try:
             if self._is_cancelled:

@@ -19,7 +19,7 @@ from codebotler.core.world import Point
 from codebotler.missions.progress import AT
 from codebotler.missions.stop import StopButton
 from codebotler.robots import base
-from codebotler.robots.base import CancelledError, Picture, RobotLostError
+from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names_of
 from codebotler.simulator.sampled_robot import RoomMap
@@ -250,7 +250,7 @@ class LiveRobot:
         name = str(there).strip().casefold()
         return next((room for room in self._room_map.rooms if room.strip().casefold() == name), None)
 
-    def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
+    def _logged(self, skill: Skill, given: list[base.RobotArgument], event: Event | None) -> base.RobotResult:
         """The robot's answer or its error, logged."""
         self._number += 1
         which = {"number": self._number, "skill": skill.name}
@@ -274,12 +274,12 @@ class LiveRobot:
         self._check_end()
         return result
 
-    def _done(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
+    def _done(self, skill: Skill, given: list[base.RobotArgument], event: Event | None) -> base.RobotResult:
         which = {"number": self._number, "skill": skill.name}
 
-        def told(what: str | Picture) -> None:
+        def told(what: str | CameraPicture) -> None:
             try:
-                if isinstance(what, Picture):
+                if isinstance(what, CameraPicture):
                     self._note("picture", **which, picture=what.data)
                 else:
                     if not self._is_watched and (found := AT.fullmatch(what)):
@@ -306,7 +306,7 @@ class LiveRobot:
             raise StoppedError
 
 
-def answered(skill: Skill, result: base.Result) -> base.Result:
+def answered(skill: Skill, result: base.RobotResult) -> base.RobotResult:
     """A robot's answer; raises RobotLostError if it does not fit the skill."""
     if not skill.returns.fits(result):
         expected = skill.returns.annotation
@@ -323,13 +323,13 @@ def _rule_entry(broken: RuleViolationError) -> dict[str, object]:
     return {"rule": rule.name, "says": rule.says, "formula": str(rule.formula), **what}
 
 
-def _text(argument: Argument) -> base.Argument:
+def _text(argument: Argument) -> base.RobotArgument:
     if not isinstance(argument, tuple):
         return argument
     return tuple(each.text if isinstance(each, Option) else each for each in argument)
 
 
-def _position(result: base.Result, event: Event) -> int:
+def _position(result: base.RobotResult, event: Event) -> int:
     """The number of the chosen option; its case and blanks may differ. Raises RobotError if it is none."""
     heard = str(result)
     for same in (str, lambda text: text.strip().casefold()):

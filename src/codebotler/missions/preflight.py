@@ -13,8 +13,8 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import answered
-from codebotler.models.recorded import UnknownInstructionError, closest_to, recorded_model
-from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
+from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
+from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -35,7 +35,7 @@ def preflight(
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
-    def ask_robot(skill: str, what: str) -> Result:
+    def ask_robot(skill: str, what: str) -> RobotResult:
         if skill not in can:
             return None
         try:
@@ -105,7 +105,7 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
 
 def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
     """The instructions that the recorded models know and whose rooms are there, with a program each."""
-    replies = recorded_model("recorded").replies
+    replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
     if room_map is None:
         return known
@@ -118,7 +118,7 @@ def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
 
 def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) -> UnknownInstructionError:
     """The same error, with the closest instructions whose rooms are there."""
-    closest = closest_to(error.instruction, known_instructions(room_map))
+    closest = find_closest(error.instruction, known_instructions(room_map))
     return UnknownInstructionError(error.model, error.instruction, closest)
 
 

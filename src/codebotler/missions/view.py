@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from codebotler.checking.problems import Check
-from codebotler.generation.arriving import ArrivingReply, arriving
 from codebotler.generation.no_program import ProgramlessReply
+from codebotler.generation.partial_reply import PartialReply, split_partial
 from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
@@ -92,9 +92,9 @@ class SessionView:
         return self.check is None or not any(one.kind in UNREADABLE for one in self.check.problems)
 
     @property
-    def arriving(self) -> ArrivingReply:
+    def arriving(self) -> PartialReply:
         """The reply that a model is writing, as much as has arrived."""
-        return arriving(self.reply)
+        return split_partial(self.reply)
 
     @property
     def digest(self) -> str:

@@ -1,4 +1,4 @@
-"""The `Model` protocol, and what every model takes, returns and raises."""
+"""The `Model` protocol, its replies and its errors."""
 
 from __future__ import annotations
 
@@ -7,64 +7,48 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
-from codebotler.models.no_program import NoProgram, is_cut_off, why_no_program
+from codebotler.models.no_program import NoProgram, classify_reply, is_cut_off
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.prompts.extract import read_reply
 
-Heard: TypeAlias = Callable[[str], None]
+TextListener: TypeAlias = Callable[[str], None]
+"""Called with each piece of a reply as it arrives."""
 
 
 @dataclass(frozen=True)
 class Usage:
-    """The tokens that a request took; None where the model does not count them.
-
-    Args:
-        input_tokens: the tokens of the prompt.
-        output_tokens: the tokens of the reply, with its reasoning.
-        reasoning_tokens: the tokens of the reasoning alone.
-    """
+    """The tokens of a request; None where the model does not count them."""
 
     input_tokens: int | None = None
-    output_tokens: int | None = None
+    output_tokens: int | None = None  # including the reasoning
     reasoning_tokens: int | None = None
 
     @property
     def total(self) -> int:
-        """All known tokens."""
+        """The sum of the known input and output tokens."""
         return (self.input_tokens or 0) + (self.output_tokens or 0)
 
 
 @dataclass(frozen=True)
 class Reply:
-    """A model's reply.
+    """A model's reply."""
 
-    Args:
-        text: the reply as it came, with calls of tools as text; of a refused request what the server said.
-        program: the program in it; any text, which need not even parse.
-        usage: the tokens that it took.
-        latency_s: the seconds from the request to the end of the reply; None where nobody measured them.
-        finish_reason: why it ended, as the server said it, such as `stop` or `length`; None if it said
-            nothing.
-        reasoning: what the model thought before it answered, where the server shows it.
-        no_program: why it holds no program; None if it does, or if that is uncertain.
-    """
-
-    text: str = field(repr=False)
-    program: str = field(repr=False)
-    usage: Usage
-    latency_s: float | None
-    finish_reason: str | None
-    reasoning: str = field(default="", repr=False)
-    no_program: NoProgram | None = None
+    text: str = field(repr=False)  # the complete reply with tool calls, or the message of a refusal
+    program: str = field(repr=False)  # the program in the reply; it may not parse
+    usage: Usage  # the number of tokens
+    latency_s: float | None  # the seconds from the request to the end of the reply; None if not measured
+    finish_reason: str | None  # the server's reason for the end, such as `stop` or `length`; None without one
+    reasoning: str = field(default="", repr=False)  # the model's reasoning, where the server shows it
+    no_program: NoProgram | None = None  # why there is no program; None if there is one, or if uncertain
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether it ended at the limit of tokens, whether or not its program is whole."""
+        """Whether the reply reached the token limit; its program may be complete all the same."""
         return is_cut_off(self.finish_reason)
 
     def data(self) -> dict[str, Any]:
-        """The reply as rows of JSON have it."""
+        """Return the reply as plain data for a row of JSON."""
         return {
             "program": self.program,
             "no_program": self.no_program,
@@ -76,7 +60,7 @@ class Reply:
         }
 
 
-def reply_from(
+def make_reply(
     text: str,
     usage: Usage,
     latency_s: float | None,
@@ -84,75 +68,66 @@ def reply_from(
     *,
     opening: Prompt | None = None,
     reasoning: str = "",
-    said: NoProgram | None = None,
+    known_kind: NoProgram | None = None,
     has_answer: bool = True,
 ) -> Reply:
-    """A reply with its program.
+    """Extract the program and build a `Reply`.
 
-    Args:
-        text: the reply as it came.
-        usage: the tokens that it took.
-        latency_s: the seconds that it took; None where nobody measured them.
-        finish_reason: why it ended, as the server said it.
-        opening: the prompt that a base model goes on from; None for a chat model.
-        reasoning: what the server sent as the model's thoughts, apart from the text.
-        said: the kind of reply without a program that the server made known in another way.
-        has_answer: whether the text is the model's answer, in which a program may be.
+    `opening` is the prompt that a base model continues; None for a chat model. `known_kind` is the kind of
+    reply without a program, if the server reported it outside the text. Only an answer can hold a program.
     """
     answer = text if has_answer else ""
     found = read_reply(
         answer if opening is None else opening.program_from(answer), continues=opening is not None
     )
     has_code = found.has_code and has_answer
-    why = why_no_program(text, found.program, finish_reason, has_code=has_code, said=said)
+    why = classify_reply(text, found.program, finish_reason, has_code=has_code, known_kind=known_kind)
     thoughts = "\n".join(filter(None, (reasoning, found.reasoning)))
     return Reply(text, found.program, usage, latency_s, finish_reason, thoughts, why)
 
 
-def unheard(_piece: str) -> None:
-    """Ignore a piece of a reply."""
+def ignore_text(_piece: str) -> None:
+    """Ignore the text."""
 
 
 class Model(Protocol):
-    """Anything that writes programs on request.
+    """Writes programs on request.
 
-    It takes several requests at a time, all from one event loop; a cancelled request is given up.
+    Several requests may run at a time, all in one event loop; each can be cancelled.
     """
 
     @property
     def name(self) -> str:
-        """The name on a command line and in a run, such as `openai-chat:gpt-5.1`."""
+        """The name for command lines and runs, such as `openai-chat:gpt-5.1`."""
 
     @property
     def settings(self) -> SamplingSettings:
-        """The settings that it really sends: what its provider does not take is None."""
+        """The settings that are sent; settings that the provider does not support are None."""
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         """Request one reply.
 
         Args:
             prompt: the request.
-            number: which sample of this prompt it is, counted from 0.
-            heard: called with each piece of the text as it arrives, and of thoughts between `<think>` and
-                `</think>`; from the beginning again when the request is repeated after an error.
+            number: the number of the sample of this prompt, from 0.
+            on_text: called with each piece of the text, and of reasoning between `<think>` and `</think>`;
+                starts again from the beginning when a request is repeated after an error.
 
         Raises:
-            ModelError: no whole reply arrived.
+            ModelError: no complete reply arrived.
         """
 
     async def close(self) -> None:
-        """Release its connections and memory; no request may be under way."""
+        """Release connections and memory; call it only when no request is running."""
 
 
 class ModelError(Exception):
-    """A model did not reply.
-
-    A reply without a program is none of these: it counts as a completion.
+    """A model did not reply; a reply without a program is no error.
 
     Args:
-        sentence: what went wrong and, where it helps, the mend; it holds no keys.
+        sentence: the cause and, if known, the fix; contains no keys.
         may_pass: whether the same request may succeed later.
-        retry_after: the seconds to wait that the server asks for, if it does.
+        retry_after: the seconds that the server asks to wait; None if it does not.
         is_refusal: whether the server refused this prompt, rather than failed.
     """
 
@@ -164,19 +139,11 @@ class ModelError(Exception):
         self.is_refusal = is_refusal
 
     def __reduce__(self) -> tuple[object, ...]:
-        made = partial(
-            type(self), may_pass=self.may_pass, retry_after=self.retry_after, is_refusal=self.is_refusal
-        )
-        return made, (self.sentence,), vars(self)
+        return partial(type(self), may_pass=self.may_pass), (self.sentence,), vars(self)
 
 
 class BudgetSpentError(Exception):
-    """The token budget is spent, so no further request is made.
-
-    Args:
-        budget: the allowed tokens.
-        used: the used tokens.
-    """
+    """The token budget is used up, so no further request is made."""
 
     def __init__(self, budget: int, used: int) -> None:
         self.budget, self.used = budget, used

@@ -1,4 +1,4 @@
-"""Requests that are sent in a file, as batch endpoints of OpenAI's protocol take them, and their answers."""
+"""Requests and answers in files for batch endpoints of OpenAI's protocol."""
 
 from __future__ import annotations
 
@@ -18,41 +18,37 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.models.server_errors import FIRST_ERROR, error_in_reply
 from codebotler.prompts import Prompt
 
-OPENAI = "https://api.openai.com/v1"
-OF_STREAMS = ("stream", "stream_options")  # fields that no batch takes
-ENDED = {"choices": [{"index": 0, "finish_reason": "stop", "text": "pass", "message": {"content": "pass"}}]}
-EVENTS = {"content-type": "text/event-stream"}
+OPENAI_URL = "https://api.openai.com/v1"
+STREAM_FIELDS = ("stream", "stream_options")  # not allowed in batches
+EMPTY_ANSWER = {
+    "choices": [{"index": 0, "finish_reason": "stop", "text": "pass", "message": {"content": "pass"}}]
+}
+STREAM_HEADERS = {"content-type": "text/event-stream"}
 
 
 @dataclass(frozen=True)
 class BatchRequest:
-    """A request for a batch endpoint.
+    """A request for a batch endpoint."""
 
-    Args:
-        url: the path of the endpoint, such as `/v1/chat/completions`.
-        body: the JSON of the request.
-    """
-
-    url: str
-    body: Mapping[str, Any]
+    url: str  # the path of the endpoint, such as `/v1/chat/completions`
+    body: Mapping[str, Any]  # as JSON
 
 
 class BatchModel:
-    """A model whose requests and answers are in files; nothing is sent, and no key is needed.
+    """A model whose requests and answers are in files; it sends nothing and needs no key.
 
-    It writes requests and reads answers with the code that asks the same model one by one, whose client of
-    HTTP is connected to this object in the place of a server.
+    It reuses the code of the same model for single requests, and takes the place of its server.
     """
 
     def __init__(self, name: str, settings: SamplingSettings) -> None:
         kind, _, rest = name.partition(":")
-        client = httpx2.AsyncClient(transport=httpx2.MockTransport(self._answered))
-        asked = replace(settings, base_url=settings.base_url or OPENAI, timeout=SamplingSettings.timeout)
+        client = httpx2.AsyncClient(transport=httpx2.MockTransport(self._answer_request))
+        usable = replace(settings, base_url=settings.base_url or OPENAI_URL, timeout=SamplingSettings.timeout)
         self._model: ChatModel | CompletionsModel
         if kind == "completions":
-            self._model = CompletionsModel(rest, asked, client)
+            self._model = CompletionsModel(rest, usable, client)
         elif kind == OWN_SERVER or (kind == "openai" and settings.base_url is not None):
-            self._model = ChatModel(name, asked, client)
+            self._model = ChatModel(name, usable, client)
         else:
             raise UserError(f"{name} takes no batch file; use {OWN_SERVER}:NAME or completions:NAME")
         self.name = self._model.name
@@ -60,40 +56,25 @@ class BatchModel:
         self._runner = asyncio.Runner()
         self._bodies: dict[Prompt, Mapping[str, Any]] = {}
         self._sent: httpx2.Request | None = None
-        self._answer = _response(200, ENDED)
+        self._answer = _response(200, EMPTY_ANSWER)
 
     def request(self, prompt: Prompt, *, number: int) -> BatchRequest:
-        """The request for one reply.
-
-        Args:
-            prompt: the request.
-            number: which sample of this prompt it is, counted from 0.
-        """
+        """Return the request for reply `number` to a prompt, counted from 0."""
         if prompt not in self._bodies:
-            self._reply(prompt, number, _response(200, ENDED))
-            assert self._sent is not None, "the model has sent its request to us"
+            self._reply(prompt, number, _response(200, EMPTY_ANSWER))
+            assert self._sent is not None, "the model sends its request to this object"
             sent = json.loads(self._sent.content)
-            self._bodies[prompt] = {name: value for name, value in sent.items() if name not in OF_STREAMS}
-        seed = self.settings.seed_of(number)  # the only difference between requests of the same prompt
+            self._bodies[prompt] = {name: value for name, value in sent.items() if name not in STREAM_FIELDS}
+        seed = self.settings.seed_of(number)  # requests for the same prompt differ only in this
         body = {**self._bodies[prompt], **({} if seed is None else {"seed": seed})}
         is_chat = isinstance(self._model, ChatModel)
         return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
 
     def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
-        """The reply in an answer.
-
-        Args:
-            prompt: the request.
-            number: which sample of this prompt it is, counted from 0.
-            status: the status of HTTP that the endpoint says it had.
-            body: the JSON that the endpoint says it had.
-
-        Raises:
-            ModelError: it is no reply, but an error.
-        """
+        """Parse the HTTP status and the JSON of an answer; ModelError if the answer is an error."""
         if status < FIRST_ERROR and not _has_choice(body):
             raise error_in_reply(self.name, body)
-        short = replace(prompt, messages=prompt.messages[-1:])  # which is sent to us again, and takes time
+        short = replace(prompt, messages=prompt.messages[-1:])  # a long request would take time
         return replace(self._reply(short, number, _response(status, body)), latency_s=None)
 
     def close(self) -> None:
@@ -105,7 +86,7 @@ class BatchModel:
         self._answer = answer
         return self._runner.run(self._model.reply(prompt, number=number))
 
-    def _answered(self, request: httpx2.Request) -> httpx2.Response:
+    def _answer_request(self, request: httpx2.Request) -> httpx2.Response:
         self._sent = request
         return self._answer
 
@@ -116,19 +97,19 @@ def _has_choice(body: object) -> bool:
 
 
 def _response(status: int, body: Any) -> httpx2.Response:  # noqa: ANN401 - any JSON
-    """An answer as the server would have sent it to a request for a stream."""
+    """Build the response that the server would have sent for a stream."""
     if status >= FIRST_ERROR:
         return httpx2.Response(status, json=body)
     head = {name: value for name, value in body.items() if name not in {"choices", "usage"}}
-    *earlier, last = _streamed(body["choices"][0])
+    *earlier, last = _split_choice(body["choices"][0])
     chunks = [{"choices": [choice]} for choice in earlier] + [{"choices": [last], "usage": body.get("usage")}]
     events = [json.dumps({**head, "object": "chat.completion.chunk", **chunk}) for chunk in chunks]
     text = "".join(f"data: {event}\n\n" for event in [*events, "[DONE]"])
-    return httpx2.Response(200, headers=EVENTS, text=text)
+    return httpx2.Response(200, headers=STREAM_HEADERS, text=text)
 
 
-def _streamed(choice: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The choices of a stream that make up one choice: reasoning comes before the answer."""
+def _split_choice(choice: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Split a choice into those of a stream, reasoning first."""
     message = choice.get("message")
     if not isinstance(message, Mapping):
         return [dict(choice)]

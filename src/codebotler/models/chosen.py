@@ -1,4 +1,4 @@
-"""Which model is asked where a command names none: by the environment, a file, or else a recorded one."""
+"""Choose the default model: from the environment, config.yaml, or else a recorded one."""
 
 from __future__ import annotations
 
@@ -16,39 +16,33 @@ from codebotler.models.open import expect_server, kind_of, open_model, runs_on_s
 from codebotler.models.recorded import is_recorded
 from codebotler.models.sampling import SamplingSettings
 
-VARIABLE = "CODEBOTLER_MODEL"
-RECORDED = "recorded:careful"
+MODEL_VARIABLE = "CODEBOTLER_MODEL"
+DEFAULT_MODEL = "recorded:careful"
 
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """A model, and how it is asked unless a command says otherwise.
+    """A model with its default settings."""
 
-    Args:
-        name: as `open_model` takes it.
-        base_url: the address of its server; None for the provider's own.
-        max_tokens: the limit for a reply, in tokens; None for the default.
-    """
+    name: str  # the argument for `open_model`
+    base_url: str | None = None  # None means the provider's own server
+    max_tokens: int | None = None  # None means the default limit for a reply
 
-    name: str
-    base_url: str | None = None
-    max_tokens: int | None = None
-
-    def with_its_server(self, settings: SamplingSettings) -> SamplingSettings:
-        """The settings with its address, and with its limit unless they have one."""
+    def add_server(self, settings: SamplingSettings) -> SamplingSettings:
+        """Return the settings with this model's address, and with its limit unless they have one."""
         limit = settings.max_tokens or self.max_tokens
         return replace(settings, base_url=self.base_url, max_tokens=limit)
 
 
 class ConfigFile(BaseModel):
-    """What config.yaml may say."""
+    """The contents of config.yaml."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    model: Annotated[str, Field(min_length=1)] = RECORDED
+    model: Annotated[str, Field(min_length=1)] = DEFAULT_MODEL
     base_url: str | None = None
     max_tokens: Annotated[int, Field(ge=1)] | None = None
-    behind_proxy: tuple[str, ...] = ()  # where a reverse proxy offers the page
+    behind_proxy: tuple[str, ...] = ()  # addresses at which a reverse proxy serves the page
 
     @model_validator(mode="after")
     def _has_a_model_for_its_settings(self) -> Self:
@@ -57,14 +51,13 @@ class ConfigFile(BaseModel):
         return self
 
 
-def chosen_model(name: str | None = None, base_url: str | None = None) -> ChosenModel:
-    """The model that is named, or else that of CODEBOTLER_MODEL, that of config.yaml, or the recorded one.
+def choose_model(name: str | None = None, base_url: str | None = None) -> ChosenModel:
+    """Choose the given model, or else the one of CODEBOTLER_MODEL, of config.yaml, or the recorded one.
 
-    The address and the limit of config.yaml belong to its model: they are used for that model only, however
-    it is named.
+    The address and the limit in config.yaml apply only to the model named there.
 
     Raises:
-        UserError: config.yaml is wrong.
+        UserError: config.yaml is invalid.
     """
     if name is not None and is_recorded(name):
         return ChosenModel(name, base_url)
@@ -72,22 +65,24 @@ def chosen_model(name: str | None = None, base_url: str | None = None) -> Chosen
     config = ConfigFile()
     if file is not None and file.is_file():
         config = YamlFile.read(file).validate(ConfigFile)
-    name = name or os.environ.get(VARIABLE, "").strip() or config.model
+    name = name or os.environ.get(MODEL_VARIABLE, "").strip() or config.model
     if name != config.model:
         return ChosenModel(name, base_url)
     return ChosenModel(name, base_url or config.base_url, config.max_tokens)
 
 
-def opener(models: Sequence[str], base_url: str | None, settings: SamplingSettings) -> Callable[[str], Model]:
-    """What opens models by their names; names that make no sense are refused at once."""
+def make_opener(
+    models: Sequence[str], base_url: str | None, settings: SamplingSettings
+) -> Callable[[str], Model]:
+    """Return a function that opens models by name; raise UserError at once for an invalid name."""
     for each in models:
         kind_of(each)
     if base_url is not None:
         expect_server(*models)
 
-    def opened(name: str) -> Model:
+    def open_by_name(name: str) -> Model:
         if not runs_on_server(name):
             return open_model(name, settings)
-        return open_model(name, chosen_model(name, base_url).with_its_server(settings))
+        return open_model(name, choose_model(name, base_url).add_server(settings))
 
-    return opened
+    return open_by_name

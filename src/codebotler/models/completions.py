@@ -1,4 +1,4 @@
-"""Base models behind a text-completion endpoint, as served by vLLM, TGI and llama.cpp."""
+"""Base models behind a text-completion endpoint, such as vLLM, TGI and llama.cpp."""
 
 from __future__ import annotations
 
@@ -11,88 +11,96 @@ import openai
 from pydantic_ai.exceptions import ModelHTTPError
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Heard, ModelError, Reply, Usage, reply_from, unheard
-from codebotler.models.http_client import bound, cannot_open, limit_of, with_proxy, without_proxy
-from codebotler.models.keys import guard_logs, key_in, without_keys
+from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text, make_reply
+from codebotler.models.http_client import (
+    byte_limit,
+    limit_replies,
+    mention_proxy,
+    opening_error,
+    without_proxy,
+)
+from codebotler.models.keys import guard_logs, read_key, remove_keys
 from codebotler.models.openai_stream import Chunks, make_lenient
 from codebotler.models.sampling import SamplingSettings
 from codebotler.models.server_errors import (
-    broken_off,
+    connection_error,
     error_in_reply,
-    failure,
+    find_model_error,
+    incomplete_error,
     is_filtered,
-    model_error_in,
-    refused,
-    timed_out,
-    unreachable,
+    model_error,
+    status_error,
+    timeout_error,
 )
 from codebotler.prompts import Prompt
 
-KEY = "OPENAI_API_KEY"
-NO_KEY = "none"  # for servers that want none, since the client does
-NO_MONEY = "insufficient_quota"  # a 429 that no waiting mends
+OPENAI_KEY = "OPENAI_API_KEY"
+PLACEHOLDER_KEY = "none"  # the client requires a key even if the server does not
+QUOTA_ERROR = "insufficient_quota"  # waiting does not help against this 429
 
 
 class CompletionsModel:
-    """A base model on a server, which continues a text."""
+    """A base model on a server; it continues a text."""
 
     def __init__(
         self, model: str, settings: SamplingSettings, http_client: httpx2.AsyncClient | None = None
     ) -> None:
         self.name = f"completions:{model}"
-        key = key_in(KEY)
+        key = read_key(OPENAI_KEY)
         if settings.base_url is None and not key:
-            raise UserError(f"{self.name} needs --base-url, or {KEY} in the environment for OpenAI's own")
+            raise UserError(f"{self.name} needs --base-url, or {OPENAI_KEY} to use OpenAI's own")
         self.model, self.settings = model, settings.for_base_model(self.name)
         try:
             with without_proxy(settings.base_url):
                 client = http_client or openai.DefaultAsyncHttpxClient()
-        except Exception as error:  # noqa: BLE001 - of wrong proxies and certificates
-            raise cannot_open(self.name, error) from None
+        except Exception as error:  # noqa: BLE001 - wrong proxies and certificates raise many types
+            raise opening_error(self.name, error) from None
         self.client = make_lenient(
             openai.AsyncOpenAI(
-                api_key=key or NO_KEY,
+                api_key=key or PLACEHOLDER_KEY,
                 base_url=settings.base_url,
                 timeout=settings.timeout,
                 max_retries=0,
-                http_client=bound(client, self.name, limit_of(self.settings.max_tokens)),
+                http_client=limit_replies(client, self.name, byte_limit(self.settings.max_tokens)),
             )
         )
         guard_logs()
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         """Request one reply."""
         start = time.monotonic()
         try:
             async with asyncio.timeout(self.settings.timeout):
-                text, chunks = await self._continuation(prompt, number, heard)
+                text, chunks = await self._request(prompt, number, on_text)
         except TimeoutError:
-            raise timed_out(self.name, self.settings.timeout) from None
+            raise timeout_error(self.name, self.settings.timeout) from None
         except openai.OpenAIError as error:
-            failed = model_error_in(error) or with_proxy(self._error(error), self.settings.base_url)
+            failed = find_model_error(error) or mention_proxy(self._convert(error), self.settings.base_url)
             if not isinstance(error, openai.APIStatusError) or not is_filtered(error.status_code, error.body):
                 raise failed from None
             latency = time.monotonic() - start
-            return reply_from(failed.sentence, Usage(), latency, None, said="filtered", has_answer=False)
+            return make_reply(
+                failed.sentence, Usage(), latency, None, known_kind="filtered", has_answer=False
+            )
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise failure(self.name, f"the server sent invalid JSON ({error})", may_pass=True) from None
+            raise model_error(self.name, f"the server sent invalid JSON ({error})", may_pass=True) from None
         if chunks.error is not None:
             raise error_in_reply(self.name, chunks.error)
         if not chunks.is_whole:
-            raise broken_off(self.name, begun=bool(text))
+            raise incomplete_error(self.name, has_begun=bool(text))
         usage = (
             Usage()
             if chunks.usage is None
             else Usage(chunks.usage.prompt_tokens, chunks.usage.completion_tokens)
         )
-        text, latency = without_keys(text), time.monotonic() - start
-        return reply_from(text, usage, latency, chunks.finish_reason, opening=prompt)
+        text, latency = remove_keys(text), time.monotonic() - start
+        return make_reply(text, usage, latency, chunks.finish_reason, opening=prompt)
 
     async def close(self) -> None:
         """Close the connections."""
         await self.client.close()
 
-    async def _continuation(self, prompt: Prompt, number: int, heard: Heard) -> tuple[str, Chunks]:
+    async def _request(self, prompt: Prompt, number: int, on_text: TextListener) -> tuple[str, Chunks]:
         settings = self.settings
         seed = settings.seed_of(number)
         pieces: list[str] = []
@@ -113,21 +121,21 @@ class CompletionsModel:
                 for choice in chunk.choices or ():
                     if choice.text:
                         pieces.append(choice.text)
-                        heard(choice.text)
+                        on_text(choice.text)
         return "".join(pieces), chunks
 
-    def _error(self, error: openai.OpenAIError) -> ModelError:
+    def _convert(self, error: openai.OpenAIError) -> ModelError:
         if isinstance(error, openai.APITimeoutError):
-            return timed_out(self.name, self.settings.timeout)
+            return timeout_error(self.name, self.settings.timeout)
         if isinstance(error, openai.APIStatusError):
-            return refused(
+            return status_error(
                 self.name,
                 error.status_code,
                 error.body or error.response.text,
                 retry_after=ModelHTTPError(0, self.name, headers=error.response.headers).retry_after,
-                hopeless=error.code == NO_MONEY,
+                is_permanent=error.code == QUOTA_ERROR,
             )
         if isinstance(error, openai.APIError) and error.body is not None:
             return error_in_reply(self.name, error.body)
-        nobody = unreachable(self.name, error, self.settings.base_url)
-        return nobody or failure(self.name, error, may_pass=True)
+        no_connection = connection_error(self.name, error, self.settings.base_url)
+        return no_connection or model_error(self.name, error, may_pass=True)

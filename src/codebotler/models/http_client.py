@@ -1,4 +1,4 @@
-"""Clients of HTTP: bounded replies, no silent redirects, no proxy for this machine."""
+"""HTTP clients with a limit on replies, without redirects, and without proxies for local servers."""
 
 from __future__ import annotations
 
@@ -14,42 +14,40 @@ from urllib.request import getproxies, proxy_bypass
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
-from codebotler.models.keys import redacted
-from codebotler.models.server_errors import FIRST_ERROR, error_in_reply, error_text, failure
+from codebotler.models.keys import redact
+from codebotler.models.server_errors import FIRST_ERROR, error_in_reply, error_text, model_error
 
-Client = TypeVar("Client", bound=Any)  # of httpx or httpx2, which share no type
+HTTPClient = TypeVar("HTTPClient", bound=Any)  # of httpx or httpx2, which share no type
 
-FLOOR = 8_000_000  # bytes
-PER_TOKEN = 4_000  # bytes; a piece of a stream holds much more than its token
-UNKNOWN_TOKENS = 100_000  # for which room is left where no limit is set
-CERTIFICATES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
+MIN_REPLY_BYTES = 8_000_000
+BYTES_PER_TOKEN = 4_000  # each event of a stream is much longer than its token
+ASSUMED_TOKENS = 100_000  # if there is no limit
+CERTIFICATE_VARIABLES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 ENDPOINTS = ("/chat/completions", "/completions", "/responses", "/messages")
 
 
-def limit_of(max_tokens: int | None) -> int:
-    """The bytes that a reply of so many tokens may have, generously."""
-    return max(FLOOR, PER_TOKEN * (max_tokens or UNKNOWN_TOKENS))
+def byte_limit(max_tokens: int | None) -> int:
+    """Return a generous limit for the bytes of a reply with up to `max_tokens` tokens."""
+    return max(MIN_REPLY_BYTES, BYTES_PER_TOKEN * (max_tokens or ASSUMED_TOKENS))
 
 
-def bound(client: Client, name: str, limit: int) -> Client:
-    """Limit the bytes that a client of HTTP takes for any request of a model, and return the client.
+def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
+    """Limit the bytes of each reply to a model's HTTP client, and return the client.
 
-    Replies are requested without compression, and compressed ones are refused: a few bytes of them could
-    become any number. A redirect is refused with the new address, since following it would take the key to
-    another server or lose the request. An error that comes as JSON although a stream was requested is raised
-    in the server's words. All of these raise a ModelError.
+    The client raises ModelError for a longer reply; a compressed one, which could expand without limit; a
+    redirect, which could send the key to another server; and for an error sent as JSON instead of a stream.
     """
 
-    async def check(response: Any) -> None:  # noqa: ANN401 - see Client
+    async def check(response: Any) -> None:  # noqa: ANN401 - see HTTPClient
         coding = response.headers.get("content-encoding", "identity")
         if coding != "identity":
             sentence = f"{name}: the server compressed its reply ({coding}), which was not requested"
             raise ModelError(sentence, may_pass=False)
-        response.stream = _stream(response.stream, name, limit)
+        response.stream = _limit_stream(response.stream, name, limit)
         if response.has_redirect_location:
-            address = _address(str(response.url.join(response.headers["location"])))
-            mend = f"set the base URL to {address}"
-            raise ModelError(f"{name}: the server has moved to {address}; {mend}", may_pass=False)
+            address = _base_url(str(response.url.join(response.headers["location"])))
+            sentence = f"{name}: the server redirects to {address}; set the base URL to that"
+            raise ModelError(sentence, may_pass=False)
         is_json = response.headers.get("content-type", "").startswith("application/json")
         if is_json and response.status_code < FIRST_ERROR and b'"stream":true' in response.request.content:
             raise _error_instead_of_stream(name, await response.aread())
@@ -60,8 +58,8 @@ def bound(client: Client, name: str, limit: int) -> Client:
     return client
 
 
-def _address(url: str) -> str:
-    """The base URL to which a redirect leads, without what may be a secret."""
+def _base_url(url: str) -> str:
+    """Return the base URL of a redirect, without parts that may be secret."""
     parts = urlsplit(url)
     path = parts.path.rstrip("/")
     for endpoint in ENDPOINTS:
@@ -72,24 +70,26 @@ def _address(url: str) -> str:
 
 def _error_instead_of_stream(name: str, body: bytes) -> ModelError:
     try:
-        said = json.loads(body)
+        reply = json.loads(body)
     except (ValueError, RecursionError):
-        said = None
-    if isinstance(said, dict) and said.get("choices") is None:
-        return error_in_reply(name, said.get("error") or said)
-    return failure(name, "the server sent its reply in one piece; only streams are supported", may_pass=False)
+        reply = None
+    if isinstance(reply, dict) and reply.get("choices") is None:
+        return error_in_reply(name, reply.get("error") or reply)
+    return model_error(
+        name, "the server sent its reply in one piece; only streams are supported", may_pass=False
+    )
 
 
-def _stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - see Client
-    # Each library takes only streams of its own class.
-    theirs = next(base for base in type(stream).__mro__ if base.__name__ == "AsyncByteStream")
+def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - see HTTPClient
+    # Each library accepts only streams of its own class.
+    base = next(kind for kind in type(stream).__mro__ if kind.__name__ == "AsyncByteStream")
 
-    class Bounded(theirs):  # type: ignore[misc,valid-type]  # one of two classes
+    class LimitedStream(base):  # type: ignore[misc,valid-type]  # one of two classes
         async def __aiter__(self) -> AsyncIterator[bytes]:
-            left = limit
+            remaining = limit
             async for piece in stream:
-                left -= len(piece)
-                if left < 0:
+                remaining -= len(piece)
+                if remaining < 0:
                     raise ModelError(
                         f"{name}: the server sent more than {limit:,} bytes for one reply", may_pass=False
                     )
@@ -98,7 +98,7 @@ def _stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - see Cl
         async def aclose(self) -> None:
             await stream.aclose()
 
-    return Bounded()
+    return LimitedStream()
 
 
 # --- proxies
@@ -106,7 +106,7 @@ def _stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - see Cl
 
 @contextmanager
 def without_proxy(url: str | None) -> Iterator[None]:
-    """Exempt a server on this machine from proxies, for clients that are made inside."""
+    """Ignore proxies for a local server while a client is created."""
     host = urlsplit(url).hostname if url is not None else None
     if host is None or not _is_loopback(host):
         yield
@@ -120,8 +120,8 @@ def without_proxy(url: str | None) -> Iterator[None]:
         os.environ.update(proxies)
 
 
-def with_proxy(error: ModelError, url: str | None) -> ModelError:
-    """The error, with the proxy through which a request to a server goes, if any."""
+def mention_proxy(error: ModelError, url: str | None) -> ModelError:
+    """Add the proxy of a request, if there is one, to its error, and return the error."""
     parts = urlsplit(url or "https://provider.invalid")
     host = parts.hostname or ""
     proxies = getproxies()
@@ -130,7 +130,7 @@ def with_proxy(error: ModelError, url: str | None) -> ModelError:
         return error
     shown = urlsplit(proxy if "://" in proxy else f"http://{proxy}")
     port = f":{shown.port}" if shown.port else ""
-    error.sentence += f" (through the proxy {redacted(f'{shown.scheme}://{shown.hostname}{port}')})"
+    error.sentence += f" (through the proxy {redact(f'{shown.scheme}://{shown.hostname}{port}')})"
     error.args = (error.sentence,)
     return error
 
@@ -143,9 +143,9 @@ def _is_loopback(host: str) -> bool:
     return address.is_loopback or address.is_unspecified
 
 
-def cannot_open(name: str, error: Exception) -> UserError:
-    """The error for a client that cannot be made: a proxy, certificates or settings are wrong."""
-    for variable in CERTIFICATES:
+def opening_error(name: str, error: Exception) -> UserError:
+    """Build the error for a client that cannot be created, such as with a wrong proxy or certificate."""
+    for variable in CERTIFICATE_VARIABLES:
         if (path := os.environ.get(variable)) and not Path(path).exists():
             return UserError(f"{name} cannot be used: {variable} names {path}, which does not exist")
     return UserError(f"{name} cannot be used: {error_text(error)}")

@@ -1,4 +1,4 @@
-"""API keys: read from the environment, and removed from whatever is shown, logged or written."""
+"""Read API keys from the environment, and remove them from output, logs and files."""
 
 from __future__ import annotations
 
@@ -13,35 +13,34 @@ from urllib.parse import quote
 
 from codebotler.core.errors import UserError
 
-SECRET = re.compile(r"(?:key|token|secret|password|passwd|credential)s?(?:_|$)", re.IGNORECASE)
-"""Found in the names of variables that hold keys, but not in TOKENIZERS_PARALLELISM."""
-
-SHORTEST = 8  # shorter values stay in replies, where they may be parts of names
-SHORTEST_IN_ERRORS = 3  # also in logs
-SHAPED = r"\b(?:sk|pk|gsk|xai|hf)[-_][\w*.-]{8,}|\bAIza[\w*-]{20,}|(?<=Bearer )\S{8,}"
-HIDDEN = "[key removed]"
-LOGGERS = (
+SECRET_NAME = re.compile(r"(?:key|token|secret|password|passwd|credential)s?(?:_|$)", re.IGNORECASE)
+"""In the names of variables that hold keys, but not in TOKENIZERS_PARALLELISM."""
+MIN_SECRET = 8  # shorter values stay in replies, where they may be parts of names
+MIN_SECRET_IN_ERRORS = 3  # also in logs
+KEY_SHAPES = r"\b(?:sk|pk|gsk|xai|hf)[-_][\w*.-]{8,}|\bAIza[\w*-]{20,}|(?<=Bearer )\S{8,}"
+KEY_REMOVED = "[key removed]"
+CLIENT_LOGGERS = (
     *("openai", "httpx", "httpx2", "httpcore", "httpcore2", "pydantic_ai", "anthropic", "google_genai"),
     *("google", "groq", "botocore", "huggingface_hub", "urllib3", "asyncio"),
 )
 
 
-def key_in(variable: str) -> str | None:
-    """The key in a variable of the environment, if there is one; a UserError if no header can hold it."""
+def read_key(variable: str) -> str | None:
+    """Return the key in an environment variable, or None; UserError if an HTTP header cannot hold it."""
     key = os.environ.get(variable, "")
     if not key.strip():
         return None
     if not (key.isascii() and key.isprintable() and key == key.strip()):
         raise UserError(
-            f"the key in {variable} cannot be sent: it has a line break, a space at either end, or a "
-            "character outside printable ASCII; set it again"
+            f"the key in {variable} has a line break, a space at an end, or a character outside ASCII; "
+            "set it again"
         )
     return key
 
 
 @contextmanager
-def blank_is_unset(variables: Iterable[str]) -> Iterator[None]:
-    """Take blank variables out of the environment meanwhile, for libraries that only test for presence."""
+def unset_blank(variables: Iterable[str]) -> Iterator[None]:
+    """Remove blank variables temporarily, for libraries that only test whether a variable exists."""
     blank = {name: os.environ.pop(name) for name in variables if not os.environ.get(name, "x").strip()}
     try:
         yield
@@ -49,22 +48,22 @@ def blank_is_unset(variables: Iterable[str]) -> Iterator[None]:
         os.environ.update(blank)
 
 
-def redacted(text: str) -> str:
-    """An error or a line of a log without the values of key variables and without the shapes of keys."""
-    # HIDDEN comes first, so that what stands for a long key is not taken for a short one.
-    rest = "|".join([re.escape(HIDDEN), SHAPED, *_secrets(SHORTEST_IN_ERRORS)])
-    return re.sub(rest, HIDDEN, without_keys(text))
+def redact(text: str) -> str:
+    """Remove the values of key variables, and text that looks like a key, from an error or a log line."""
+    # KEY_REMOVED comes first, since otherwise a short secret could match a part of it.
+    rest = "|".join([re.escape(KEY_REMOVED), KEY_SHAPES, *_secrets(MIN_SECRET_IN_ERRORS)])
+    return re.sub(rest, KEY_REMOVED, remove_keys(text))
 
 
-def without_keys(text: str) -> str:
-    """A reply without the long values of key variables; what only looks like a key may be a name in it."""
-    secrets = _secrets(SHORTEST)
-    return re.sub("|".join(secrets), HIDDEN, text) if secrets else text
+def remove_keys(text: str) -> str:
+    """Remove long values of key variables from a reply; text that only looks like a key may be a name."""
+    secrets = _secrets(MIN_SECRET)
+    return re.sub("|".join(secrets), KEY_REMOVED, text) if secrets else text
 
 
 def _secrets(shortest: int) -> list[str]:
-    """Patterns of the values of key variables, the longest first, for one may contain another."""
-    values = {value.strip() for name, value in os.environ.items() if SECRET.search(name)}
+    """Return patterns of the values of key variables, longest first, since one may contain another."""
+    values = {value.strip() for name, value in os.environ.items() if SECRET_NAME.search(name)}
     spellings = {
         spelling
         for value in values
@@ -84,10 +83,10 @@ class _Redaction(logging.Filter):
         try:
             message = record.getMessage()
         except (TypeError, ValueError):
-            return True  # logging itself reports such a record, and shows no more than its format
-        record.msg, record.args = redacted(message), None
+            return True  # logging reports such a record with its format only
+        record.msg, record.args = redact(message), None
         if record.exc_info:
-            record.exc_text = redacted(logging.Formatter().formatException(record.exc_info))
+            record.exc_text = redact(logging.Formatter().formatException(record.exc_info))
             record.exc_info = None
         return True
 
@@ -96,11 +95,14 @@ _REDACTION = _Redaction()
 
 
 def guard_logs() -> None:
-    """Take keys out of the logs of the libraries that talk to models, and silence their warnings.
+    """Remove keys from the logs of client libraries, and silence their warnings; call it after their import.
 
-    Call it once they are imported. Our own notes name the settings that a model does not take.
+    CodeBotler's own notes name the settings that a model does not support.
     """
-    warnings.filterwarnings("ignore", module="|".join(LOGGERS))
+    warnings.filterwarnings("ignore", module="|".join(CLIENT_LOGGERS))
     known = logging.root.manager.loggerDict
-    for name in [*LOGGERS, *(name for name in known if name.startswith(tuple(f"{top}." for top in LOGGERS)))]:
+    for name in [
+        *CLIENT_LOGGERS,
+        *(name for name in known if name.startswith(tuple(f"{top}." for top in CLIENT_LOGGERS))),
+    ]:
         logging.getLogger(name).addFilter(_REDACTION)

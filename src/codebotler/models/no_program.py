@@ -1,4 +1,4 @@
-"""Why a reply holds no program, as far as the server says it or the text leaves no doubt."""
+"""Why a reply holds no program, if the server says so or the text makes it certain."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NoProgram: TypeAlias = Literal["cut-off", "tool-call", "refusal", "filtered", "e
 """The kinds of replies without a program."""
 
 NO_PROGRAM_KINDS: tuple[NoProgram, ...] = get_args(NoProgram)
-IN_WORDS: Mapping[NoProgram, str] = {
+NO_PROGRAM_SENTENCES: Mapping[NoProgram, str] = {
     "cut-off": "The reply was cut off before the program was complete.",
     "tool-call": "The model called a tool instead of writing a program.",
     "refusal": "The model refused.",
@@ -32,39 +32,36 @@ _BY_REASON: Mapping[str, NoProgram] = {
     **dict.fromkeys(("content_filter", "content_filtered", "safety", "recitation", "blocklist"), "filtered"),
     **dict.fromkeys(("prohibited_content", "spii", "language", "guardrail_intervened"), "filtered"),
 }
-"""Reasons for the end of a reply by the words of servers, in lower case."""
+"""Kinds of replies by the finish reasons of servers, in lower case."""
 
 
 def is_cut_off(finish_reason: str | None) -> bool:
-    """Whether a reply ended at the limit of tokens, by the word of its server."""
+    """Whether the server says that a reply reached the token limit."""
     return (finish_reason or "").lower() in _CUT_OFF
 
 
-def why_no_program(
+def classify_reply(
     reply: str | None,
     program: str,
     finish_reason: str | None,
     *,
     has_code: bool,
-    said: NoProgram | None = None,
+    known_kind: NoProgram | None = None,
 ) -> NoProgram | None:
-    """Why a reply holds no program; None if it holds one, or something that may be meant as one.
+    """Return why a reply holds no program; None if it holds one, or text that may be meant as one.
 
-    A reply that was cut off behind a whole program holds one. A program up to whose end it was cut off is not
-    whole, even if it parses.
+    A reply that was cut off after a complete program holds one. If the reply was cut off inside the
+    program, the program is incomplete, even if it parses.
 
     Args:
-        reply: the text; None if nobody recorded it.
-        program: what was taken for the program.
-        finish_reason: why the reply ended, as the server said it; None if it said nothing.
-        has_code: whether there is any code in the reply.
-        said: the kind that the server made known in another way, such as a field for refusals.
-
-    Raises:
-        EngineError: no isolated process can be started.
+        reply: the text; None if it was not recorded.
+        program: the extracted program.
+        finish_reason: the server's reason for the end; None without one.
+        has_code: whether the reply contains any code.
+        known_kind: the kind, if the server reported it outside the text, such as in a field for refusals.
     """
     by_reason = _BY_REASON.get((finish_reason or "").lower())
-    kind = by_reason if by_reason == "cut-off" else said or by_reason
+    kind = by_reason if by_reason == "cut-off" else known_kind or by_reason
     if kind is not None and not (program.strip() and _is_whole(program)):
         return kind
     if kind == "cut-off" and reply is not None and _ends_in_code(reply, program):
@@ -75,7 +72,7 @@ def why_no_program(
 
 
 def _ends_in_code(reply: str, program: str) -> bool:
-    """Whether a reply ends within its program, or within a fence behind it, which holds a better version."""
+    """Whether a reply ends inside its program, or inside a later fence with a better version."""
     last = program.rstrip().rpartition("\n")[2].strip()
     _, _, rest = composed(reply).rpartition(last)
     fences = sum(line.lstrip().startswith(("```", "~~~")) for line in rest.splitlines())

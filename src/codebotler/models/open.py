@@ -1,13 +1,13 @@
-"""Opens a model by its name."""
+"""Open a model by its name."""
 
 from __future__ import annotations
 
 from codebotler.core.errors import UserError, installed
 from codebotler.models.base import Model
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import open_recorded
 from codebotler.models.sampling import SamplingSettings
 
-KINDS = (
+MODEL_FORMS = (
     "recorded, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
     "completions:NAME with --base-url, or hf:PATH"
 )
@@ -19,22 +19,21 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
     Args:
         name: `recorded`, `recorded:hasty`, `provider:name` as in pydantic-ai, `completions:name` for a
             text-completion endpoint, or `hf:PATH` for a folder or a name on the Hugging Face hub.
-        settings: how it is asked.
+        settings: the settings of its requests.
 
     Raises:
-        UserError: there is no such model, a key is not in the environment, or something is not installed.
+        UserError: the model does not exist, or a key or a package is missing.
     """
     kind, rest = kind_of(name), name.partition(":")[2]
-    # Each of the modules imports a large library, and is imported only where it is used.
+    # Each of these modules imports a large library, so import only the one that is needed.
     match kind:
         case "recorded":
             if settings.base_url is not None:
                 expect_server(name)
-            return recorded_model(name)
+            return open_recorded(name)
         case "completions":
             with installed():
                 from codebotler.models.completions import CompletionsModel  # noqa: PLC0415 - see above
-
             return CompletionsModel(rest, settings)
         case "hf":
             with installed():
@@ -47,7 +46,7 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
 
 
 def expect_server(*names: str) -> None:
-    """Refuse a base URL where none of the models runs on a server."""
+    """Raise UserError if none of the models runs on a server, so a base URL makes no sense."""
     if not any(map(runs_on_server, names)):
         raise UserError(
             f"a base URL is given, but {' and '.join(names)} {'does' if len(names) == 1 else 'do'} not use "
@@ -56,15 +55,15 @@ def expect_server(*names: str) -> None:
 
 
 def runs_on_server(name: str) -> bool:
-    """Whether a model is asked over HTTP, rather than recorded or on this machine."""
+    """Whether a model is reached over HTTP, unlike recorded models and models in this process."""
     return kind_of(name) not in {"recorded", "hf"}
 
 
 def kind_of(name: str) -> str:
-    """The part of a model's name before the colon, checked without importing a large library."""
+    """Validate a model's name without importing a large library; return its part before the colon."""
     kind, _, rest = name.partition(":")
     if kind == "recorded":
-        recorded_model(name)
+        open_recorded(name)
     elif not kind or not rest.strip():
-        raise UserError(f'"{name}" is not the name of a model; write {KINDS}')
+        raise UserError(f'"{name}" is not the name of a model; write {MODEL_FORMS}')
     return kind

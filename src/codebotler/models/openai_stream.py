@@ -1,4 +1,4 @@
-"""Streams of servers that speak OpenAI's protocol, some of them loosely."""
+"""Streams of OpenAI's protocol, also from servers that deviate from it."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import Any, TypeVar
 import openai
 from openai._streaming import ServerSentEvent, SSEDecoder
 
-Client = TypeVar("Client", bound=openai.AsyncOpenAI)
-ERROR = "error: "
-FAILED = {"abort", "error", "insufficient_system_resource"}  # reasons for the end that are failures
+OpenAIClient = TypeVar("OpenAIClient", bound=openai.AsyncOpenAI)
+ERROR_FIELD = "error: "
+FAILURE_REASONS = {"abort", "error", "insufficient_system_resource"}  # finish reasons that mean a failure
 
 
 class LenientDecoder(SSEDecoder):
-    """A decoder that skips events without data, which the protocol allows, and remembers the last mark."""
+    """A decoder that skips events without data, which the protocol allows, and notes `[DONE]`."""
 
     is_done = False
 
     def decode(self, line: str) -> ServerSentEvent | None:
-        """The event that a line completes; None if it completes none, or one without data."""
-        if line.startswith(ERROR):  # a field of llama.cpp's, which no standard has
-            line = f'data: {{"error": {line.removeprefix(ERROR)}}}'
+        """Return the event that a line completes; None if there is none, or if it has no data."""
+        if line.startswith(ERROR_FIELD):  # a nonstandard field of llama.cpp
+            line = f'data: {{"error": {line.removeprefix(ERROR_FIELD)}}}'
         event = super().decode(line)
         if event is None or not event.data:
             return None
@@ -29,28 +29,26 @@ class LenientDecoder(SSEDecoder):
         return event
 
 
-def make_lenient(client: Client) -> Client:
-    """Have a client decode streams leniently, and also each copy that a library makes of it."""
-    theirs = type(client)
-    client.__class__ = type(
-        theirs.__name__, (theirs,), {"_make_sse_decoder": lambda _client: LenientDecoder()}
-    )
+def make_lenient(client: OpenAIClient) -> OpenAIClient:
+    """Make a client, and all copies that a library makes of it, decode streams leniently."""
+    kind = type(client)
+    client.__class__ = type(kind.__name__, (kind,), {"_make_sse_decoder": lambda _client: LenientDecoder()})
     return client
 
 
 class Chunks:
-    """The chunks of a stream, with what they say of the end and of tokens.
+    """The chunks of a stream; collects the usage and the finish reason.
 
-    Servers count tokens in the last chunk, or up to now in each; so the last count is right. Some send a last
-    chunk without `delta`, or no reason for the end but the mark `[DONE]`.
+    Servers report usage in the last chunk or cumulatively in each, so the last report counts. Some send a
+    last chunk without `delta`, or only `[DONE]` instead of a finish reason.
     """
 
-    def __init__(self, stream: Any) -> None:  # noqa: ANN401 - of chat or text completions, or a wrapper of it
+    def __init__(self, stream: Any) -> None:  # noqa: ANN401 - of chat or text completions, or a wrapper
         self._stream = stream
-        self.source = getattr(stream, "source", stream)  # which pydantic-ai closes
+        self.source = getattr(stream, "source", stream)  # pydantic-ai closes it
         self.usage: Any = None
         self.finish_reason: str | None = None
-        self.error: object = None  # what came in the place of a chunk
+        self.error: object = None  # a body that came in place of a chunk
         self._has_choice = False
 
     async def __aiter__(self) -> AsyncIterator[Any]:
@@ -67,7 +65,7 @@ class Chunks:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the server said that the reply has ended, in whatever words."""
-        if not self._has_choice or self.finish_reason in FAILED:
+        """Whether the server has marked the end of the reply in any way."""
+        if not self._has_choice or self.finish_reason in FAILURE_REASONS:
             return False
         return bool(self.finish_reason) or bool(getattr(self.source._decoder, "is_done", False))  # noqa: SLF001 - no public way

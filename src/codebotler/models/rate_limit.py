@@ -1,4 +1,4 @@
-"""Limits on the rate, the concurrency and the tokens of requests to a model, and retries after errors."""
+"""Limit the rate, concurrency and tokens of requests to a model, and retry after errors."""
 
 from __future__ import annotations
 
@@ -16,35 +16,42 @@ from tenacity import (
 )
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.base import (
+    BudgetSpentError,
+    Model,
+    ModelError,
+    Reply,
+    TextListener,
+    Usage,
+    ignore_text,
+)
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 
-LOG = logging.getLogger("codebotler.models")
-LONGEST_WAIT = 30.0  # seconds between two tries, where the server asks for nothing else
-LONGEST_RETRY_AFTER = 600.0  # seconds; a request that a server defers for longer has failed
-CHARACTERS = 3  # for each token of a text, where the model counts none; a high estimate
+MODELS_LOG = logging.getLogger("codebotler.models")
+MAX_WAIT = 30.0  # seconds between two tries, unless the server asks for more
+MAX_RETRY_AFTER = 600.0  # seconds; a request that a server delays for longer fails
+CHARACTERS_PER_TOKEN = 3  # overestimates the tokens where the model does not count them
 
 
 @dataclass
 class RateLimited:
     """A model with limits.
 
-    Errors that may pass are retried: statuses such as 429 and 500, timeouts, failed and broken connections,
-    and answers that are no reply. A whole reply is never requested again, even without a program in it.
+    It retries temporary errors: statuses such as 429 and 500, timeouts, failed connections and invalid
+    answers. It never repeats a complete reply, even one without a program.
 
     Args:
-        model: the model that it asks.
-        concurrency: the requests that may be under way at a time, at least 1.
-        requests_per_minute: the requests, further tries included, that may begin in a minute, evenly spread;
-            None for any number.
+        model: the model to ask.
+        concurrency: the requests that may run at the same time, at least 1.
+        requests_per_minute: the tries that may start per minute, evenly spread; None for no limit.
         retries: the further tries of each request, at least 0.
-        token_budget: no request begins once so many tokens are used; those under way are completed. Where
-            the model counts no tokens, one is assumed for every three characters. None for any number.
-        first_wait: about the seconds before the second try; they double before each further one.
+        token_budget: the tokens after which no request starts; running ones complete. Where the model does
+            not count tokens, one is assumed for every three characters. None for no limit.
+        first_wait: the approximate seconds before the second try; the wait doubles each time.
 
     Raises:
-        UserError: a limit is out of its range.
+        UserError: a limit is out of range.
     """
 
     model: Model
@@ -53,14 +60,10 @@ class RateLimited:
     retries: int = 6
     token_budget: int | None = None
     first_wait: float = 0.5
-    requests: int = field(default=0, init=False)
-    """The requests so far, further tries included."""
-    retried: int = field(default=0, init=False)
-    """The further tries so far."""
-    usage: Usage = field(default_factory=Usage, init=False)
-    """The tokens of all replies, as counted by the model."""
-    spent: int = field(default=0, init=False)
-    """The tokens that count against the budget, with estimates where the model counts none."""
+    requests: int = field(default=0, init=False)  # including further tries
+    retry_count: int = field(default=0, init=False)
+    usage: Usage = field(default_factory=Usage, init=False)  # of all replies
+    tokens_used: int = field(default=0, init=False)  # with estimates where the model does not count
     _has_replied: bool = field(default=False, init=False, repr=False)
     _free: asyncio.Semaphore = field(init=False, repr=False)
     _gate: asyncio.Lock = field(default_factory=asyncio.Lock, init=False, repr=False)
@@ -74,10 +77,10 @@ class RateLimited:
             ("token budget", self.token_budget, 1),
         ):
             if value is not None and value < least:
-                raise UserError(f"the {name} is {value}, but it must be at least {least}")
+                raise UserError(f"the {name} is {value}; it must be at least {least}")
         if self.requests_per_minute is not None and not self.requests_per_minute > 0:
             rate = f"{self.requests_per_minute:g}"
-            raise UserError(f"the number of requests per minute is {rate}, but it must be above 0")
+            raise UserError(f"the number of requests per minute is {rate}; it must be above 0")
         self._free = asyncio.Semaphore(self.concurrency)
 
     @property
@@ -87,65 +90,54 @@ class RateLimited:
 
     @property
     def settings(self) -> SamplingSettings:
-        """The settings that the model sends."""
+        """The settings of the model."""
         return self.model.settings
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
-        """Request one reply, with further tries.
-
-        Args:
-            prompt: the request.
-            number: which sample of this prompt it is, counted from 0.
-            heard: called with each piece of the text as it arrives, from the beginning again in each try.
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
+        """Request one reply, with retries; each try calls `on_text` from the beginning again.
 
         Raises:
-            ModelError: the last try brought no whole reply either.
-            BudgetSpentError: the budget is spent, and no request was made.
+            ModelError: the last try failed.
+            BudgetSpentError: the budget is used up, so no request was made.
         """
         tries = AsyncRetrying(
             sleep=asyncio.sleep,
             stop=stop_after_attempt(self.retries + 1),
             wait=self._wait,
-            retry=retry_if_exception(_may_pass),
+            retry=retry_if_exception(_is_retryable),
             before_sleep=self._before_sleep,
             reraise=True,
         )
         async with self._free:
             try:
-                return await tries(self._try, prompt, number, heard)
+                return await tries(self._try, prompt, number, on_text)
             except ModelError as error:
-                times = tries.statistics["attempt_number"]
-                if times == 1:
-                    raise
-                sentence = f"{error.sentence} (tried {times} times)"
-                raise ModelError(
-                    sentence,
-                    may_pass=error.may_pass,
-                    retry_after=error.retry_after,
-                    is_refusal=error.is_refusal,
-                ) from None
+                if (times := tries.statistics["attempt_number"]) > 1:
+                    error.sentence += f" (tried {times} times)"
+                    error.args = (error.sentence,)
+                raise
 
     async def close(self) -> None:
         """Close the model."""
         await self.model.close()
 
-    async def _try(self, prompt: Prompt, number: int, heard: Heard) -> Reply:
+    async def _try(self, prompt: Prompt, number: int, on_text: TextListener) -> Reply:
         self._check_budget()
-        await self._turn()
-        self._check_budget()  # other requests may have spent it meanwhile
+        await self._wait_for_turn()
+        self._check_budget()  # other requests may have used it up meanwhile
         self.requests += 1
         length = 0
 
-        def hear(piece: str) -> None:
+        def count(piece: str) -> None:
             nonlocal length
             length += len(piece)
-            heard(piece)
+            on_text(piece)
 
         try:
-            reply = await self.model.reply(prompt, number=number, heard=hear)
-        except BaseException:  # the pieces that came are paid for
+            reply = await self.model.reply(prompt, number=number, on_text=count)
+        except BaseException:  # the received pieces cost tokens
             if length:
-                self.spent += _estimate(prompt, length)
+                self.tokens_used += _estimate(prompt, length)
             raise
         self._has_replied = True
         self.usage = Usage(
@@ -153,31 +145,31 @@ class RateLimited:
             _sum(self.usage.output_tokens, reply.usage.output_tokens),
             _sum(self.usage.reasoning_tokens, reply.usage.reasoning_tokens),
         )
-        self.spent += reply.usage.total or _estimate(prompt, len(reply.text))
+        self.tokens_used += reply.usage.total or _estimate(prompt, len(reply.text))
         return reply
 
     def _check_budget(self) -> None:
-        if self.token_budget is not None and self.spent >= self.token_budget:
-            raise BudgetSpentError(self.token_budget, self.spent)
+        if self.token_budget is not None and self.tokens_used >= self.token_budget:
+            raise BudgetSpentError(self.token_budget, self.tokens_used)
 
-    async def _turn(self) -> None:
-        """Wait until the next request may begin."""
+    async def _wait_for_turn(self) -> None:
+        """Wait until the next request may start."""
         now = asyncio.get_running_loop().time
         async with self._gate:
-            while (wait := max(self._next_start, self._deferred_until) - now()) > 0:  # noqa: ASYNC110 - both may move
+            while (wait := max(self._next_start, self._deferred_until) - now()) > 0:  # noqa: ASYNC110 - other requests may postpone both times
                 await asyncio.sleep(wait)
             if self.requests_per_minute is not None:
                 self._next_start = now() + 60 / self.requests_per_minute
 
     def _wait(self, state: RetryCallState) -> float:
-        wait = wait_exponential_jitter(self.first_wait, LONGEST_WAIT, jitter=self.first_wait / 2)(state)
+        wait = wait_exponential_jitter(self.first_wait, MAX_WAIT, jitter=self.first_wait / 2)(state)
         return max(wait, _retry_after(state))
 
     def _before_sleep(self, state: RetryCallState) -> None:
-        self.retried += 1
-        if not self._has_replied and self.retried == 1 and state.outcome is not None:
-            LOG.warning("trying again, up to %d times: %s", self.retries, state.outcome.exception())
-        # A server that asks to wait means all requests, not only the one that it refused.
+        self.retry_count += 1
+        if not self._has_replied and self.retry_count == 1 and state.outcome is not None:
+            MODELS_LOG.warning("trying again, up to %d times: %s", self.retries, state.outcome.exception())
+        # A server that asks for a delay means all requests, not only the rejected one.
         now = asyncio.get_running_loop().time()
         self._deferred_until = max(self._deferred_until, now + _retry_after(state))
 
@@ -187,10 +179,8 @@ def _retry_after(state: RetryCallState) -> float:
     return (error.retry_after or 0.0) if isinstance(error, ModelError) else 0.0
 
 
-def _may_pass(error: BaseException) -> bool:
-    return (
-        isinstance(error, ModelError) and error.may_pass and (error.retry_after or 0) <= LONGEST_RETRY_AFTER
-    )
+def _is_retryable(error: BaseException) -> bool:
+    return isinstance(error, ModelError) and error.may_pass and (error.retry_after or 0) <= MAX_RETRY_AFTER
 
 
 def _sum(one: int | None, other: int | None) -> int | None:
@@ -199,4 +189,4 @@ def _sum(one: int | None, other: int | None) -> int | None:
 
 def _estimate(prompt: Prompt, length: int) -> int:
     asked = sum(len(message.text) for message in prompt.messages)
-    return (asked + length) // CHARACTERS + 1
+    return (asked + length) // CHARACTERS_PER_TOKEN + 1

@@ -1,4 +1,4 @@
-"""Failures of a network or a server as errors of a model, without keys in their sentences."""
+"""Convert network and server failures to model errors without keys in their messages."""
 
 from __future__ import annotations
 
@@ -7,54 +7,56 @@ from collections.abc import Iterator, Mapping
 
 from codebotler.core.words import brief
 from codebotler.models.base import ModelError
-from codebotler.models.keys import redacted
+from codebotler.models.keys import redact
 
 SUCCESS, FIRST_ERROR, SERVER_ERROR = 299, 400, 500
-LATER = (408, 409, 425, 429)  # the statuses below 500 that may pass
-MENDS = {
+RETRYABLE_STATUSES = (408, 409, 425, 429)  # below 500
+STATUS_HINTS = {
     401: "; is the right key in the environment?",
     403: "; is the right key in the environment?",
     404: "; are the model's name and the base URL right?",
 }
-NO_CONNECTION = "ConnectError"  # of httpx or httpx2, whichever a provider's library has
-MOST = 300  # characters of what a server says
+CONNECT_ERROR = "ConnectError"  # in httpx and httpx2; providers use either
+MAX_ERROR_CHARACTERS = 300
 FORBIDDEN = 403
-OF_PROMPT = (400, 413, 422)  # the statuses that may be about this one prompt
-FILTER = re.compile(
+PROMPT_STATUSES = (400, 413, 422)  # may concern this prompt alone
+FILTER_WORDS = re.compile(
     r"content[\s_-]*(?:filter|management|policy|exists risk)|safety system|data_inspection|moderation"
     r"|flagged|usage polic|prohibited_content|敏感内容",
     re.IGNORECASE,
 )
-ACCOUNT = re.compile(
+ACCOUNT_WORDS = re.compile(
     r"\b(?:credit|billing|balance|quota|payment|budget|expired|api[ _-]?key|permission|unauthori[sz]ed)",
     re.IGNORECASE,
 )
-"""Words of errors about an account rather than a prompt."""
-PASSING = re.compile(r"rate_?limit|overload|unavailable|server_?error|internal|timeout", re.IGNORECASE)
-"""Found in the types and codes of errors that may pass."""
+"""In messages of errors about an account, not about a prompt."""
+RETRYABLE_WORDS = re.compile(
+    r"rate_?limit|overload|unavailable|server_?error|internal|timeout", re.IGNORECASE
+)
+"""In the types and codes of temporary errors."""
 
 
-def failure(name: str, what: str | Exception, *, may_pass: bool) -> ModelError:
-    """The error for whatever went wrong with a model."""
-    first: BaseException | None = what if isinstance(what, Exception) else None
+def model_error(name: str, fault: str | Exception, *, may_pass: bool) -> ModelError:
+    """Build an error from a sentence or an exception, with the original cause."""
+    first: BaseException | None = fault if isinstance(fault, Exception) else None
     while first and first.__cause__:
         first = first.__cause__
-    cause = "" if first is None or str(first) in str(what) else f" ({error_text(first)})"
-    return ModelError(f"{name}: {error_text(what)}{cause}", may_pass=may_pass)
+    cause = "" if first is None or str(first) in str(fault) else f" ({error_text(first)})"
+    return ModelError(f"{name}: {error_text(fault)}{cause}", may_pass=may_pass)
 
 
-def unreachable(name: str, error: Exception, url: str | None) -> ModelError | None:
-    """The error for a server that takes no connection; None if something else went wrong."""
-    failed = next((cause for cause in _causes(error) if type(cause).__name__ == NO_CONNECTION), None)
+def connection_error(name: str, error: Exception, url: str | None) -> ModelError | None:
+    """Build the error for a refused connection; None if the error has another cause."""
+    failed = next((cause for cause in _causes(error) if type(cause).__name__ == CONNECT_ERROR), None)
     if failed is None:
         return None
-    mend = "check the network" if url is None else "check that the server runs, and the base URL"
-    sentence = f"{name}: no connection to {url or 'its server'} ({error_text(failed)}); {mend}"
+    fix = "check the network" if url is None else "check the base URL, and whether the server is running"
+    sentence = f"{name}: no connection to {url or 'its server'} ({error_text(failed)}); {fix}"
     return ModelError(sentence, may_pass=True)
 
 
-def model_error_in(error: Exception) -> ModelError | None:
-    """The error that was raised while a reply was read, and that a library wrapped in its own."""
+def find_model_error(error: Exception) -> ModelError | None:
+    """Return the ModelError that a library wrapped in its own exception, if there is one."""
     return next((cause for cause in _causes(error) if isinstance(cause, ModelError)), None)
 
 
@@ -64,53 +66,53 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ or error.__context__
 
 
-def broken_off(name: str, *, begun: bool) -> ModelError:
-    """The error for a stream that ends too early, before or after the reply has begun."""
+def incomplete_error(name: str, *, has_begun: bool) -> ModelError:
+    """Build the error for a stream that ended early, before or after the reply began."""
     nothing = "the server sent no completion; check the base URL"
-    return failure(name, "the reply was cut off" if begun else nothing, may_pass=True)
+    return model_error(name, "the reply was cut off" if has_begun else nothing, may_pass=True)
 
 
-def timed_out(name: str, seconds: float) -> ModelError:
-    """The error for a reply that did not come in time."""
+def timeout_error(name: str, seconds: float) -> ModelError:
+    """Build the error for a reply that did not arrive in time."""
     return ModelError(f"{name}: no complete reply arrived within {seconds:g} s", may_pass=True)
 
 
-def refused(
-    name: str, status: int, body: object, *, retry_after: float | None = None, hopeless: bool = False
+def status_error(
+    name: str, status: int, body: object, *, retry_after: float | None = None, is_permanent: bool = False
 ) -> ModelError:
-    """The error for a status of 400 or more; `hopeless` says that it will not pass, whatever the status."""
-    said = f" ({text})" if (text := error_text(body)) else ""
-    sentence = f"{name}: the server answered with status {status}{said}{MENDS.get(status, '')}"
-    may_pass = not hopeless and (status >= SERVER_ERROR or status in LATER)
-    is_refusal = not hopeless and status in OF_PROMPT and not ACCOUNT.search(said)
+    """Build the error for a status of 400 or more; a permanent one is not retried, whatever its status."""
+    message = f" ({text})" if (text := error_text(body)) else ""
+    sentence = f"{name}: the server answered with status {status}{message}{STATUS_HINTS.get(status, '')}"
+    may_pass = not is_permanent and (status >= SERVER_ERROR or status in RETRYABLE_STATUSES)
+    is_refusal = not is_permanent and status in PROMPT_STATUSES and not ACCOUNT_WORDS.search(message)
     return ModelError(sentence, may_pass=may_pass, retry_after=retry_after, is_refusal=is_refusal)
 
 
 def error_in_reply(name: str, body: object) -> ModelError:
-    """The error that a server sends in the place of a reply, with a status of success."""
-    said = body if isinstance(body, Mapping) else {}
-    code = next((said[key] for key in ("code", "status") if said.get(key)), None)
+    """Build the error that a server sent in place of a reply, with a status of success."""
+    fields = body if isinstance(body, Mapping) else {}
+    code = next((fields[key] for key in ("code", "status") if fields.get(key)), None)
     if str(code).isdigit() and int(str(code)) > SUCCESS:
-        return refused(name, int(str(code)), body)
-    may_pass = bool(PASSING.search(f"{code} {said.get('type')}"))
+        return status_error(name, int(str(code)), body)
+    may_pass = bool(RETRYABLE_WORDS.search(f"{code} {fields.get('type')}"))
     return ModelError(f"{name}: the server sent an error: {error_text(body) or 'no text'}", may_pass=may_pass)
 
 
 def is_filtered(status: int | None, body: object) -> bool:
-    """Whether a refused request was refused by a filter of contents, by the word of the server."""
-    return status in {*OF_PROMPT, FORBIDDEN} and FILTER.search(str(body)) is not None
+    """Whether the server rejected a request because of a content filter."""
+    return status in {*PROMPT_STATUSES, FORBIDDEN} and FILTER_WORDS.search(str(body)) is not None
 
 
-def error_text(said: object) -> str:
-    """What a server or a library says, in one short line without keys."""
-    text = next(_messages(said), None) or ("" if said is None else str(said))
-    return brief(redacted(text), MOST).rstrip(".")
+def error_text(body: object) -> str:
+    """Return the message of a server or a library in one short line without keys."""
+    text = next(_messages(body), None) or ("" if body is None else str(body))
+    return brief(redact(text), MAX_ERROR_CHARACTERS).rstrip(".")
 
 
-def _messages(said: object) -> Iterator[str]:
-    if isinstance(said, Mapping):
+def _messages(body: object) -> Iterator[str]:
+    if isinstance(body, Mapping):
         for key in ("message", "error", "detail"):
-            value = said.get(key)
+            value = body.get(key)
             if isinstance(value, str) and value:
                 yield value
             else:

@@ -1,4 +1,4 @@
-"""Which models can be asked here and now: keys that are set, servers on this machine, recorded programs."""
+"""Find the models that can be used now: keys in the environment, local servers, recorded programs."""
 
 from __future__ import annotations
 
@@ -12,88 +12,85 @@ from time import monotonic
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from codebotler.models.keys import key_in
-from codebotler.models.recorded import NAMES, is_recorded
+from codebotler.models.keys import read_key
+from codebotler.models.recorded import RECORDED_NAMES, is_recorded
 
-SERVERS: Mapping[str, int] = {"Ollama": 11434, "LM Studio": 1234, "vLLM": 8000, "llama.cpp": 8080}
-"""Servers of models with the ports at which they listen by default; each knows OpenAI's protocol."""
+MODEL_SERVERS: Mapping[str, int] = {"Ollama": 11434, "LM Studio": 1234, "vLLM": 8000, "llama.cpp": 8080}
+"""Model servers and their default ports; all support OpenAI's protocol."""
 
-KEYS: Mapping[str, str] = {
+KEY_VARIABLES: Mapping[str, str] = {
     "OPENAI_API_KEY": "openai-chat:gpt-5.1",
     "ANTHROPIC_API_KEY": "anthropic:claude-sonnet-4-5",
     "GOOGLE_API_KEY": "google:gemini-3-pro",
 }
-"""Variables that hold a key, each with a model that it opens."""
+"""Environment variables for keys, each with an example of a model."""
 
-PATIENCE_S, LONGEST_LIST = 0.5, 1_000_000  # bytes that a server may list
-SETUP = "set OPENAI_API_KEY or another provider's key, or start a model server such as Ollama"
+SERVER_TIMEOUT = 0.5  # seconds
+MAX_LIST_BYTES = 1_000_000
+MODEL_HINT = "set OPENAI_API_KEY or another provider's key, or start a model server such as Ollama"
 
 
 @dataclass(frozen=True)
 class UsableModel:
-    """A model that can be asked.
+    """A model that can be used."""
 
-    Args:
-        name: as `--model` takes it.
-        why: what makes it usable, such as `OPENAI_API_KEY is set`.
-        base_url: as `--base-url` takes it; None where it needs none.
-    """
-
-    name: str
-    why: str
-    base_url: str | None = None
+    name: str  # the value for `--model`
+    why: str  # the reason that it can be used, such as `OPENAI_API_KEY is set`
+    base_url: str | None = None  # the value for `--base-url`; None if not needed
 
     @property
     def is_recorded(self) -> bool:
-        """Whether no language model stands behind it."""
+        """Whether it is a recorded model, not a language model."""
         return is_recorded(self.name)
 
     @property
     def options(self) -> str:
-        """The options that choose it, for a shell."""
+        """The command-line options that select this model, quoted for a shell."""
         server = "" if self.base_url is None else f" --base-url {self.base_url}"
         return f"--model {shlex.quote(visible(self.name))}{server}"
 
 
-def usable_models(servers: Mapping[str, int] = SERVERS) -> list[UsableModel]:
-    """The models of servers on this machine, then an example for each key, then the recorded ones."""
-    listed: dict[str, list[UsableModel]] = {}
+def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[UsableModel]:
+    """List the models of local servers, then an example for each key, then the recorded models."""
+    found: dict[str, list[UsableModel]] = {}
 
     def ask(server: str) -> None:
-        listed[server] = _served(server, servers[server])
+        found[server] = _list_models(server, servers[server])
 
-    asking = [Thread(target=ask, args=(server,), daemon=True) for server in servers]
-    for thread in asking:
+    threads = [Thread(target=ask, args=(server,), daemon=True) for server in servers]
+    for thread in threads:
         thread.start()
-    until = monotonic() + 2 * PATIENCE_S  # some servers trickle
-    for thread in asking:
-        thread.join(max(0.0, until - monotonic()))
-    served = [model for server in servers for model in listed.get(server, ())]
-    keyed = [UsableModel(name, f"{key} is set") for key, name in KEYS.items() if _is_set(key)]
-    recorded = [UsableModel(f"recorded:{name}", "written by hand, for known instructions") for name in NAMES]
-    return [*served, *keyed, *recorded]
+    deadline = monotonic() + 2 * SERVER_TIMEOUT  # a slow trickle of bytes resets a socket's own timeout
+    for thread in threads:
+        thread.join(max(0.0, deadline - monotonic()))
+    local = [model for server in servers for model in found.get(server, ())]
+    by_key = [UsableModel(name, f"{key} is set") for key, name in KEY_VARIABLES.items() if _is_set(key)]
+    recorded = [
+        UsableModel(f"recorded:{name}", "written by hand, for known instructions") for name in RECORDED_NAMES
+    ]
+    return [*local, *by_key, *recorded]
 
 
-def how_to_use_a_model(servers: Mapping[str, int] = SERVERS) -> str:
-    """The options for the first model that is found here, or else how to get one."""
-    first = usable_models(servers)[0]
-    return SETUP if first.is_recorded else f"add {first.options}"
+def suggest_model(servers: Mapping[str, int] = MODEL_SERVERS) -> str:
+    """Return the options for the first model found, or else how to get one."""
+    first = find_usable_models(servers)[0]
+    return MODEL_HINT if first.is_recorded else f"add {first.options}"
 
 
 def _is_set(key: str) -> bool:
     try:
-        return key_in(key) is not None
-    except UserError:  # no header can hold it
+        return read_key(key) is not None
+    except UserError:  # an HTTP header cannot hold the key
         return False
 
 
-def _served(server: str, port: int) -> list[UsableModel]:
-    """What a server lists; nothing where none answers, or where it is something else."""
-    connection = HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
+def _list_models(server: str, port: int) -> list[UsableModel]:
+    """Ask a server for its models; return none if it does not answer, or is not a model server."""
+    connection = HTTPConnection("127.0.0.1", port, timeout=SERVER_TIMEOUT)
     try:
         connection.request("GET", "/v1/models", headers={"Accept": "application/json"})
-        listed = json.loads(connection.getresponse().read(LONGEST_LIST))
-        names = [str(one["id"]) for one in listed["data"]]
+        reply = json.loads(connection.getresponse().read(MAX_LIST_BYTES))
+        names = [str(one["id"]) for one in reply["data"]]
     except (OSError, HTTPException, ValueError, LookupError, TypeError, RecursionError):
         return []
     finally:

@@ -1,4 +1,4 @@
-"""Looking for an object or a person in a picture."""
+"""Look for an object or a person in a picture."""
 
 from codebotler.perception.base import Detector, PerceptionError, Sighting
 from codebotler.perception.image import boxed, image_from_ros, image_of, jpeg_of, read_image

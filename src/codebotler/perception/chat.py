@@ -1,4 +1,4 @@
-"""Chat models as detectors: they get the picture and answer with a small JSON object."""
+"""Chat models as detectors: they receive a picture and answer with a small JSON object."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.server_errors import error_text
-from codebotler.perception.base import PerceptionError, Sighting, checked_label
+from codebotler.perception.base import PerceptionError, Sighting, check_label
 from codebotler.perception.image import jpeg_of
 from codebotler.prompts import PictureMessage, Prompt, PromptMessage
 
-SYSTEM = """\
+DETECTOR_PROMPT = """\
 You are the eyes of a robot. You get a picture from its camera and a JSON text that names an object or a
 person. Say whether that can be seen in the picture.
 
@@ -32,19 +32,19 @@ Answer with one JSON object and nothing else:
 - "box": where the clearest one is: left, top, right and bottom, each from 0 to 1, as shares of the picture's
   width and height, counted from its upper left corner; null if it was not found.
 """
-AGAIN = "That cannot be used: {fault}. Answer again, with only the JSON object."
-TRIES = 3  # replies that are requested until one can be used
-RETRIES = 2  # of each request that finds no server, or a busy one
-LONGEST_REPLY = 20_000  # characters
-FENCED = re.compile(r"```(?:json)?[^\S\n]*\n(.*)\n[^\S\n]*```", re.DOTALL)
+RETRY_PROMPT = "That cannot be used: {fault}. Answer again, with only the JSON object."
+MAX_REPLIES = 3  # until one is valid
+REQUEST_RETRIES = 2  # of each request, if the server is down or busy
+MAX_REPLY_CHARACTERS = 20_000  # characters
+FENCED_JSON = re.compile(r"```(?:json)?[^\S\n]*\n(.*)\n[^\S\n]*```", re.DOTALL)
 
 
 class ChatDetector:
-    """A detector that asks a chat model; threads may share it, one at a time."""
+    """Asks a chat model; several threads may use it, one at a time."""
 
     def __init__(self, model: Model) -> None:
         self._runner = asyncio.Runner()
-        self._model = RateLimited(model, retries=RETRIES)
+        self._model = RateLimited(model, retries=REQUEST_RETRIES)
 
     @property
     def name(self) -> str:
@@ -52,24 +52,24 @@ class ChatDetector:
         return self._model.name
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Show the picture to the model, and ask again where a reply cannot be used."""
-        question = PictureMessage("user", json.dumps(checked_label(label)), jpeg_of(image))
-        messages: tuple[PromptMessage, ...] = (PromptMessage("system", SYSTEM), question)
-        fault = said = ""
-        for number in range(TRIES):
+        """Show the picture to the model, and ask again after an invalid reply."""
+        question = PictureMessage("user", json.dumps(check_label(label)), jpeg_of(image))
+        messages: tuple[PromptMessage, ...] = (PromptMessage("system", DETECTOR_PROMPT), question)
+        fault = text = ""
+        for number in range(MAX_REPLIES):
             prompt = Prompt(label, messages, text="", stop=(), opening="")
             try:
                 reply = self._runner.run(self._model.reply(prompt, number=number))
             except ModelError as error:
                 raise PerceptionError(error.sentence) from None
             try:
-                return sighting_in(reply.text)
+                return parse_sighting(reply.text)
             except ValueError as error:
-                fault, said = str(error), reply.text.strip()[:LONGEST_REPLY]
-            answer = [PromptMessage("assistant", said)] if said else []
-            messages = (*messages[:2], *answer, PromptMessage("user", AGAIN.format(fault=fault)))
-        last = f"; it replied: {error_text(said)}" if said else ""
-        raise PerceptionError(f"{self.name} gave no usable answer in {TRIES} tries: {fault}{last}")
+                fault, text = str(error), reply.text.strip()[:MAX_REPLY_CHARACTERS]
+            answer = [PromptMessage("assistant", text)] if text else []
+            messages = (*messages[:2], *answer, PromptMessage("user", RETRY_PROMPT.format(fault=fault)))
+        last = f"; it replied: {error_text(text)}" if text else ""
+        raise PerceptionError(f"{self.name} gave no valid answer in {MAX_REPLIES} tries: {fault}{last}")
 
     def close(self) -> None:
         """Close the connections."""
@@ -77,7 +77,7 @@ class ChatDetector:
         self._runner.close()
 
 
-class _Answer(BaseModel):
+class _DetectorAnswer(BaseModel):
     model_config = ConfigDict(strict=True)
 
     found: bool
@@ -85,13 +85,13 @@ class _Answer(BaseModel):
     box: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
 
 
-def sighting_in(text: str) -> Sighting:
-    """The sighting in a reply, one JSON object, perhaps in a code fence; a ValueError says why it is none."""
-    if len(text) > LONGEST_REPLY:
+def parse_sighting(text: str) -> Sighting:
+    """Parse a reply, one JSON object that may be in a code fence; ValueError if it is invalid."""
+    if len(text) > MAX_REPLY_CHARACTERS:
         raise ValueError(f"it has {len(text):,} characters")
-    fenced = FENCED.fullmatch(text.strip())
+    fenced = FENCED_JSON.fullmatch(text.strip())
     try:
-        answer = _Answer.model_validate_json(fenced[1] if fenced else text)
+        answer = _DetectorAnswer.model_validate_json(fenced[1] if fenced else text)
     except ValidationError as error:
         first = error.errors()[0]
         fault = f'"{first["loc"][0]}": {first["msg"]}' if first["loc"] else "it is not a JSON object"

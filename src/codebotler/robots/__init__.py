@@ -1,1 +1,1 @@
-"""Robots: whatever executes skills and can be stopped, simulated or real."""
+"""Robots, simulated or real: they execute skills and can be stopped."""

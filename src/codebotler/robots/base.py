@@ -1,4 +1,4 @@
-"""What every robot offers: the `Robot` protocol, its errors and its options."""
+"""The `Robot` protocol, its errors and its options."""
 
 from __future__ import annotations
 
@@ -16,37 +16,34 @@ from codebotler.robots.clock import Clock
 if TYPE_CHECKING:
     from codebotler.robots.ros.connection import Connection
 
-Argument: TypeAlias = Scalar | tuple[Scalar, ...]
-"""An argument of a skill: a text or another value, a list of these, or the options of a question."""
+RobotArgument: TypeAlias = Scalar | tuple[Scalar, ...]
+"""An argument of a skill: a single value, a list of values, or the options of a question."""
 
-Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
-"""What a skill returns; for a question the text of the chosen option."""
+RobotResult: TypeAlias = Scalar | list[str] | list[Scalar] | None
+"""The result of a skill; for a question, the text of the chosen option."""
 
+STOP_BY_HAND = "STOP THE ROBOT BY HAND"
 ROS_PYTHON = Path("/usr/bin/python3")
-"""The interpreter that a robot's ROS usually belongs to."""
+"""The usual Python of a robot's ROS installation."""
 
 
 @dataclass(frozen=True)
-class Picture:
-    """Something the robot saw.
+class CameraPicture:
+    """A picture from the robot."""
 
-    Args:
-        data: a JPEG or PNG file, not yet validated.
-    """
-
-    data: bytes
+    data: bytes  # a JPEG or PNG file, not yet validated
 
 
-Feedback: TypeAlias = Callable[[str | Picture], None]
+Feedback: TypeAlias = Callable[[str | CameraPicture], None]
 """Called from any thread with the progress of a skill, such as `at (3.1, 2.0)`, and with pictures."""
 
 
-def no_feedback(_: str | Picture) -> None:
-    """Ignore feedback."""
+def ignore_feedback(_: str | CameraPicture) -> None:
+    """Ignore the feedback."""
 
 
 class Robot(Protocol):
-    """Something that executes skills, one at a time, and can be stopped at any moment."""
+    """Executes skills, one at a time, and can be stopped at any moment."""
 
     @property
     def name(self) -> str:
@@ -54,132 +51,106 @@ class Robot(Protocol):
 
     @property
     def address(self) -> str:
-        """What tells it from others of its kind, such as the URI of a ROS master; empty if only we use it.
-
-        Different spellings of a network address are recognised.
-        """
+        """The address, such as the URI of a ROS master; empty if no other tool can reach the robot."""
 
     @property
     def if_tool_dies(self) -> str:
-        """What happens to a running skill when this process is killed, as a clause without a full stop."""
+        """The effect of killing this process on a running skill, as a clause without a full stop."""
 
     @property
     def rooms_are_regexes(self) -> bool:
-        """Whether the rooms that it lists are regexes, as world files write them, and not plain names."""
+        """Whether its room names are regexes, as in world files, rather than plain names."""
 
     @property
     def has_pose(self) -> bool:
-        """Whether its feedback says where it is while it moves, as in `at (3.1, 2.0)`, in metres."""
+        """Whether its feedback reports its position in metres while it moves, as in `at (3.1, 2.0)`."""
 
     @property
     def skills(self) -> SkillTable:
-        """The skills it may be asked to perform."""
+        """The skills that it may be asked to perform."""
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """Why it cannot perform some of its skills, by name, as far as that was known when it connected."""
+        """The reasons why it cannot perform some skills, by name, as known after connecting."""
 
     @property
     def clock(self) -> Clock:
-        """The time by which a program sleeps."""
+        """The clock for a program's sleeps."""
 
     def connect(self) -> None:
         """Make the robot ready and at rest, with its clock at 0; also after a `cancel`.
 
         Raises:
-            NotReadyError: it cannot be used; nothing is left open then.
+            NotReadyError: the robot cannot be used; nothing stays open.
         """
 
     def perform(
-        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback, /
-    ) -> Result:
-        """Execute a skill to its end; called from one thread at a time.
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback, /
+    ) -> RobotResult:
+        """Execute a skill to its end; call it from one thread at a time.
 
         Args:
             skill: its name in the table.
             arguments: in the order of its parameters.
-            feedback: called with its progress.
+            feedback: called with the progress.
 
         Raises:
-            RobotError: (of `codebotler.simulator.robot`) the robot cannot do it; the program sees this.
-            CancelledError: `cancel` was called before or meanwhile, or another client stopped the robot.
-            RobotLostError: the robot is gone or no longer answers.
+            RobotError: the robot cannot do it; programs can catch this.
+            CancelledError: `cancel` was called, or another client stopped the robot.
+            RobotLostError: the robot does not answer any more.
         """
 
     def cancel(self) -> None:
         """End the current skill, if any, and refuse all others until the next `connect`.
 
-        Called from any thread. It returns as soon as the robot has been told; `perform` returns when the
-        skill has ended. Without a connection it does nothing, and it raises nothing.
+        Any thread may call it. It returns when the command is sent, and `perform` returns when the skill has
+        ended. It never raises.
         """
 
     def disconnect(self) -> None:
-        """End whatever goes on and release all resources; may be called again."""
+        """End the current skill and release all resources; may be called repeatedly."""
 
 
-class NotReadyError(Exception):
-    """A robot cannot be used.
-
-    Args:
-        sentence: what is missing, and how to fix it.
-    """
-
+class _SentenceError(Exception):
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
         self.sentence = sentence
 
 
-class RobotLostError(Exception):
-    """A connected robot is gone or no longer answers.
+class NotReadyError(_SentenceError):
+    """A robot cannot be used; the sentence says why, and how to fix it."""
 
-    Args:
-        sentence: how that was noticed.
-    """
 
-    def __init__(self, sentence: str) -> None:
-        super().__init__(sentence)
-        self.sentence = sentence
+class RobotLostError(_SentenceError):
+    """A connected robot does not answer any more; the sentence says why."""
+
+
+class AnswerError(_SentenceError):
+    """An answer to a robot's question is too late or invalid."""
 
 
 class CancelledError(Exception):
-    """A skill was ended on demand."""
+    """A skill was cancelled."""
 
 
 @dataclass(frozen=True)
 class Readiness:
-    """Whether robots of one kind can be used on this machine.
+    """Whether robots of one kind can be used on this machine."""
 
-    Args:
-        name: the kind as a user names it: sim, pyrobosim, ros1, rosbridge or ros2.
-        works: whether they can, as far as can be seen without connecting.
-        missing: what is missing, as a phrase; empty if it works.
-        mend: the command that fixes it, if one does.
-        note: what a user should know about it, such as how far it was tested.
-    """
-
-    name: str
-    works: bool
-    missing: str = ""
-    mend: str = ""
-    note: str = ""
+    name: str  # the kind: sim, pyrobosim, ros1, rosbridge or ros2
+    works: bool  # whether they can be used, as far as is known without connecting
+    missing: str = ""  # the missing part, as a phrase; empty if nothing is missing
+    mend: str = ""  # the command that installs the missing part, if there is one
+    note: str = ""  # a remark for users, such as how to choose the address
 
 
 @dataclass(frozen=True)
 class Options:
-    """A user's options for opening a robot; each kind uses those that concern it.
+    """Options for opening a robot; each kind uses some of them."""
 
-    Args:
-        world: the world of a simulated robot.
-        speed: seconds of the robot's clock per real second; None if waiting takes no real time.
-        address: of the robot, such as the URI of a ROS master or rosbridge; empty for the default.
-        ros_python: the interpreter that the robot's ROS belongs to.
-        skills: the skills it may be asked to perform.
-        connection: what a robot on ROS offers, where that is not an action for each skill.
-    """
-
-    world: World | None = None
-    speed: float | None = 1.0
-    address: str = ""
-    ros_python: Path = ROS_PYTHON
-    skills: SkillTable = SKILLS
-    connection: Connection | None = None
+    world: World | None = None  # the world of a simulated robot
+    speed: float | None = 1.0  # clock seconds per real second; None if waiting takes no real time
+    address: str = ""  # the address, such as the URI of a ROS master or rosbridge; empty for the default
+    ros_python: Path = ROS_PYTHON  # the Python of the robot's ROS installation
+    skills: SkillTable = SKILLS  # the skills that the robot may be asked to perform
+    connection: Connection | None = None  # the calls of a robot on ROS; None for an action per skill

@@ -1,4 +1,4 @@
-"""A robot's clock: in real time, scaled, or advancing only while a program waits."""
+"""A robot's clock: real time, scaled time, or time that only advances by waiting."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ import time
 
 from codebotler.core.errors import UserError
 
-FASTEST, SLOWEST = 1e6, 1e-6
+MAX_SPEED, MIN_SPEED = 1e6, 1e-6
 
 
 class Clock:
-    """Time that starts at 0, and waits that can be stopped.
+    """A clock that starts at 0, with interruptible waiting.
 
     Args:
-        speed: its seconds per real second, from 0.000001 to 1,000,000; None if waiting takes no real time,
-            and time advances only by waiting.
+        speed: clock seconds per real second, from 0.000001 to 1,000,000; None if time only advances by
+            waiting, which takes no real time.
 
     Raises:
         UserError: the speed is out of range.
     """
 
     def __init__(self, speed: float | None = 1.0) -> None:
-        if speed is not None and not SLOWEST <= speed <= FASTEST:
-            raise UserError(f"the speed is {speed:g}, but must be from {SLOWEST:f} to {FASTEST:,.0f}")
+        if speed is not None and not MIN_SPEED <= speed <= MAX_SPEED:
+            raise UserError(f"the speed is {speed:g}; it must be from {MIN_SPEED:f} to {MAX_SPEED:,.0f}")
         self.speed = speed
         self._start = time.monotonic()
         self._waited = 0.0
@@ -37,7 +37,7 @@ class Clock:
         return (time.monotonic() - self._start) * self.speed
 
     def wait(self, seconds: float) -> bool:
-        """Wait for at least 0 seconds of this clock; False if it was stopped before or meanwhile."""
+        """Wait for at least 0 seconds of this clock; return False if the clock was stopped."""
         if self.speed is not None:
             self._stopped.wait(min(seconds / self.speed, threading.TIMEOUT_MAX))
         elif not self._stopped.is_set():
@@ -45,7 +45,7 @@ class Clock:
         return not self._stopped.is_set()
 
     def stop(self) -> None:
-        """End all waiting, now and until the next restart; from any thread."""
+        """End all waiting, now and until the next restart; any thread may call it."""
         self._stopped.set()
 
     def restart(self) -> None:

@@ -1,4 +1,4 @@
-"""A face on which a robot speaks and asks, shown on any number of screens."""
+"""A face on any number of screens, on which a robot speaks and asks questions."""
 
 from __future__ import annotations
 
@@ -14,60 +14,64 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Recording, Skill, SkillTable
 from codebotler.core.words import counted
 from codebotler.core.world import Point
-from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
+from codebotler.robots.base import (
+    AnswerError,
+    CancelledError,
+    Feedback,
+    Robot,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
+)
 from codebotler.robots.clock import Clock
 
-PATIENCE = 60.0  # real seconds that people have for an answer by default
-TIMED_OUT = "AskTimeout"  # kind of the error
-MOST_SAID = 3
-AT_LEAST, AT_MOST, LETTERS_PER_SECOND = 1.0, 10.0, 20.0  # robot seconds that saying something takes
+ANSWER_SECONDS = 60.0  # real seconds for an answer by default
+ASK_TIMEOUT = "AskTimeout"  # the kind of the error
+MAX_SENTENCES = 3
+MIN_SPEECH, MAX_SPEECH, CHARACTERS_PER_SECOND = 1.0, 10.0, 20.0  # the duration of speech, in robot seconds
 
 
 @dataclass(frozen=True)
-class Said:
-    """Something the robot said; sentences and questions are numbered together, from 1."""
+class FaceSentence:
+    """A sentence of the robot; sentences and questions share their numbers, from 1."""
 
     number: int
     text: str
 
 
 @dataclass(frozen=True)
-class Question:
-    """Something the robot asks or asked; an answer refers to its number."""
+class FaceQuestion:
+    """A question of the robot; an answer refers to its number."""
 
     number: int
     person: str
     text: str
     options: tuple[str, ...]
-    until: float = math.inf  # deadline by the monotonic clock
-    how: str = ""  # it ended: answered, withdrawn or unanswered
-    answer: int | None = None  # the position of the chosen option, if it was answered
+    until: float = math.inf  # the deadline by the monotonic clock
+    how: str = ""  # the question ended: answered, withdrawn or unanswered
+    answer: int | None = None  # the position of the chosen option
 
 
 @dataclass(frozen=True)
 class FaceState:
-    """What all screens show: the last sentences of this mission, the open question, and the one before."""
+    """The contents of all screens: the last sentences, the open question, and the previous question."""
 
-    said: tuple[Said, ...] = ()
-    question: Question | None = None
-    ended: Question | None = None
-
-
-class AnswerError(Exception):
-    """An answer that comes too late or is not one of the options."""
-
-    def __init__(self, sentence: str) -> None:
-        super().__init__(sentence)
-        self.sentence = sentence
+    said: tuple[FaceSentence, ...] = ()
+    question: FaceQuestion | None = None
+    ended: FaceQuestion | None = None
 
 
 class Face:
-    """What a robot says and asks; thread-safe, and only `ask` blocks.
+    """The robot's sentences and questions; thread-safe, and only `ask` blocks.
 
-    `seconds` are real ones that people have for an answer; `changed` is called after each change.
+    Args:
+        seconds: the real seconds for an answer.
+
+    Attributes:
+        changed: called after each change.
     """
 
-    def __init__(self, seconds: float = PATIENCE) -> None:
+    def __init__(self, seconds: float = ANSWER_SECONDS) -> None:
         self.changed: Callable[[], None] = lambda: None
         self.shown = FaceState()
         self.screens = 0
@@ -77,8 +81,8 @@ class Face:
         self._is_open = False
 
     @contextmanager
-    def watched(self) -> Iterator[None]:
-        """Count as a screen that shows it."""
+    def count_screen(self) -> Iterator[None]:
+        """Count a screen as open inside the context."""
         self._add_screens(1)
         try:
             yield
@@ -86,7 +90,7 @@ class Face:
             self._add_screens(-1)
 
     def open(self) -> None:
-        """Clear it for a new mission."""
+        """Clear the face for a new mission."""
         with self._lock:
             self._is_open = True
             self._show(FaceState())
@@ -98,18 +102,22 @@ class Face:
             self._end("withdrawn")
 
     def say(self, text: str) -> None:
-        """Show a sentence, or raise CancelledError if it was withdrawn."""
+        """Show a sentence; CancelledError if the face is withdrawn."""
         with self._lock:
-            said = Said(self._next(), text)
-            self._show(replace(self.shown, said=(*self.shown.said, said)[-MOST_SAID:]))
+            said = FaceSentence(self._next(), text)
+            self._show(replace(self.shown, said=(*self.shown.said, said)[-MAX_SENTENCES:]))
 
     def ask(self, person: str, text: str, options: Sequence[str]) -> int:
-        """Ask, and wait for the position of the chosen option.
+        """Ask a question, and wait for the position of the chosen option.
 
-        Raises RobotError if nobody answered in time, CancelledError if it was withdrawn.
+        Raises:
+            RobotError: nobody answered in time.
+            CancelledError: the question was withdrawn.
         """
         with self._lock:
-            question = Question(self._next(), person, text, tuple(options), time.monotonic() + self._seconds)
+            question = FaceQuestion(
+                self._next(), person, text, tuple(options), time.monotonic() + self._seconds
+            )
             self._show(replace(self.shown, question=question, ended=None))
             while self.shown.question is question:
                 left = question.until - time.monotonic()
@@ -121,17 +129,17 @@ class Face:
         if ended is None or ended.number != question.number or ended.how == "withdrawn":
             raise CancelledError
         if ended.answer is None:
-            raise RobotError(TIMED_OUT, f'nobody answered "{text}" within {self._seconds:g} s')
+            raise RobotError(ASK_TIMEOUT, f'nobody answered "{text}" within {self._seconds:g} s')
         return ended.answer
 
     def answer(self, number: int, option: int) -> None:
-        """Answer the question with this number; the first answer counts, others raise AnswerError."""
+        """Answer the question with this number; later answers raise AnswerError."""
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
                 raise AnswerError(self._too_late(number))
             if not 0 <= option < len(question.options):
-                raise AnswerError("that is not one of the options")
+                raise AnswerError("that is not one of the options; choose one of them")
             self._end("answered", option)
 
     def _too_late(self, number: int) -> str:
@@ -166,17 +174,17 @@ class Face:
 
 
 def without_speech(skills: SkillTable = SKILLS) -> SkillTable:
-    """The skills that the robot behind a face must offer."""
-    return SkillTable(tuple(skill for skill in skills.rows if _spoken(skill) is None))
+    """Return the skills that the robot behind a face must perform itself."""
+    return SkillTable(tuple(skill for skill in skills.rows if _speech_of(skill) is None))
 
 
-def _spoken(skill: Skill) -> Recording | None:
-    """What a skill leaves in the trace, if it is spoken."""
+def _speech_of(skill: Skill) -> Recording | None:
+    """Return the recording of a skill, if the skill is spoken."""
     return skill.recording if skill.recording and skill.recording.is_spoken else None
 
 
 class RobotWithFace:
-    """A robot that says and asks on a face, and passes all other skills on to another robot."""
+    """Speaks and asks on a face, and passes all other skills to another robot."""
 
     def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
         self._robot, self._face, self.skills = robot, face, skills
@@ -185,9 +193,9 @@ class RobotWithFace:
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """What the other robot cannot do, apart from speaking."""
+        """The reasons why the other robot cannot perform some skills, apart from speech."""
         return {
-            skill: why for skill, why in self._robot.missing.items() if _spoken(self.skills[skill]) is None
+            skill: why for skill, why in self._robot.missing.items() if _speech_of(self.skills[skill]) is None
         }
 
     @property
@@ -200,9 +208,11 @@ class RobotWithFace:
         self._robot.connect()
         self._face.open()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Speak, or have the other robot perform the skill."""
-        spoken = _spoken(self.skills[skill])
+        spoken = _speech_of(self.skills[skill])
         if spoken is None:
             return self._robot.perform(skill, arguments, feedback)
         screens = self._face.screens
@@ -215,19 +225,19 @@ class RobotWithFace:
             self._say(text)
             return None
         offered = given.pop(spoken.options)
-        assert isinstance(offered, tuple), "a mission checks what a program passes"
+        assert isinstance(offered, tuple), "a mission checks the arguments of a program"
         options = tuple(map(str, offered))
         return options[self._face.ask(", ".join(map(str, given.values())), text, options)]
 
     @property
     def failed_stop(self) -> str:
-        """Why the other robot could not be stopped; empty if it could, or does not say."""
+        """The reason why the other robot did not stop; empty if it stopped, or does not report that."""
         return str(getattr(self._robot, "failed_stop", ""))
 
-    def watch(self, told: Callable[[Point | None], None]) -> bool:
-        """Have the other robot tell its poses, if it can."""
+    def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
+        """Report the poses of the other robot; return whether it has poses."""
         watch = getattr(self._robot, "watch", None)
-        return watch is not None and bool(watch(told))
+        return watch is not None and bool(watch(on_pose))
 
     def cancel(self) -> None:
         """Withdraw the question, and stop the other robot."""
@@ -243,6 +253,6 @@ class RobotWithFace:
 
     def _say(self, text: str) -> None:
         self._face.say(text)
-        seconds = min(max(AT_LEAST, len(text) / LETTERS_PER_SECOND), AT_MOST)
+        seconds = min(max(MIN_SPEECH, len(text) / CHARACTERS_PER_SECOND), MAX_SPEECH)
         if not self.clock.wait(seconds):
             raise CancelledError

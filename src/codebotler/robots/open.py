@@ -1,4 +1,4 @@
-"""Opens a robot by its kind, and tells which kinds work on this machine."""
+"""Open a robot by its kind, and find out which kinds work on this machine."""
 
 from __future__ import annotations
 
@@ -14,54 +14,53 @@ from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
 from codebotler.robots.spelling import SpellingRobot
 
-KINDS = {
+ROBOT_MODULES = {
     "sim": "simulated",
     "pyrobosim": "pyrobosim.robot",
     "ros1": "ros.ros1",
     "rosbridge": "ros.rosbridge",
     "ros2": "ros.ros2",
 }
-"""Kinds of robots as a user names them, with the module of each.
+"""The module of each kind of robot.
 
-Importing such a module is cheap. It has `readiness(ros_python)`, which takes less than a second, and
-`robot(options)`, which gives a robot that is not yet connected.
+It imports fast, and has `readiness(ros_python)` and `robot(options)`, which returns an unconnected robot.
 """
 
 
 def open_robot(name: str, options: Options | None = None) -> Robot:
-    """A robot by its kind (sim, pyrobosim, ros1, rosbridge or ros2) or class, not yet connected.
+    """Open a robot by its kind (sim, pyrobosim, ros1, rosbridge or ros2) or class, without connecting.
 
     Raises:
-        UserError: there is no such kind or class, or an option is missing or wrong.
+        UserError: the kind or class does not exist, or an option is missing or invalid.
     """
     if is_own(name):
-        return _spelling(OwnRobot(name, options or Options()))
-    if name not in KINDS:
-        own = "or a class of yours, as in lab_robot.py:Spot"
-        raise UserError(f'there is no robot "{name}"; choose one of {", ".join(KINDS)}, {own}')
-    robot: Robot = _kind(name).robot(options or Options())
-    return robot if name == "sim" else _spelling(robot)
+        return _with_spelling(OwnRobot(name, options or Options()))
+    if name not in ROBOT_MODULES:
+        own = "or your own class, such as lab_robot.py:Spot"
+        raise UserError(f'there is no robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
+    robot: Robot = _import_kind(name).robot(options or Options())
+    return robot if name == "sim" else _with_spelling(robot)
 
 
-def _spelling(robot: Robot) -> Robot:
+def _with_spelling(robot: Robot) -> Robot:
     return cast("Robot", SpellingRobot(robot))
 
 
 def open_with_face(name: str, options: Options, face: Face) -> Robot:
-    """The same with a face, so that the robot itself needs neither `say` nor `ask`."""
+    """Open a robot with a face, which performs `say` and `ask`."""
     silent = open_robot(name, replace(options, skills=without_speech(options.skills)))
     lacking = without_speech(options.skills).without(silent.skills)
     return RobotWithFace(silent, face, options.skills.without(lacking))
 
 
-def all_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
-    """Whether each kind of robot can be used here, and what is missing if not."""
-    return [_readiness(name, ros_python) for name in KINDS]
+def check_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
+    """Return whether each kind of robot can be used here, and what is missing if not."""
+    return [_readiness(name, ros_python) for name in ROBOT_MODULES]
 
 
 def _readiness(name: str, ros_python: Path) -> Readiness:
     try:
-        readiness: Readiness = _kind(name).readiness(ros_python)
+        readiness: Readiness = _import_kind(name).readiness(ros_python)
     except ModuleNotFoundError as error:
         package = missing_package(error)
         if not package:
@@ -71,5 +70,5 @@ def _readiness(name: str, ros_python: Path) -> Readiness:
     return readiness
 
 
-def _kind(name: str) -> ModuleType:
-    return importlib.import_module(f"{__package__}.{KINDS[name]}")
+def _import_kind(name: str) -> ModuleType:
+    return importlib.import_module(f"{__package__}.{ROBOT_MODULES[name]}")

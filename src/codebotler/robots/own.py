@@ -1,11 +1,11 @@
-"""A robot that is a class in a file of the user's: its methods are named as the skills, async or not."""
+"""A robot defined by a class in a user's file, with a method for each skill, async or not."""
 
 from __future__ import annotations
 
 import asyncio
 import inspect
 import threading
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import CancelledError as FutureCancelledError
 from concurrent.futures import Future
 from contextlib import suppress
@@ -19,43 +19,42 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import plain
 from codebotler.core.words import listed
 from codebotler.robots.base import (
-    Argument,
+    STOP_BY_HAND,
     CancelledError,
     Feedback,
     NotReadyError,
     Options,
-    Result,
+    RobotArgument,
     RobotLostError,
-    no_feedback,
+    RobotResult,
+    ignore_feedback,
 )
 from codebotler.robots.clock import Clock
 
-STOPS = 5.0  # seconds that an async `stop` may take
-BY_HAND = "STOP THE ROBOT BY HAND"
+STOP_SECONDS = 5.0  # for an async `stop`
 
 
 def is_own(name: str) -> bool:
-    """Whether the name of a robot is that of a class in a file, such as `lab_robot.py:Spot`."""
+    """Whether a robot's name is a class in a file, such as `lab_robot.py:Spot`."""
     return ".py:" in name
 
 
 class OwnRobot:
-    """Makes a robot of an object whose methods are named as the skills.
+    """A robot whose skills are the methods of an object.
 
-    `rooms()` lists the rooms, and `stop()`, which may be called from any thread while another method runs,
-    stops the robot at once; what runs then may return or raise anything. A method raises RobotError, or an
-    exception whose class is named as an error that the skill declares. Whatever else it raises ends the
-    mission.
+    `rooms()` lists the rooms. `stop()` stops the robot at once, and may be called from any thread while
+    another method runs. A method reports a failure by RobotError, or by an exception with the name of an
+    error that the skill declares. Any other exception ends the mission.
 
     Args:
-        name: by which the user named it: the file and the class.
-        options: a user's.
+        name: the file and the class.
+        options: the user's options.
 
     Attributes:
-        failed_stop: why it could not be stopped; empty if it could.
+        failed_stop: why the robot could not be stopped; empty if it could.
 
     Raises:
-        UserError: there is no such file or class, or it lacks what every robot needs.
+        UserError: the file or class does not exist, or a required method is missing.
     """
 
     if_tool_dies = "nothing stops the robot unless its class sees to that"
@@ -65,7 +64,7 @@ class OwnRobot:
         path, _, kind = name.rpartition(":")
         self.name, self.address, self.skills = kind, f"{Path(path).resolve()}:{kind}", options.skills
         self.clock = Clock(1.0)
-        self._body = _made(Path(path), kind)
+        self._body = _make_body(Path(path), kind)
         methods = {skill: self._method(skill) for skill in self.skills}
         self._methods = {skill: method for skill, method in methods.items() if method is not None}
         for skill, method in self._methods.items():
@@ -75,18 +74,18 @@ class OwnRobot:
         }
         self._stopped = True
         self._is_busy = False
-        self._order, self._told = threading.Lock(), threading.Event()
-        self._told.set()  # there is nothing to tell
+        self._stop_lock, self._stop_returned = threading.Lock(), threading.Event()
+        self._stop_returned.set()
         self.failed_stop = ""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._running: Future[Any] | None = None
 
     def _method(self, skill: str) -> Callable[..., Any] | None:
-        """What carries out a skill; `rooms()` lists the rooms if nothing else does."""
+        """Return the method for a skill; `rooms` also serves as `get_all_rooms`."""
         try:
             method = getattr(self._body, skill, None)
         except Exception as error:
-            raise UserError(f"{self.name}.{skill} is not a method: {_said(error)}") from error
+            raise UserError(f"{self.name}.{skill} cannot be read: {_describe(error)}") from error
         if method is None and skill == "get_all_rooms":
             method = self._body.rooms
         return method if callable(method) else None
@@ -101,18 +100,20 @@ class OwnRobot:
         connect = getattr(self._body, "connect", None)
         if connect is not None:
             try:
-                self._finished(connect())
+                self._finish(connect())
             except Exception as error:
-                raise NotReadyError(f"{self.name} did not connect: {_said(error)}") from error
+                raise NotReadyError(f"{self.name} did not connect: {_describe(error)}") from error
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], _: Feedback = no_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], _: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Call the method of a skill.
 
         Raises:
-            RobotError: it says that the robot cannot do it.
+            RobotError: the robot cannot do it.
             CancelledError: the robot was stopped.
-            RobotLostError: it failed in another way, or the robot could not be stopped.
+            RobotLostError: the method failed unexpectedly, or the robot could not be stopped.
         """
         if self._stopped:
             raise CancelledError
@@ -122,7 +123,7 @@ class OwnRobot:
         given = [parameter.type.wanted(one) for parameter, one in zip(row.parameters, arguments, strict=True)]
         self._is_busy = True
         try:
-            result: Result = plain(self._finished(self._methods[skill](*given)))
+            result: RobotResult = plain(self._finish(self._methods[skill](*given)))
         except Exception as error:
             self._expect_no_stop()
             kind = type(error).__name__
@@ -132,44 +133,46 @@ class OwnRobot:
                 raise RobotError(kind, str(error) or f"{skill}: {dict(row.fails)[kind]}") from error
             self.cancel()
             failed = f"; {self.failed_stop}" if self.failed_stop else ""
-            raise RobotLostError(f"{self.name}.{skill} failed: {_said(error)}{failed}") from error
+            raise RobotLostError(f"{self.name}.{skill} failed: {_describe(error)}{failed}") from error
         finally:
             self._is_busy = False
         self._expect_no_stop()
         return result
 
     def _expect_no_stop(self) -> None:
-        """Raise what a stop makes of a skill, once it is known whether that has worked."""
+        """If the robot was stopped, wait until `stop` has returned, and raise the error for its result."""
         if not self._stopped:
             return
-        if not self._told.wait(STOPS):
-            raise RobotLostError(f"{self.name}.stop has not returned after {STOPS:.0f} s; {BY_HAND}")
+        if not self._stop_returned.wait(STOP_SECONDS):
+            raise RobotLostError(
+                f"{self.name}.stop has not returned after {STOP_SECONDS:.0f} s; {STOP_BY_HAND}"
+            )
         if self.failed_stop:
             raise RobotLostError(self.failed_stop)
         raise CancelledError
 
     def cancel(self) -> None:
-        """Call `stop`, and cancel what is awaited."""
-        with self._order:
+        """Call `stop`, and cancel the running method."""
+        with self._stop_lock:
             was_stopped, self._stopped = self._stopped, True
             if not was_stopped:
-                self._told.clear()
+                self._stop_returned.clear()
         self.clock.stop()
         if was_stopped:
-            self._told.wait(STOPS)  # by another call
+            self._stop_returned.wait(STOP_SECONDS)  # another thread calls it
             return
         try:
-            self._finished(self._body.stop(), STOPS)
-        except Exception as error:  # noqa: BLE001 - a stop raises nothing
-            why = "it took too long" if isinstance(error, TimeoutError) else _said(error)
-            self.failed_stop = f"{self.name}.stop failed: {why}; {BY_HAND}"
+            self._finish(self._body.stop(), STOP_SECONDS)
+        except Exception as error:  # noqa: BLE001 - cancel must not raise
+            why = "it took too long" if isinstance(error, TimeoutError) else _describe(error)
+            self.failed_stop = f"{self.name}.stop failed: {why}; {STOP_BY_HAND}"
         finally:
-            self._told.set()
+            self._stop_returned.set()
         if (running := self._running) is not None:
             running.cancel()
 
     def disconnect(self) -> None:
-        """End what goes on, call `disconnect` if the class has it, and end the loop of async methods."""
+        """End the running method, call `disconnect` if the class has it, and end the event loop."""
         if self._is_busy:
             self.cancel()
         self._stopped = True
@@ -177,22 +180,19 @@ class OwnRobot:
         disconnect = getattr(self._body, "disconnect", None)
         if self._loop is None:
             return
-        with suppress(Exception):  # it is left in any case
+        with suppress(Exception):  # the connection is given up in any case
             if disconnect is not None:
-                self._finished(disconnect(), STOPS)
+                self._finish(disconnect(), STOP_SECONDS)
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._loop = None
-        self._thread.join(STOPS)
+        self._thread.join(STOP_SECONDS)
 
-    def _finished(self, result: Any, patience: float | None = None) -> Any:  # noqa: ANN401 - of a user's method
-        """What a method has returned, or what comes of it if it is async."""
+    def _finish(self, result: Any, patience: float | None = None) -> Any:  # noqa: ANN401 - of a user's method
+        """Return the result of a method; wait for it if the method is async."""
         if not inspect.iscoroutine(result):
             return result
-        return self._awaited(result, patience)
-
-    def _awaited(self, work: Coroutine[Any, Any, Any], patience: float | None) -> Any:  # noqa: ANN401 - the same
         assert self._loop is not None, "the robot is connected"
-        future = asyncio.run_coroutine_threadsafe(work, self._loop)
+        future = asyncio.run_coroutine_threadsafe(result, self._loop)
         if patience is None:
             self._running = future
         try:
@@ -208,21 +208,21 @@ class OwnRobot:
 
 
 def _expect_fit(kind: str, method: Callable[..., Any], skill: Skill) -> None:
-    """UserError if a method does not take what programs pass to its skill."""
+    """Raise UserError if a method does not take the arguments of its skill."""
     code = getattr(method, "__code__", None)
     try:
         inspect.signature(method).bind(*(parameter.name for parameter in skill.parameters))
     except TypeError:
         takes = ", ".join(["self", *(parameter.name for parameter in skill.parameters)])
         file, line = (None, None) if code is None else (code.co_filename, code.co_firstlineno)
-        sentence = f"{kind}.{skill.name} does not take what programs pass; write def {skill.name}({takes})"
+        sentence = f"{kind}.{skill.name} has the wrong parameters; write def {skill.name}({takes})"
         raise UserError(sentence, file=file, line=line) from None
-    except ValueError:  # it has no signature that Python knows
+    except ValueError:  # Python cannot find its signature
         return
 
 
 def _run(loop: asyncio.AbstractEventLoop) -> None:
-    """Run a loop until it is stopped."""
+    """Run an event loop until it is stopped."""
     try:
         loop.run_forever()
         loop.run_until_complete(loop.shutdown_asyncgens())
@@ -230,8 +230,8 @@ def _run(loop: asyncio.AbstractEventLoop) -> None:
         loop.close()
 
 
-def _made(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
-    """An object of a class in a file; a UserError if it cannot be a robot."""
+def _make_body(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
+    """Create an object of a class in a file; UserError if it cannot be a robot."""
     module = loaded(path)
     classes = [
         n for n, one in vars(module).items() if inspect.isclass(one) and one.__module__ == module.__name__
@@ -239,25 +239,25 @@ def _made(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
     if kind not in classes:
         hint = f"; its classes are {listed(classes)}" if classes else ""
         raise UserError(f"it has no class {kind}{hint}", file=path)
-    made = getattr(module, kind)
-    line = inspect.getsourcelines(made)[1]
-    for method, why in NEEDED.items():
-        if not callable(getattr(made, method, None)):
+    body = getattr(module, kind)
+    line = inspect.getsourcelines(body)[1]
+    for method, why in REQUIRED_METHODS.items():
+        if not callable(getattr(body, method, None)):
             raise UserError(
                 f"{kind} has no method {method}, {why}; add def {method}(self)", file=path, line=line
             )
     try:
-        return made()
+        return body()
     except Exception as error:
-        raise UserError(f"{kind}() failed: {_said(error)}", file=path, line=line) from error
+        raise UserError(f"{kind}() failed: {_describe(error)}", file=path, line=line) from error
 
 
-OURS = str(Path(__file__).parents[1])
-NEEDED = {"stop": "which stops the robot at once", "rooms": "which lists the rooms"}
+OWN_CODE = str(Path(__file__).parents[1])
+REQUIRED_METHODS = {"stop": "which stops the robot at once", "rooms": "which lists the rooms"}
 
 
-def _said(error: Exception) -> str:
-    """An error in words, with the last line of a file of the user's that it came through."""
-    own = [frame for frame in extract_tb(error.__traceback__) if not frame.filename.startswith(OURS)]
+def _describe(error: Exception) -> str:
+    """Describe an error, with the last line outside CodeBotler in its traceback."""
+    own = [frame for frame in extract_tb(error.__traceback__) if not frame.filename.startswith(OWN_CODE)]
     where = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
     return f"{type(error).__name__}: {error}{where}"

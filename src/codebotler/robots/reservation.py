@@ -1,4 +1,4 @@
-"""A lock that keeps a robot for one mission at a time, also from other tools on this machine."""
+"""Lock a robot, so that only one tool on this machine uses it at a time."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from urllib.parse import urlsplit
 from codebotler.core.files import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
-PORTS = {"ws": 80, "wss": 443, "http": 80, "https": 443}
-HERE = "127.0.0.1"
+DEFAULT_PORTS = {"ws": 80, "wss": 443, "http": 80, "https": 443}
+LOOPBACK_ADDRESS = "127.0.0.1"
 
 
 class Reservation:
-    """A context manager that locks a robot and connects it.
+    """Locks a robot and connects it, as a context manager.
 
-    The lock ends with this process, however that ends. A robot with an address is locked for all tools of
-    this user on this machine; one without is locked for the missions of one home.
+    The lock ends with this process. It holds for all tools of this user on this machine if the robot has an
+    address, otherwise for the missions in one folder.
 
     Args:
-        robot: not yet connected.
+        robot: an unconnected robot.
         home: the folder of missions.
 
     Raises:
@@ -68,19 +68,13 @@ class Reservation:
             os.close(self._lock)
 
     def use(self) -> None:
-        """Take the robot for a mission; it has to be connected again for the next one.
-
-        Raises:
-            NotReadyError: it was taken before.
-        """
+        """Use the robot for a mission; NotReadyError if this connection has already served one."""
         if not self._is_used.acquire(blocking=False):
-            raise NotReadyError(
-                f"the robot {self.robot.name} has already run another mission; connect it again"
-            )
+            raise NotReadyError(f"the robot {self.robot.name} has already run a mission; connect it again")
 
     def _path(self) -> Path:
         if self.robot.address:
-            return file_of(self.robot.name, self.robot.address, "lock")
+            return robot_file(self.robot.name, self.robot.address, "lock")
         folder = self._home / "robots"
         make_folder(folder)
         return folder / f"{self.robot.name}.lock"
@@ -101,74 +95,69 @@ class Reservation:
         try:
             holder = json.loads(os.pread(self._lock, 1_000, 0))
             return f"another tool (process {holder['process']}, since {holder['since']})"
-        except ValueError:  # it is being written
+        except ValueError:  # another process is writing it
             return "another tool"
 
 
-def file_of(robot: str, address: str, kind: str) -> Path:
-    """A file of this user on this machine about the robot at an address.
-
-    Raises:
-        NotReadyError: others could write there.
-        OSError: its folder cannot be created.
-    """
-    digest = sha256(endpoint(address).encode(errors="surrogatepass")).hexdigest()
+def robot_file(robot: str, address: str, kind: str) -> Path:
+    """Return the path of this user's file about the robot at an address, inside `lock_folder`."""
+    digest = sha256(normalize_address(address).encode(errors="surrogatepass")).hexdigest()
     return lock_folder() / f"{robot} {digest}.{kind}"
 
 
 def lock_folder() -> Path:
-    """The folder of this user's locks on this machine, created if necessary.
+    """Return the folder of this user's locks on this machine, and create it if necessary.
 
     Raises:
-        NotReadyError: others could write there.
-        OSError: it cannot be created.
+        NotReadyError: others can write there.
+        OSError: the folder cannot be created.
     """
     runtime = Path(os.environ.get("XDG_RUNTIME_DIR", ""))
-    is_usable = runtime.is_absolute() and _is_ours(runtime)  # with `sudo` it may be the caller's
+    is_usable = runtime.is_absolute() and _is_ours(runtime)  # under `sudo` it may belong to the caller
     folder = runtime / "codebotler" if is_usable else Path(gettempdir()) / f"codebotler-{os.getuid()}"
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):
         raise NotReadyError(
-            f"{folder} holds the locks of robots, but is not a folder that only you can write to; remove it"
+            f"{folder} holds locks of robots, but others can write to it, or it is no folder; remove it"
         )
     return folder
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether it is a real folder of this user in which nobody else can write."""
+    """Whether this is a real folder of this user that nobody else can write to."""
     try:
         found = folder.lstat()
     except OSError:
         return False
-    is_closed = not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and is_closed
+    is_private = not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and is_private
 
 
-def endpoint(address: str) -> str:
-    """An address with its port, and without user, capitals and trailing slashes.
+def normalize_address(address: str) -> str:
+    """Return one spelling for an address: with a port, without user, capitals and trailing slashes.
 
-    All names of this machine become one, and text that is no address stays as it is. Connect to what the user
-    wrote, since a server may listen at only one name of its machine.
+    All names of this machine become one; invalid addresses stay unchanged. Connect to the original spelling,
+    since a server may listen at only one name of its machine.
     """
     try:
         parts = urlsplit(address.strip())
         host, port = parts.hostname, parts.port
-    except ValueError:  # the port is no number, or a bracket is open
+    except ValueError:  # an invalid port, or an unmatched bracket
         return address
-    if not host or parts.scheme not in PORTS:
+    if not host or parts.scheme not in DEFAULT_PORTS:
         return address
-    where = _machine(host.rstrip("."))
-    where = f"[{where}]" if ":" in where else where
+    host = _normalize_host(host.rstrip("."))
+    host = f"[{host}]" if ":" in host else host
     path = parts.path.rstrip("/") + (f"?{parts.query}" if parts.query else "")
-    return f"{parts.scheme}://{where}:{port or PORTS[parts.scheme]}{path}"
+    return f"{parts.scheme}://{host}:{port or DEFAULT_PORTS[parts.scheme]}{path}"
 
 
-def _machine(host: str) -> str:
+def _normalize_host(host: str) -> str:
     if host in {"localhost", socket.gethostname().lower()}:
-        return HERE
-    with suppress(ValueError):  # it is a name
+        return LOOPBACK_ADDRESS
+    with suppress(ValueError):  # a name, not a number
         number = ip_address(host)
         number = getattr(number, "ipv4_mapped", None) or number
-        return HERE if number.is_loopback or number.is_unspecified else number.compressed
+        return LOOPBACK_ADDRESS if number.is_loopback or number.is_unspecified else number.compressed
     return host

@@ -1,4 +1,4 @@
-"""The simulated robot: it drives at walking pace, and does all else as in the simulator."""
+"""A simulated robot that drives at walking pace."""
 
 from __future__ import annotations
 
@@ -14,37 +14,36 @@ from codebotler.core.trace import Option
 from codebotler.core.world import World, laid_out
 from codebotler.robots.base import (
     ROS_PYTHON,
-    Argument,
     CancelledError,
     Feedback,
     Options,
     Readiness,
-    Result,
-    no_feedback,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
 )
 from codebotler.robots.clock import Clock
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import ENDLESS, WORDS_FOR_PEOPLE, SimulationSettings, resolve_room
 
-ROBOT_RULES = SimulationSettings(
+SIMULATED_RULES = SimulationSettings(
     literals="as-written", people="own-name-or-word", words_for_people=WORDS_FOR_PEOPLE, limits=ENDLESS
 )
 METRES_PER_SECOND = 0.5
-FEEDBACK_EVERY = 0.25  # real seconds
-
+FEEDBACK_SECONDS = 0.25  # real seconds
 
 OFFICE = Path(__file__).with_name("office.yaml")
 """The world of an example: printer rooms, a supply room and an office."""
 
 
 class Simulated:
-    """A simulated robot that takes its time.
+    """A simulated robot whose skills take time.
 
     Args:
-        world: where it is.
+        world: its world.
         speed: seconds of its clock per real second; None if nothing takes real time.
-        skills: the skills it may be asked to perform.
-        metres_per_second: how fast it drives, above 0; infinite if driving takes no time.
+        skills: the skills that it may be asked to perform.
+        metres_per_second: its driving speed, above 0; infinite if driving takes no time.
 
     Raises:
         UserError: the speed is out of range.
@@ -65,17 +64,19 @@ class Simulated:
         self.skills, self.clock = skills, Clock(speed)
         self._world, self._pace = world, metres_per_second
         self._stands_at = {room.name: room.stand_at or (0.0, 0.0) for room in laid_out(world).rooms}
-        self._robot = SimulatedRobot(world, ROBOT_RULES, skills)
+        self._robot = SimulatedRobot(world, SIMULATED_RULES, skills)
         self._place = self._stands_at[world.robot]
 
     def connect(self) -> None:
-        """Put the robot and all objects where the world has them."""
-        self._robot = SimulatedRobot(self._world, ROBOT_RULES, self.skills)
+        """Put the robot and all objects at their places in the world."""
+        self._robot = SimulatedRobot(self._world, SIMULATED_RULES, self.skills)
         self._place = self._stands_at[self._world.robot]
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
-        """Execute a skill, taking its time.
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
+        """Execute a skill; it takes time.
 
         Raises:
             RobotError: the robot cannot do it.
@@ -88,7 +89,7 @@ class Simulated:
                 self._drive(room, feedback)
         else:
             self._wait(self.skills[skill].seconds)
-        return performed(self._robot, skill, arguments)
+        return perform_at_once(self._robot, skill, arguments)
 
     def cancel(self) -> None:
         """Stop at once."""
@@ -101,7 +102,7 @@ class Simulated:
     def _drive(self, room: str, feedback: Feedback) -> None:
         start, end = self._place, self._stands_at[room]
         takes = math.dist(start, end) / self._pace
-        step = takes if self.clock.speed is None else max(FEEDBACK_EVERY * self.clock.speed, 1e-3)
+        step = takes if self.clock.speed is None else max(FEEDBACK_SECONDS * self.clock.speed, 1e-3)
         driven = 0.0
         if takes:
             feedback(f"at ({start[0]:.1f}, {start[1]:.1f})")
@@ -119,8 +120,8 @@ class Simulated:
             raise CancelledError
 
 
-def performed(robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-    """A skill in the simulator, with texts for options."""
+def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[RobotArgument]) -> RobotResult:
+    """Perform a skill in the simulator, with texts for options."""
     taken = robot.skills[skill].parameters
     given = [
         tuple(Option(str(text)) for text in a) if parameter.is_options and isinstance(a, tuple) else a
@@ -134,12 +135,12 @@ def performed(robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) 
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """It works everywhere."""
+    """Return that the simulator works."""
     return Readiness("sim", works=True, note="simulates the rooms and people of --world FILE")
 
 
 def robot(options: Options) -> Simulated:
-    """The simulated robot of these options, which must name a world."""
+    """Open the simulated robot; UserError if the options name no world."""
     if options.world is None:
         raise UserError("the simulated robot needs a world; name one with --world FILE")
     return Simulated(options.world, speed=options.speed, skills=options.skills)

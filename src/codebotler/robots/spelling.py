@@ -1,4 +1,4 @@
-"""A robot whose names may be in another form of Unicode than those of programs."""
+"""Translate names between the robot's form of Unicode and the composed form of programs."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ from collections.abc import Sequence
 from typing import Any
 
 from codebotler.core.unicode import composed
-from codebotler.robots.base import Argument, Feedback, Result, Robot, no_feedback
+from codebotler.robots.base import Feedback, Robot, RobotArgument, RobotResult, ignore_feedback
 
 
 class SpellingRobot:
-    """A robot that answers in composed texts, and is asked for what it named in its own spelling."""
+    """Answers in composed Unicode, and passes names to the robot in its own spelling."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._spellings: dict[str, str] = {}  # its own, by the composed ones
+        self._spellings: dict[str, str] = {}  # by composed names
 
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the robot has
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of the robot
         return getattr(self._robot, name)
 
-    def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
-        """Have the robot execute a skill."""
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
+        """Execute a skill."""
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)
         for text in result if isinstance(result, list) else [result]:

@@ -15,7 +15,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.terminal import shortened, visible_lines
 from codebotler.missions.mission import UNCONFIRMED
-from codebotler.robots.face import AnswerError, Face, Question
+from codebotler.robots.base import AnswerError
+from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.access import Role
 from codebotler.web.console import Console
 
@@ -82,7 +83,7 @@ def router(console: Console, face: Face) -> APIRouter:
     async def live(socket: WebSocket) -> None:
         """Send what the face shows, again at each change; messages from there are ignored."""
         await socket.accept()
-        with face.watched():
+        with face.count_screen():
             sending = asyncio.create_task(_send_changes(socket, console, face))
             try:
                 with suppress(WebSocketDisconnect, KeyError):  # a message that is no text
@@ -125,12 +126,12 @@ def face_data(console: Console, face: Face) -> dict[str, Any]:
     }
 
 
-def _seconds_left(question: Question) -> float | None:
+def _seconds_left(question: FaceQuestion) -> float | None:
     left = question.until - time.monotonic()
     return round(max(0.0, left), 1) if math.isfinite(left) else None
 
 
-def question_data(question: Question) -> dict[str, Any]:
+def question_data(question: FaceQuestion) -> dict[str, Any]:
     """A question as plain data."""
     return {
         "number": question.number,
@@ -146,6 +147,6 @@ def words(text: str, most: int = MOST_TEXT) -> str:
     return shortened(text, most, visible_lines)
 
 
-def _ended_data(ended: Question) -> dict[str, Any]:
+def _ended_data(ended: FaceQuestion) -> dict[str, Any]:
     answer = None if ended.answer is None else words(ended.options[ended.answer], MOST_OPTION)
     return {"number": ended.number, "how": ended.how, "answer": answer}

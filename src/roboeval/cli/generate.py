@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from codebotler.cli.ending import STOPPED
-from codebotler.cli.model_options import model_settings, note_unsent, with_options_of
+from codebotler.cli.model_options import inherit_options, model_settings, note_unsent
 from codebotler.cli.options import (
     BaseUrlOption,
     ModelOption,
@@ -83,7 +83,7 @@ class Requested:
         return open_model(self.name, self.settings)
 
 
-@with_options_of(model_settings)
+@inherit_options(model_settings)
 def requested(
     model: ModelOption = None,
     out: OutOption = None,
@@ -99,7 +99,7 @@ def requested(
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> Requested:
     """What options request."""
-    from codebotler.models.chosen import chosen_model
+    from codebotler.models.chosen import choose_model
     from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import tasks_to_judge
@@ -107,8 +107,8 @@ def requested(
     if families is not None or num_tasks is not None:
         suite = suite_of_families(suite, families, num_tasks, sampling["seed"])
         sampling["seed"] = None
-    chosen = chosen_model(model, base_url)
-    settings = chosen.with_its_server(model_settings(**sampling))
+    chosen = choose_model(model, base_url)
+    settings = chosen.add_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
@@ -129,7 +129,7 @@ def suite_of_families(suite: str, families: str | None, num_tasks: int | None, s
 
 def complete(run: Run, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
-    from codebotler.models.recorded import NOTICE, is_recorded
+    from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
     meter = Meter()
@@ -143,11 +143,11 @@ def complete(run: Run, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
         note(f"roboeval: {progress.missing}; the same command continues where it stopped")
         raise SystemExit(1)
     if is_recorded(model.name):
-        note(NOTICE)
+        note(RECORDED_NOTICE)
     return run.path
 
 
-@with_options_of(requested)
+@inherit_options(requested)
 def generate(
     *,
     requests: RequestsOption = None,
@@ -186,7 +186,7 @@ def write_batch(what: Requested, path: Path) -> None:
         note(f"OpenAI takes at most {MOST_REQUESTS:,} requests in a file; split it")
 
 
-@with_options_of(requested)
+@inherit_options(requested)
 def run(
     *,
     tasks: TasksOption = None,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 from codebotler.core.trace import Outcome, Status
-from codebotler.models.no_program import IN_WORDS, NO_PROGRAM_KINDS
+from codebotler.models.no_program import NO_PROGRAM_KINDS, NO_PROGRAM_SENTENCES
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
@@ -102,7 +102,7 @@ def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
     """Why a reply held no program, in a sentence, from the failure of a row; None if it fails otherwise."""
     if failure["class"] != NO_PROGRAM:
         return None
-    return next((words for kind, words in IN_WORDS.items() if kind == failure["kind"]), "")
+    return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,13 @@ from dataclasses import asdict, dataclass, field
 from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_whole
 from codebotler.models.base import (
     BudgetSpentError,
-    Heard,
     Model,
     ModelError,
     Reply,
+    TextListener,
     Usage,
-    reply_from,
-    unheard,
+    ignore_text,
+    make_reply,
 )
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.sampling import SamplingSettings
@@ -125,7 +125,7 @@ def generate_run(
 
 def reply_of_refusal(error: ModelError) -> Reply:
     """The reply that stands for a request that the server refused for good."""
-    return reply_from(error.sentence, Usage(), None, None, said="refusal", has_answer=False)
+    return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
 
 
 _KEY: ContextVar[Key] = ContextVar("_KEY")
@@ -146,10 +146,10 @@ class _LoggedModel:
     def settings(self) -> SamplingSettings:
         return self.model.settings
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         self.log.sent(_KEY.get())
         try:
-            return await self.model.reply(prompt, number=number, heard=heard)
+            return await self.model.reply(prompt, number=number, on_text=on_text)
         except ModelError:
             self.log.failed(_KEY.get())
             raise
@@ -186,7 +186,7 @@ class _Generation:
             if self.progress.stopped is None and self.progress.done:
                 self._keep_refused()
             if self._budget is not None:  # requests that were under way have used more since
-                self.progress.stopped = BudgetSpentError(self._budget, self._paced.spent).sentence
+                self.progress.stopped = BudgetSpentError(self._budget, self._paced.tokens_used).sentence
         except BaseExceptionGroup as errors:
             raise errors.exceptions[0] from None
         finally:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
-from codebotler.models.recorded import NAMES, InstructionSolutions, Solution
+from codebotler.models.recorded import RECORDED_NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task
 
 LENDER = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
@@ -40,7 +40,12 @@ def solutions(task: Task) -> tuple[Solution, ...]:
     folders = [task.path.parents[1], *([LENDER] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
-        recorded = (one for model in NAMES for recording in form.recorded for one in recording.by(model))
+        recorded = (
+            one
+            for model in RECORDED_NAMES
+            for recording in form.recorded
+            for one in recording.replies_of(model)
+        )
         for solution in (*recorded, *form.programs):
             distinct.setdefault(solution.program, solution)
     return tuple(distinct.values())

@@ -11,7 +11,7 @@ import polars as pl
 from fastapi import Query
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.models.no_program import IN_WORDS
+from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
 from roboeval.analysis.summary import Failures, cut_off_replies, failures
@@ -37,7 +37,7 @@ SIGN = (
 ERROR = pl.col("error_message")
 WHY = (
     pl.when(HAS_NO_PROGRAM)
-    .then(pl.col("failure_kind").replace(dict(IN_WORDS)))
+    .then(pl.col("failure_kind").replace(dict(NO_PROGRAM_SENTENCES)))
     .when(pl.col("failure_check").is_not_null())
     .then(pl.col("failure_check").map_elements(check_label, return_dtype=pl.String))
     .when((pl.col("status") == "timeout") & ERROR.str.contains(r"^\d"))

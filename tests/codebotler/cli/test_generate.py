@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import command_line
-from codebotler.models.recorded import NOTICE, recorded_model
+from codebotler.models.recorded import RECORDED_NOTICE, open_recorded
 from codebotler.robots.simulated import OFFICE
 from command_line import Ended, Refusal, command, process
 from roboeval.suites.load import Suite
@@ -55,11 +55,11 @@ def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, p
     world = tmp_path / "world.yaml"
     world.write_text(paper.tasks["StaplerDelivery"].scenarios[0].world.to_yaml())
     alone = codebotler("generate", instruction(paper), "--model", "recorded")
-    assert (alone.status, alone.err) == (0, f"{NOTICE}\n")
+    assert (alone.status, alone.err) == (0, f"{RECORDED_NOTICE}\n")
     compile(alone.out, "program", "exec")
     assert alone.out.startswith("def task_program():\n")
     piped = codebotler("generate", instruction(paper), after=f"| {CODEBOTLER} check - --world {world}")
-    assert (piped.status, piped.err) == (0, f"{NOTICE}\n")
+    assert (piped.status, piped.err) == (0, f"{RECORDED_NOTICE}\n")
     assert piped.out.startswith("accepted: no problem in the program")
 
 
@@ -75,7 +75,7 @@ def test_instructions_that_are_offered_instead_are_whole_and_fit_the_world(tmp_p
     office.write_text(OFFICE.read_text())
     refusal = refused("Go to the lobby, and tell me how many people are there.", "--world", office, lines=5)
     _, *offered, _ = refusal.sentence.splitlines()
-    known = recorded_model("recorded").replies
+    known = open_recorded("recorded").replies
     assert {text.strip() for text in offered} <= known.keys()
     assert not any("lobby" in text.lower() for text in offered)
     (tmp_path / "hall.yaml").write_text("robot: hall\nrooms: [hall]\n")
@@ -164,7 +164,7 @@ def test_the_prompt_for_a_local_model_says_which_form_it_is() -> None:
     [
         ("nonsense", ['"nonsense"', "recorded, "]),
         ("hf:", ['"hf:"', "recorded, "]),
-        ("recorded:lazy", ['"recorded:lazy"', "recorded:careful, "]),
+        ("recorded:lazy", ['"recorded:lazy"', "recorded:careful or "]),
     ],
 )
 def test_no_prompt_is_shown_for_a_model_that_is_none(model: str, named: list[str]) -> None:

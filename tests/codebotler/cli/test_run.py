@@ -19,7 +19,7 @@ from mcap.reader import make_reader
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import home
-from codebotler.models.recorded import NOTICE, recorded_model
+from codebotler.models.recorded import RECORDED_NOTICE, open_recorded
 from command_line import Ended, command
 from forked import Forked
 from processes import are_gone, children_of
@@ -151,10 +151,10 @@ def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) ->
     instruction = task.prompts[0]
     (folder / "world.yaml").write_text(task.scenarios[0].world.to_yaml())
     status, out, err = run(folder, instruction, "--yes")
-    assert (status, err.splitlines()[0]) == (0, NOTICE)
+    assert (status, err.splitlines()[0]) == (0, RECORDED_NOTICE)
     assert "accepted: " in out
     program = "".join(line.removeprefix("    ") for line in out.splitlines(keepends=True)[:40])
-    assert recorded_model("recorded:careful").solution(instruction, 0).program in program
+    assert open_recorded("recorded:careful").solution(instruction, 0).program in program
     status, out, _ = ended(folder, "missions", "last", "--json")
     mission = json.loads(out)
     assert (mission["instruction"], mission["model"]) == (instruction, "recorded:careful")
@@ -203,7 +203,7 @@ def test_without_a_world_the_robot_works_in_the_office_of_the_examples(folder: P
 def test_one_course_is_shown_or_all_of_them(folder: Path) -> None:
     one = run(folder, "good.py", "--yes")[1].partition("running on")[0]
     assert one.count("what the robot would do") == 1
-    assert "1 of 2 different courses; --all" in one
+    assert "1 of 2 different outcomes; --all" in one
     both = run(folder, "good.py", "--yes", "--all")[1].partition("running on")[0]
     assert [both.count('"mug": found'), both.count('"mug": not found')] == [1, 1]
     assert "--all" not in both

@@ -11,11 +11,14 @@ from codebotler.core.program import flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
 from codebotler.core.skills.values import NO_VALUE
-from codebotler.models.recorded import NAMES, recorded_model
+from codebotler.models.recorded import RECORDED_NAMES, open_recorded
 from codebotler.prompts.extract import program_of
 
 RECORDED = [
-    reply for name in NAMES for them in recorded_model(f"recorded:{name}").replies.values() for reply in them
+    reply
+    for name in RECORDED_NAMES
+    for them in open_recorded(f"recorded:{name}").replies.values()
+    for reply in them
 ]
 UNPARSABLE = {"SyntaxError", "IndentationError"}
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from codebotler.generation.generate import Attempt, Generation, write_program
-from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 
@@ -24,11 +24,11 @@ class Scripted:
     name: str = "scripted"
     settings: SamplingSettings = field(default_factory=SamplingSettings)
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         self.asked.append((prompt, number))
         if number >= len(self.lines):
             raise ModelError("the script is over", may_pass=False)
-        heard(self.lines[number])
+        on_text(self.lines[number])
         return Reply(self.lines[number], self.lines[number], Usage(3, 4), 0.25, "stop")
 
     async def close(self) -> None: ...
@@ -39,7 +39,7 @@ def no_bad_word(program: str) -> list[str]:
 
 
 def made(model: Scripted, tried: Callable[[Attempt], None] = lambda _: None, **how: object) -> Generation:
-    return asyncio.run(write_program(model, PROMPT, no_bad_word, tried=tried, **how))  # type: ignore[arg-type] # how
+    return asyncio.run(write_program(model, PROMPT, no_bad_word, on_attempt=tried, **how))  # type: ignore[arg-type] # how
 
 
 def test_a_program_that_is_accepted_is_asked_for_once() -> None:

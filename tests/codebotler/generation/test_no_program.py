@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import pytest
 
 from codebotler.generation.generate import Generation, write_program
-from codebotler.generation.no_program import programless
-from codebotler.models.base import Heard, Reply, Usage, reply_from, unheard
+from codebotler.generation.no_program import describe_programless
+from codebotler.models.base import Reply, TextListener, Usage, ignore_text, make_reply
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
@@ -32,9 +32,9 @@ class Scripted:
     name: str = "scripted"
     settings: SamplingSettings = field(default_factory=SamplingSettings)
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         self.asked.append(prompt)
-        heard(self.replies[number].text)
+        on_text(self.replies[number].text)
         return self.replies[number]
 
     async def close(self) -> None: ...
@@ -53,11 +53,11 @@ def made(model: Scripted, *, retries: int, repair: bool) -> Generation:
 
 @pytest.mark.parametrize("kind", NO_PROGRAM_KINDS)
 def test_every_kind_has_a_sentence_and_a_whole_program_has_none(kind: NoProgram) -> None:
-    none = programless(reply("what it says", kind), PLAIN)
+    none = describe_programless(reply("what it says", kind), PLAIN)
     assert none is not None
     assert (none.kind, none.text) == (kind, "what it says")
     assert none.sentence
-    assert programless(reply(PROGRAM, None), PLAIN) is None
+    assert describe_programless(reply(PROGRAM, None), PLAIN) is None
 
 
 @pytest.mark.parametrize(
@@ -67,14 +67,14 @@ def test_every_kind_has_a_sentence_and_a_whole_program_has_none(kind: NoProgram)
 def test_a_reply_that_was_cut_off_names_its_limit_and_a_higher_one(
     limit: int | None, tokens: int | None, named: str, higher: int
 ) -> None:
-    none = programless(reply("def task", "cut-off", tokens), SamplingSettings(max_tokens=limit))
+    none = describe_programless(reply("def task", "cut-off", tokens), SamplingSettings(max_tokens=limit))
     assert none is not None
     assert named in none.sentence
     assert none.higher_limit == higher
 
 
 def test_a_refusal_is_quoted_and_kept_short() -> None:
-    none = programless(reply("I can't help with that. " * 50, "refusal"), PLAIN)
+    none = describe_programless(reply("I can't help with that. " * 50, "refusal"), PLAIN)
     assert none is not None
     assert "I can't help with that." in none.sentence
     assert len(none.sentence) < 300
@@ -83,7 +83,7 @@ def test_a_refusal_is_quoted_and_kept_short() -> None:
 
 @pytest.mark.parametrize("repair", [False, True])
 def test_a_reply_without_a_program_is_not_checked_and_asked_for_again(*, repair: bool) -> None:
-    prose = reply_from("I am afraid that I cannot do that.", Usage(), 0.0, "stop")
+    prose = make_reply("I am afraid that I cannot do that.", Usage(), 0.0, "stop")
     model = Scripted([prose, reply(PROGRAM, None)])
     generation = made(model, retries=1, repair=repair)
     first, last = generation.attempts

@@ -24,11 +24,11 @@ from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import expect_poses, preflight
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import Order
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.face import Face, RobotWithFace
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.ros.keepout import RESOLUTION, keepout
+from codebotler.robots.ros.keepout import MASK_RESOLUTION, keepout_messages
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.robots.spelling import SpellingRobot
 from codebotler.rtl import parse
@@ -248,7 +248,7 @@ def test_a_rule_that_cannot_be_enforced_is_refused_before_anything_moves(
         robot,
         tmp_path,
         Order(program="def task_program():\n    go_to('hall')\n"),
-        open_model=recorded_model,
+        open_model=open_recorded,
         check=checker(SKILLS),
         rules=(VAULT,),
         world=world,
@@ -356,7 +356,9 @@ def test_poses_are_not_asked_for_where_no_rule_is_about_them(tmp_path: Path) -> 
 
 def test_the_keepout_mask_holds_the_rooms_that_no_path_may_enter() -> None:
     also = rule('not tr.Exists(inside("supply")) and not tr.Exists(inside("printer room 2"))')
-    grid, info = keepout([also, VAULT, rule('not tr.Exists(goto("room 1"))')], WORLD.rooms, "map", "/mask")
+    grid, info = keepout_messages(
+        [also, VAULT, rule('not tr.Exists(goto("room 1"))')], WORLD.rooms, "map", "/mask"
+    )
     assert (info["type"], info["filter_mask_topic"], info["base"], info["multiplier"]) == (
         0,
         "/mask",
@@ -365,10 +367,10 @@ def test_the_keepout_mask_holds_the_rooms_that_no_path_may_enter() -> None:
     )
     shape, origin = grid["info"], grid["info"]["origin"]["position"]
     assert len(grid["data"]) == shape["width"] * shape["height"]
-    assert (grid["header"]["frame_id"], shape["resolution"]) == ("map", RESOLUTION)
+    assert (grid["header"]["frame_id"], shape["resolution"]) == ("map", MASK_RESOLUTION)
 
     def cell(x: float, y: float) -> int:
-        row, column = (int((a - origin[b]) / RESOLUTION) for a, b in ((y, "y"), (x, "x")))
+        row, column = (int((a - origin[b]) / MASK_RESOLUTION) for a, b in ((y, "y"), (x, "x")))
         return int(grid["data"][row * shape["width"] + column])
 
     inside = {
@@ -391,7 +393,7 @@ def test_the_keepout_mask_holds_the_rooms_that_no_path_may_enter() -> None:
 )
 def test_other_rules_have_no_keepout_mask(formula: str) -> None:
     for one in (rule(formula), replace(NEVER, when="finally")):
-        assert keepout([one], WORLD.rooms)[0]["data"] == [0]
+        assert keepout_messages([one], WORLD.rooms)[0]["data"] == [0]
 
 
 def test_a_pose_is_no_event_of_a_trace() -> None:

@@ -15,8 +15,8 @@ from codebotler.core.skills.values import TEXT_TYPE, ValueType, written_call
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.models.recorded import recorded_model
-from codebotler.robots.base import CancelledError, Result, RobotLostError
+from codebotler.models.recorded import open_recorded
+from codebotler.robots.base import CancelledError, RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.settings import PAPER
@@ -38,7 +38,7 @@ class Notes(list[tuple[str, dict[str, object]]]):
         return [event for event, _ in self]
 
 
-def live(answer: Callable[[str, str], Result] = lambda *_: None) -> tuple[LiveRobot, Notes]:
+def live(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> tuple[LiveRobot, Notes]:
     notes = Notes()
     return LiveRobot(Answering(answer), notes, place="hall"), notes
 
@@ -55,7 +55,7 @@ def worker() -> Iterator[Worker]:
 
 def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
     as_written = replace(PAPER, literals="as-written")
-    model = recorded_model("recorded:careful")
+    model = open_recorded("recorded:careful")
     pairs = [
         (model.solution(task.prompts[0], 0).program, task.scenarios[0].world) for task in paper.tasks.values()
     ]
@@ -196,7 +196,7 @@ def test_robots_own_words_are_kept() -> None:
     ],
 )
 def test_answer_that_the_skill_does_not_have_loses_the_robot(
-    skill: str, arguments: list[str], answer: Result
+    skill: str, arguments: list[str], answer: RobotResult
 ) -> None:
     robot, _ = live(giving(answer))
     with pytest.raises(RobotLostError, match=f"answered {skill} with"):
@@ -233,7 +233,7 @@ def test_nothing_starts_after_a_stop() -> None:
 
 
 def test_robot_that_answers_after_a_stop_is_not_believed() -> None:
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         robot.stop()
         return True
 
@@ -244,7 +244,7 @@ def test_robot_that_answers_after_a_stop_is_not_believed() -> None:
 
 
 def test_error_after_a_stop_does_not_reach_the_program() -> None:
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         robot.stop()
         raise RobotError("GoToInvalidLocation", "the goal was cancelled")
 

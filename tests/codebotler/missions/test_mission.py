@@ -21,7 +21,7 @@ from codebotler.missions import mission as module
 from codebotler.missions.log import EVENTS, SUMMARY, TRANSITIONS, Line, State, Summary, events_of
 from codebotler.missions.mission import UNCONFIRMED, Mission, MissionError
 from codebotler.missions.store import find, missions, recover
-from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
+from codebotler.robots.base import NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator import ledger
@@ -204,7 +204,7 @@ def test_every_state_but_the_ends_has_a_way_out() -> None:
     ],
 )
 def test_mission_that_fails_says_why(
-    home: Path, program: str, answer: Callable[[str, str], Result], reason: str, line: int | None
+    home: Path, program: str, answer: Callable[[str, str], RobotResult], reason: str, line: int | None
 ) -> None:
     robot = Answering(answer)
     mission = done(home, robot, program)
@@ -319,7 +319,7 @@ def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Pat
                 told.set()
                 assert has_ended.wait(30)
 
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         asked.set()
         assert told.wait(30)
         return None
@@ -348,7 +348,7 @@ def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Pat
 def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result: Exception | None) -> None:
     asked, may_answer = threading.Event(), threading.Event()
 
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         asked.set()
         assert may_answer.wait(30)
         if result:
@@ -373,7 +373,7 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
     monkeypatch.setattr(module, "GRACE", 0.3)
     asked, may_answer = threading.Event(), threading.Event()
 
-    def never(_skill: str, _first: str) -> Result:
+    def never(_skill: str, _first: str) -> RobotResult:
         asked.set()
         may_answer.wait(60)
         return None
@@ -408,7 +408,7 @@ def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
         def cancel(self) -> None:
             may_go_on.wait(60)
 
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         may_go_on.wait(60)
         return None
 
@@ -445,7 +445,7 @@ def test_stop_may_come_again(home: Path) -> None:
             if self.cancels > 1:
                 asked.set()
 
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         assert asked.wait(30)
         return None
 
@@ -482,7 +482,7 @@ def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.
         def disconnect(self) -> None:
             may_answer.set()
 
-    def never(_skill: str, _first: str) -> Result:
+    def never(_skill: str, _first: str) -> RobotResult:
         may_answer.wait(60)
         return None
 

@@ -18,7 +18,7 @@ from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import Mission
 from codebotler.missions.pictures import Pictures, picture_of
 from codebotler.missions.wording import event_text
-from codebotler.robots.base import Argument, Feedback, Picture, Result, no_feedback
+from codebotler.robots.base import CameraPicture, Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.reservation import Reservation
 from doubles import Answering
 
@@ -33,9 +33,11 @@ class Showing(Answering):
         super().__init__(lambda *_: True)
         self.pictures = pictures
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = no_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
+    ) -> RobotResult:
         for data in self.pictures:
-            told(Picture(data))
+            told(CameraPicture(data))
         return super().perform(skill, arguments, told)
 
 

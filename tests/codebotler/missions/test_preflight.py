@@ -23,10 +23,10 @@ from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight, rooms_to_check, unknown_rooms
 from codebotler.missions.store import missions
-from codebotler.models.base import Heard, Reply, Usage, unheard
+from codebotler.models.base import Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.robots.base import CancelledError, NotReadyError, Result
+from codebotler.robots.base import CancelledError, NotReadyError, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
@@ -34,7 +34,7 @@ from codebotler.simulator.rule_guard import Rule
 from doubles import Answering, raising
 
 
-def knowing(rooms: object, here: object = "") -> Callable[[str, str], Result]:
+def knowing(rooms: object, here: object = "") -> Callable[[str, str], RobotResult]:
     """Answers of a robot that says which rooms it knows and where it is."""
     answers = {"get_all_rooms": rooms, "get_current_location": here}
     return lambda skill, _first: answers.get(skill)  # type: ignore[return-value]  # robots say anything
@@ -57,7 +57,7 @@ def test_answer_that_is_none_is_said_before_the_robot_moves(rooms: object, here:
 def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def answers(skill: str, _first: str) -> Result:
+    def answers(skill: str, _first: str) -> RobotResult:
         if skill == "get_current_location":
             raise RobotError("GetCurrentLocationFailed", "not localised")
         return ["hall", "lab"]
@@ -117,9 +117,9 @@ class Writing:
     settings: SamplingSettings = field(default_factory=SamplingSettings)
     asked: list[Prompt] = field(default_factory=list)
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         self.asked.append(prompt)
-        heard(self.program)
+        on_text(self.program)
         return Reply(self.program, self.program, Usage(1, 1), float(number), "stop")
 
     async def close(self) -> None: ...

@@ -17,8 +17,8 @@ from codebotler.missions.log import EVENTS, Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import Order
-from codebotler.models.recorded import recorded_model as recorded
-from codebotler.robots.base import Result, Robot
+from codebotler.models.recorded import open_recorded as recorded
+from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
@@ -42,13 +42,13 @@ def task_program():
 """
 
 
-def answering(answer: Callable[[str, str], Result] = lambda *_: None) -> Answering:
+def answering(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> Answering:
     return Answering(answer)
 
 
 def knowing(*rooms: str) -> Answering:
     """A robot that knows rooms, and is in the first."""
-    told: dict[str, Result] = {"get_all_rooms": [*rooms], "get_current_location": rooms[0]}
+    told: dict[str, RobotResult] = {"get_all_rooms": [*rooms], "get_current_location": rooms[0]}
     return answering(lambda skill, _: told.get(skill))
 
 
@@ -188,7 +188,7 @@ def test_a_robot_that_tells_of_a_room_which_nobody_meant_is_there(tmp_path: Path
 
 
 def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: Path) -> None:
-    def answer(skill: str, _: str) -> Result:
+    def answer(skill: str, _: str) -> RobotResult:
         if skill == "go_to":
             raise RobotError("GoToInvalidLocation", "the door is shut")
         return "hall" if skill == "get_current_location" else None
@@ -202,7 +202,7 @@ def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: 
 
 
 def test_a_drive_that_failed_began_where_the_robot_was(tmp_path: Path) -> None:
-    def answer(skill: str, _: str) -> Result:
+    def answer(skill: str, _: str) -> RobotResult:
         raise RobotError("GoToInvalidLocation", f"{skill}: the door is shut")
 
     back = Rule("back", "Stay in lab 2.", parse('not tr.Exists(at("lab 2", goto(".*")))'))
@@ -256,7 +256,7 @@ def test_a_skill_of_a_user_that_moves_the_robot_moves_it_for_rules_too(
 def test_a_robot_may_be_anywhere_between_after_a_drive_that_failed(
     tmp_path: Path, where: str | None, state: State
 ) -> None:
-    def answer(skill: str, _: str) -> Result:
+    def answer(skill: str, _: str) -> RobotResult:
         if skill == "go_to":
             raise RobotError("GoToInvalidLocation", "the door is shut")
         return told_room(where) if skill == "get_current_location" else None

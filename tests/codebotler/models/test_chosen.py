@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.models.chosen import ChosenModel, chosen_model
+from codebotler.models.chosen import ChosenModel, choose_model
 from codebotler.models.sampling import SamplingSettings
 
 URL = "http://localhost:11434/v1"
@@ -17,29 +17,29 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_without_a_choice_it_is_the_recorded_model() -> None:
-    assert chosen_model() == ChosenModel("recorded:careful")
+    assert choose_model() == ChosenModel("recorded:careful")
 
 
 def test_a_name_comes_before_the_environment_and_that_before_the_file(
     config: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config.write_text(f"model: openai-chat:qwen3\nbase_url: {URL}\n")
-    assert chosen_model() == ChosenModel("openai-chat:qwen3", URL)
-    assert chosen_model(base_url="http://localhost:1/v1").base_url == "http://localhost:1/v1"
+    assert choose_model() == ChosenModel("openai-chat:qwen3", URL)
+    assert choose_model(base_url="http://localhost:1/v1").base_url == "http://localhost:1/v1"
     monkeypatch.setenv("CODEBOTLER_MODEL", "anthropic:claude-sonnet-4-5")
-    assert chosen_model() == ChosenModel("anthropic:claude-sonnet-4-5")
-    assert chosen_model("recorded:hasty") == ChosenModel("recorded:hasty")
-    assert chosen_model("openai-chat:qwen3") == ChosenModel("openai-chat:qwen3", URL)
+    assert choose_model() == ChosenModel("anthropic:claude-sonnet-4-5")
+    assert choose_model("recorded:hasty") == ChosenModel("recorded:hasty")
+    assert choose_model("openai-chat:qwen3") == ChosenModel("openai-chat:qwen3", URL)
     monkeypatch.setenv("CODEBOTLER_MODEL", " ")
-    assert chosen_model().name == "openai-chat:qwen3"
+    assert choose_model().name == "openai-chat:qwen3"
 
 
 def test_limit_of_the_file_is_for_its_model_unless_a_command_names_one(config: Path) -> None:
     config.write_text(f"model: openai-chat:qwen3\nbase_url: {URL}\nmax_tokens: 900\n")
-    limited, other = chosen_model(), chosen_model("openai-chat:other")
-    assert limited.with_its_server(SamplingSettings()) == SamplingSettings(max_tokens=900, base_url=URL)
-    assert limited.with_its_server(SamplingSettings(max_tokens=5)).max_tokens == 5
-    assert other.with_its_server(SamplingSettings()) == SamplingSettings()
+    limited, other = choose_model(), choose_model("openai-chat:other")
+    assert limited.add_server(SamplingSettings()) == SamplingSettings(max_tokens=900, base_url=URL)
+    assert limited.add_server(SamplingSettings(max_tokens=5)).max_tokens == 5
+    assert other.add_server(SamplingSettings()) == SamplingSettings()
 
 
 def test_without_codebotlers_home_the_file_is_where_settings_are(
@@ -49,7 +49,7 @@ def test_without_codebotlers_home_the_file_is_where_settings_are(
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     (tmp_path / "codebotler").mkdir()
     (tmp_path / "codebotler" / "config.yaml").write_text("model: recorded:hasty\n")
-    assert chosen_model().name == "recorded:hasty"
+    assert choose_model().name == "recorded:hasty"
 
 
 @pytest.mark.parametrize(
@@ -66,5 +66,5 @@ def test_without_codebotlers_home_the_file_is_where_settings_are(
 def test_a_wrong_file_is_told_with_its_line(text: str, told: str, config: Path) -> None:
     config.write_text(text)
     with pytest.raises(UserError, match=told):
-        chosen_model()
-    assert chosen_model("recorded:hasty").name == "recorded:hasty", "which needs no file"
+        choose_model()
+    assert choose_model("recorded:hasty").name == "recorded:hasty", "which needs no file"

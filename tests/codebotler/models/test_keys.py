@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 import pytest
 
-from codebotler.models.keys import HIDDEN, SHORTEST_IN_ERRORS, guard_logs, redacted, without_keys
+from codebotler.models.keys import KEY_REMOVED, MIN_SECRET_IN_ERRORS, guard_logs, redact, remove_keys
 from server import Fault, Server
 
 KEY = "sk-Fake0123456789abcdefGHIJ"
@@ -85,7 +85,7 @@ def test_key_of_a_run_is_in_nothing_that_is_printed_logged_or_written(
         assert key not in text, where
         assert json.dumps(key)[1:-1] not in text, where
         assert repr(key)[1:-1] not in text, where
-        assert (HIDDEN in text) == (where != "output"), where
+        assert (KEY_REMOVED in text) == (where != "output"), where
     assert "status 401" in done.stderr
     assert "x-echo" in everything["log.txt"].lower()
 
@@ -99,27 +99,27 @@ def test_values_of_all_variables_that_hold_keys_are_removed(monkeypatch: pytest.
         "GOOGLE_APPLICATION_CREDENTIALS",
     ):
         monkeypatch.setenv(name, f"value-of-{name}")
-        assert redacted(f"a value-of-{name} b") == f"a {HIDDEN} b"
+        assert redact(f"a value-of-{name} b") == f"a {KEY_REMOVED} b"
     monkeypatch.setenv("HARMLESS", "value-of-it")
-    assert redacted("a value-of-it b") == "a value-of-it b"
+    assert redact("a value-of-it b") == "a value-of-it b"
 
 
 def test_key_within_another_one_leaves_no_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("A_KEY", "abcdefgh")
     monkeypatch.setenv("B_KEY", "abcdefgh-ijklmnop")
-    assert redacted("it is abcdefgh-ijklmnop.") == f"it is {HIDDEN}."
+    assert redact("it is abcdefgh-ijklmnop.") == f"it is {KEY_REMOVED}."
 
 
 @pytest.mark.parametrize("spelling", [ODD, json.dumps(ODD)[1:-1], repr(f"'{ODD}")[3:-1], quote(ODD, safe="")])
 def test_key_is_removed_however_it_is_spelt(monkeypatch: pytest.MonkeyPatch, spelling: str) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", ODD)
-    assert redacted(f"a {spelling} b") == f"a {HIDDEN} b"
+    assert redact(f"a {spelling} b") == f"a {KEY_REMOVED} b"
 
 
 def test_what_is_shorter_than_any_key_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("KEYBOARD", "decide"[: SHORTEST_IN_ERRORS - 1])
+    monkeypatch.setenv("KEYBOARD", "decide"[: MIN_SECRET_IN_ERRORS - 1])
     monkeypatch.setenv("EMPTY_KEY", "")
-    assert redacted("decide") == "decide"
+    assert redact("decide") == "decide"
 
 
 @pytest.mark.parametrize("key", ["secret", "abc", "key", "removed"])
@@ -129,9 +129,9 @@ def test_short_key_is_kept_out_of_errors_and_logs_but_not_of_programs(
     monkeypatch.setenv("OPENAI_API_KEY", key)
     monkeypatch.setenv("OTHER_API_KEY", "a-long-one")
     sentence = "Incorrect: {}, a-long-one, sk-0123456789."
-    assert redacted(sentence.format(key)) == f"Incorrect: {HIDDEN}, {HIDDEN}, {HIDDEN}"
+    assert redact(sentence.format(key)) == f"Incorrect: {KEY_REMOVED}, {KEY_REMOVED}, {KEY_REMOVED}"
     program = f"say('{key}')"
-    assert without_keys(program) == program
+    assert remove_keys(program) == program
 
 
 @pytest.mark.parametrize(
@@ -145,14 +145,14 @@ def test_short_key_is_kept_out_of_errors_and_logs_but_not_of_programs(
 )
 def test_program_keeps_names_that_look_like_keys(monkeypatch: pytest.MonkeyPatch, program: str) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
-    assert without_keys(program) == program
+    assert remove_keys(program) == program
 
 
 @pytest.mark.parametrize("spelling", [ODD, json.dumps(ODD)[1:-1], repr(f"'{ODD}")[3:-1], quote(ODD, safe="")])
 def test_program_loses_the_key_itself(monkeypatch: pytest.MonkeyPatch, spelling: str) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", ODD)
     monkeypatch.setenv("OTHER_API_KEY", ODD[:-3])
-    assert without_keys(f"say('{spelling}')") == f"say('{HIDDEN}')"
+    assert remove_keys(f"say('{spelling}')") == f"say('{KEY_REMOVED}')"
 
 
 @pytest.mark.parametrize(
@@ -166,8 +166,8 @@ def test_program_loses_the_key_itself(monkeypatch: pytest.MonkeyPatch, spelling:
     ],
 )
 def test_what_has_the_shape_of_a_key_is_removed_wherever_it_comes_from(key: str) -> None:
-    assert redacted(f"Incorrect API key provided: {key}, sorry") == (
-        f"Incorrect API key provided: {HIDDEN}, sorry"
+    assert redact(f"Incorrect API key provided: {key}, sorry") == (
+        f"Incorrect API key provided: {KEY_REMOVED}, sorry"
     )
 
 
@@ -175,7 +175,7 @@ def test_what_has_the_shape_of_a_key_is_removed_wherever_it_comes_from(key: str)
     "text", ["say('sk-8')", "risk-averse people", "pick('hf_x')", "task-program", "a desk-lamp-with-shade"]
 )
 def test_words_of_programs_have_no_shape_of_a_key(text: str) -> None:
-    assert redacted(text) == text
+    assert redact(text) == text
 
 
 def test_logs_of_clients_keep_all_but_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,8 +196,8 @@ def test_logs_of_clients_keep_all_but_the_key(monkeypatch: pytest.MonkeyPatch) -
         logger.removeHandler(handler)
         logger.setLevel(logging.NOTSET)
     text = stream.getvalue()
-    assert f"headers [('Authorization', '{HIDDEN}')] of it\n" in text
-    assert f"ValueError: could not convert string to float: '{HIDDEN}'" in text
+    assert f"headers [('Authorization', '{KEY_REMOVED}')] of it\n" in text
+    assert f"ValueError: could not convert string to float: '{KEY_REMOVED}'" in text
     assert KEY not in text
 
 
@@ -217,4 +217,4 @@ def test_names_of_variables_that_hold_keys(
     monkeypatch: pytest.MonkeyPatch, name: str, *, holds_a_key: bool
 ) -> None:
     monkeypatch.setenv(name, "kitchen table")
-    assert (redacted("at the kitchen table") == "at the [key removed]") is holds_a_key
+    assert (redact("at the kitchen table") == "at the [key removed]") is holds_a_key

@@ -157,7 +157,7 @@ def test_pieces_are_heard_in_order_and_are_the_reply(by_heart: Callable[..., str
 
         async def ask(name: str, heard: list[str]) -> Reply:
             model = open_model(name, SamplingSettings(max_tokens=60, temperature=1.0, seed=1))
-            return await model.reply(PROMPT, number=0, heard=heard.append)
+            return await model.reply(PROMPT, number=0, on_text=heard.append)
 
         reply = run(ask(name, heard))
         assert "".join(heard) == reply.text
@@ -266,7 +266,7 @@ def test_error_of_the_model_reaches_who_waits(babbler: str) -> None:
 
 async def begin_and_cancel(model: Any) -> None:  # noqa: ANN401 - a private part of it is needed
     begun = asyncio.Event()
-    task = asyncio.create_task(model.reply(PROMPT, number=0, heard=lambda _piece: begun.set()))
+    task = asyncio.create_task(model.reply(PROMPT, number=0, on_text=lambda _piece: begun.set()))
     await begun.wait()
     task.cancel()
     with pytest.raises(asyncio.CancelledError):

@@ -148,7 +148,7 @@ def test_reply_without_choices_is_an_error_in_a_sentence(
 @both
 def test_address_to_which_a_server_has_moved_is_named(name: str, server: Server) -> None:
     server.sends = lambda request: (308, {"Location": f"https://new.example/v1{request.path}"}, b"")
-    with pytest.raises(ModelError, match=r"moved to https://new\.example/v1;") as caught:
+    with pytest.raises(ModelError, match=r"redirects to https://new\.example/v1;") as caught:
         ask(name, server)
     assert not caught.value.may_pass
     assert len(server.requests) == 1
@@ -296,7 +296,7 @@ def test_reasoning_is_heard_between_marks(server: Server) -> None:
 
     async def asked() -> None:
         model = open_model(CHAT, SamplingSettings(base_url=server.url))
-        await model.reply(PROMPT, number=0, heard=heard.append)
+        await model.reply(PROMPT, number=0, on_text=heard.append)
         await model.close()
 
     asyncio.run(asked())

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import BudgetSpentError, Heard, ModelError, Reply, Usage, unheard
+from codebotler.models.base import BudgetSpentError, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.sampling import SamplingSettings
@@ -86,7 +86,7 @@ def test_what_may_pass_is_tried_again(name: str, server: Server, fault: Fault) -
     server.faults.extend([fault, fault])
     paced, reply = use(server, one, name=name, timeout=1 if fault in {Fault.SLOW, Fault.STALLED} else 30)
     assert "reply 0" in reply.program
-    assert (paced.requests, paced.retried) == (3, 2)
+    assert (paced.requests, paced.retry_count) == (3, 2)
     assert len(server.requests) == 3
 
 
@@ -107,7 +107,7 @@ def test_that_a_later_request_is_tried_again_is_not_told(
         await paced.reply(prompt_for("x"), number=0)
         server.faults.append(Fault.HUNG_UP)
         await paced.reply(prompt_for("x"), number=1)
-        return paced.retried
+        return paced.retry_count
 
     assert use(server, two)[1] == 1
     assert caplog.messages == []
@@ -134,7 +134,7 @@ def test_reply_without_a_program_is_the_models_fault_and_not_asked_for_again(
 ) -> None:
     server.faults.append(fault)
     paced, _ = use(server, one, name=name)
-    assert (paced.requests, paced.retried, len(server.requests)) == (1, 0, 1)
+    assert (paced.requests, paced.retry_count, len(server.requests)) == (1, 0, 1)
 
 
 def test_tries_come_to_an_end(server: Server) -> None:
@@ -163,7 +163,7 @@ def test_who_asks_for_peace_gets_it_from_all_requests(name: str, server: Server)
 
     async def ask(paced: RateLimited) -> None:
         first = asyncio.create_task(paced.reply(PROMPT, number=0))
-        while not paced.retried:  # noqa: ASYNC110 - a counter, which tells nobody
+        while not paced.retry_count:  # noqa: ASYNC110 - a counter, which tells nobody
             await asyncio.sleep(0.005)
         await asyncio.gather(first, *(paced.reply(PROMPT, number=number) for number in range(3)))
 
@@ -198,12 +198,12 @@ def test_requests_are_spread_over_the_minute_tries_included(server: Server) -> N
 
 def test_counters_add_up(server: Server) -> None:
     paced, replies = use(server, many(5))
-    assert (paced.requests, paced.retried) == (5, 0)
+    assert (paced.requests, paced.retry_count) == (5, 0)
     assert paced.usage == Usage(
         sum(reply.usage.input_tokens or 0 for reply in replies),
         sum(reply.usage.output_tokens or 0 for reply in replies),
     )
-    assert paced.spent == paced.usage.total
+    assert paced.tokens_used == paced.usage.total
 
 
 def spend(paced: RateLimited) -> Awaitable[tuple[int, BudgetSpentError]]:
@@ -221,10 +221,10 @@ def spend(paced: RateLimited) -> Awaitable[tuple[int, BudgetSpentError]]:
 @both
 def test_spent_budget_stops_before_a_request(name: str, server: Server) -> None:
     paced, (replies, error) = use(server, spend, name=name, token_budget=5_000)
-    each = paced.spent // replies
+    each = paced.tokens_used // replies
     assert replies == -(-5_000 // each)
-    assert (error.budget, error.used) == (5_000, paced.spent)
-    for named in ("token budget", "5,000", f"{paced.spent:,}"):
+    assert (error.budget, error.used) == (5_000, paced.tokens_used)
+    for named in ("token budget", "5,000", f"{paced.tokens_used:,}"):
         assert named in error.sentence
     assert len(server.requests) == paced.requests == replies
 
@@ -235,8 +235,8 @@ class HundredTokens:
     name = "hundred"
     settings = SamplingSettings()
 
-    async def reply(self, _prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
-        heard(str(number))
+    async def reply(self, _prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
+        on_text(str(number))
         return Reply("", "", Usage(60, 40), 0.0, "stop")
 
     async def close(self) -> None:
@@ -257,7 +257,7 @@ def test_budget_holds_where_nobody_counts_tokens(name: str, server: Server) -> N
     paced, (replies, _) = use(server, spend, name=name, token_budget=5_000)
     assert 2 <= replies <= 6
     assert paced.usage == Usage(None, None)
-    assert paced.spent >= 5_000
+    assert paced.tokens_used >= 5_000
 
 
 def test_reply_that_breaks_off_counts_against_the_budget(server: Server) -> None:
@@ -369,8 +369,8 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
     server.fault = fault
     paced, replies = use(server, many(100), name=name)
     assert [f'say("reply {number}")' in reply.program for number, reply in enumerate(replies)] == [True] * 100
-    assert len(server.requests) == paced.requests == 100 + paced.retried
-    assert paced.retried > 5
+    assert len(server.requests) == paced.requests == 100 + paced.retry_count
+    assert paced.retry_count > 5
     asked = Counter(request.body["seed"] for request in server.requests)
     assert set(asked) == set(range(100))
 
@@ -378,10 +378,10 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
 @pytest.mark.parametrize(
     ("limits", "named"),
     [
-        ({"concurrency": 0}, ["concurrency", " 0,", " 1"]),
+        ({"concurrency": 0}, ["concurrency", " 0", " 1"]),
         ({"requests_per_minute": 0.0}, ["requests per minute", "above 0"]),
-        ({"retries": -1}, ["retries", " -1,", " 0"]),
-        ({"token_budget": 0}, ["token budget", " 0,", " 1"]),
+        ({"retries": -1}, ["retries", " -1", " 0"]),
+        ({"token_budget": 0}, ["token budget", " 0", " 1"]),
     ],
 )
 def test_limits_out_of_range_are_told(limits: dict[str, Any], named: list[str]) -> None:

@@ -12,7 +12,7 @@ from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
 from codebotler.models import base
 from codebotler.models.open import expect_server, open_model
-from codebotler.models.recorded import NAMES, UnknownInstructionError, _words, recorded_model
+from codebotler.models.recorded import RECORDED_NAMES, UnknownInstructionError, _words, open_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import prompt_for
 from codebotler.simulator.engine import run
@@ -25,34 +25,34 @@ def write(path: Path, text: str) -> Path:
 
 @pytest.mark.parametrize("name", ["recorded", "recorded:", "recorded:careful", "careful"])
 def test_careful_model_is_the_one_that_is_meant_by_recorded(name: str) -> None:
-    assert recorded_model(name).name == "recorded:careful"
+    assert open_recorded(name).name == "recorded:careful"
 
 
 def test_unknown_recorded_model_is_told_in_a_sentence() -> None:
-    with pytest.raises(UserError, match=r'"recorded:lazy".* recorded:careful, recorded:hasty'):
-        recorded_model("recorded:lazy")
+    with pytest.raises(UserError, match=r'"recorded:lazy".* recorded:careful or recorded:hasty'):
+        open_recorded("recorded:lazy")
 
 
 def test_replies_come_round_again() -> None:
-    model = recorded_model("recorded:hasty")
+    model = open_recorded("recorded:hasty")
     for instruction, replies in model.replies.items():
         assert [model.solution(instruction, i) for i in range(2 * len(replies))] == [*replies, *replies]
 
 
 def test_nobody_recorded_an_instruction_of_ones_own() -> None:
     with pytest.raises(KeyError):
-        recorded_model("recorded").solution("Fetch me a coffee", 0)
+        open_recorded("recorded").solution("Fetch me a coffee", 0)
 
 
 def test_both_models_know_the_same_instructions() -> None:
-    careful, hasty = (recorded_model(name).replies for name in NAMES)
+    careful, hasty = (open_recorded(name).replies for name in RECORDED_NAMES)
     assert set(careful) == set(hasty)
     assert len({*map(_words, careful)}) == len(careful) == 129
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", RECORDED_NAMES)
 def test_every_recorded_program_defines_its_task_or_is_said_not_to_parse(name: str) -> None:
-    for replies in recorded_model(name).replies.values():
+    for replies in open_recorded(name).replies.values():
         assert replies
         for reply in replies:
             assert reply.about
@@ -67,9 +67,7 @@ def test_every_recorded_program_defines_its_task_or_is_said_not_to_parse(name: s
 
 def test_careful_model_is_right_more_often_than_the_hasty_one() -> None:
     def share(name: str) -> float:
-        marks = [
-            reply.fails is None for replies in recorded_model(name).replies.values() for reply in replies
-        ]
+        marks = [reply.fails is None for replies in open_recorded(name).replies.values() for reply in replies]
         return sum(marks) / len(marks)
 
     assert 1 > share("careful") > share("hasty") > 0
@@ -80,12 +78,12 @@ def reply_to(instruction: str, number: int = 0, model: str = "recorded") -> base
 
 
 def test_recorded_model_is_asked_like_any_other() -> None:
-    recorded = recorded_model("recorded:hasty")
+    recorded = open_recorded("recorded:hasty")
     instruction, replies = max(recorded.replies.items(), key=lambda item: len(item[1]))
     heard: list[str] = []
     model = open_model("recorded:hasty", SamplingSettings())
     assert model.name == "recorded:hasty"
-    reply = asyncio.run(model.reply(prompt_for(instruction), number=1, heard=heard.append))
+    reply = asyncio.run(model.reply(prompt_for(instruction), number=1, on_text=heard.append))
     asyncio.run(model.close())
     program = replies[1].program
     assert reply == base.Reply(program, program, base.Usage(None, None), 0.0, "stop")
@@ -94,7 +92,7 @@ def test_recorded_model_is_asked_like_any_other() -> None:
 
 
 def test_spaces_capitals_and_the_final_full_stop_do_not_make_another_instruction() -> None:
-    instruction = next(one for one in recorded_model("recorded").replies if one.endswith("."))
+    instruction = next(one for one in open_recorded("recorded").replies if one.endswith("."))
     for other in (f"\n {instruction.upper().replace(' ', '  ')}\n", instruction[:-1], f"{instruction}\n.."):
         assert reply_to(other) == reply_to(instruction)
 
@@ -160,11 +158,11 @@ def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"temperature": -0.1}, ["temperature", " -0.1,", "0 and 100"]),
-        ({"temperature": float("nan")}, ["temperature", " nan,", "0 and 100"]),
-        ({"top_p": 0.0}, ["top-p", " 0,", " 1"]),
-        ({"top_p": 1.5}, ["top-p", " 1.5,", " 1"]),
-        ({"max_tokens": 0}, ["tokens", " 0,", " 1"]),
+        ({"temperature": -0.1}, ["temperature", " -0.1", "0 to 100"]),
+        ({"temperature": float("nan")}, ["temperature", " nan", "0 to 100"]),
+        ({"top_p": 0.0}, ["top-p", " 0", " 1"]),
+        ({"top_p": 1.5}, ["top-p", " 1.5", " 1"]),
+        ({"max_tokens": 0}, ["tokens", " 0", " 1"]),
         ({"timeout": 0.0}, ["timeout", " 0 seconds"]),
         ({"base_url": "localhost:8000"}, ["base URL", "http:// or https://"]),
         ({"base_url": "http://a:99999/v1"}, ["base URL", "host and port"]),

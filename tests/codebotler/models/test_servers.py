@@ -37,7 +37,7 @@ def ask(name: str, server: Server, prompt: Prompt = PROMPT, **settings: Any) -> 
 
     async def asked(model: Model) -> Reply:
         try:
-            return await model.reply(prompt, number=4, heard=heard.append)
+            return await model.reply(prompt, number=4, on_text=heard.append)
         finally:
             await model.close()
 
@@ -182,7 +182,7 @@ def test_reply_that_never_ends_is_given_up_though_its_pieces_come_in_time(name: 
     async def asked() -> None:
         model = open_model(name, SamplingSettings(base_url=server.url, timeout=1.0))
         try:
-            await asyncio.wait_for(model.reply(PROMPT, number=0, heard=heard.append), 10)
+            await asyncio.wait_for(model.reply(PROMPT, number=0, on_text=heard.append), 10)
         finally:
             await model.close()
 
@@ -264,7 +264,7 @@ def test_more_than_a_reply_can_be_is_not_read(
 ) -> None:
     for key in ("ANTHROPIC_API_KEY", "GOOGLE_API_KEY", "OPENAI_API_KEY"):
         monkeypatch.setenv(key, "a key of nobody")
-    monkeypatch.setattr(http_client, "FLOOR", 200_000)
+    monkeypatch.setattr(http_client, "MIN_REPLY_BYTES", 200_000)
     server.faults.append(fault)
     with pytest.raises(
         ModelError, match="200,000 bytes" if fault is Fault.ENDLESS else "compressed"
@@ -277,8 +277,10 @@ def test_more_than_a_reply_can_be_is_not_read(
 
 
 def test_a_limit_follows_the_tokens() -> None:
-    assert http_client.limit_of(1) == http_client.FLOOR
-    assert http_client.limit_of(100_000) == 100_000 * http_client.PER_TOKEN > http_client.FLOOR
+    assert http_client.byte_limit(1) == http_client.MIN_REPLY_BYTES
+    assert (
+        http_client.byte_limit(100_000) == 100_000 * http_client.BYTES_PER_TOKEN > http_client.MIN_REPLY_BYTES
+    )
 
 
 @both
@@ -294,7 +296,7 @@ def test_given_up_request_ends_at_once_and_the_next_one_is_answered(name: str, s
         model = open_model(name, SamplingSettings(base_url=server.url, seed=7))
         begun = asyncio.Event()
         server.faults.append(Fault.STALLED)
-        task = asyncio.create_task(model.reply(PROMPT, number=0, heard=lambda _piece: begun.set()))
+        task = asyncio.create_task(model.reply(PROMPT, number=0, on_text=lambda _piece: begun.set()))
         await begun.wait()
         task.cancel()
         with pytest.raises(asyncio.CancelledError):

@@ -8,14 +8,14 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from codebotler.models.usable import KEYS, UsableModel, how_to_use_a_model, usable_models
+from codebotler.models.usable import KEY_VARIABLES, UsableModel, find_usable_models, suggest_model
 
 RECORDED = ["recorded:careful", "recorded:hasty"]
 
 
 @pytest.fixture(autouse=True)
 def no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
-    for key in KEYS:
+    for key in KEY_VARIABLES:
         monkeypatch.delenv(key, raising=False)
 
 
@@ -44,7 +44,7 @@ def test_the_models_of_a_server_on_this_machine_come_first() -> None:
         {"object": "list", "data": [{"id": "qwen3:8b"}, {"id": "llama 3"}, {"id": "nomic-embed-text"}]}
     )
     with server(body.encode()) as port:
-        found = usable_models({"Ollama": port, "vLLM": 1})
+        found = find_usable_models({"Ollama": port, "vLLM": 1})
     url = f"http://127.0.0.1:{port}/v1"
     assert found[0] == UsableModel("openai-chat:qwen3:8b", "Ollama answers on this machine", url)
     assert found[1].options == f"--model 'openai-chat:llama 3' --base-url {url}"
@@ -65,23 +65,23 @@ def test_the_models_of_a_server_on_this_machine_come_first() -> None:
 )
 def test_what_is_no_server_of_models_is_passed_over(body: bytes, status: int) -> None:
     with server(body, status) as port:
-        assert [one.name for one in usable_models({"vLLM": port})] == RECORDED
+        assert [one.name for one in find_usable_models({"vLLM": port})] == RECORDED
 
 
 def test_a_server_that_says_nothing_is_not_waited_for() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listening:
         port = listening.getsockname()[1]
         began = time.monotonic()
-        assert [one.name for one in usable_models({"vLLM": port})] == RECORDED
+        assert [one.name for one in find_usable_models({"vLLM": port})] == RECORDED
         assert time.monotonic() - began < 10
 
 
 def test_a_key_in_the_environment_opens_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "OPENAI_API_KEY" in how_to_use_a_model({})
+    assert "OPENAI_API_KEY" in suggest_model({})
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-secret-of-mine")
     monkeypatch.setenv("OPENAI_API_KEY", " ")
     monkeypatch.setenv("GOOGLE_API_KEY", "no\nheader")
-    (first, *rest) = usable_models({})
+    (first, *rest) = find_usable_models({})
     assert (first.why, first.base_url) == ("ANTHROPIC_API_KEY is set", None)
     assert [one.name for one in rest] == RECORDED
-    assert how_to_use_a_model({}) == f"add --model {KEYS['ANTHROPIC_API_KEY']}"
+    assert suggest_model({}) == f"add --model {KEY_VARIABLES['ANTHROPIC_API_KEY']}"

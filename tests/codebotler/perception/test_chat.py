@@ -15,8 +15,14 @@ from PIL import Image
 from codebotler.core.errors import UserError
 from codebotler.models import rate_limit
 from codebotler.perception import Detector, PerceptionError, Sighting, image_of, jpeg_of, open_detector
-from codebotler.perception.chat import FENCED, LONGEST_REPLY, SYSTEM, TRIES, sighting_in
-from codebotler.perception.open import LOOKING
+from codebotler.perception.chat import (
+    DETECTOR_PROMPT,
+    FENCED_JSON,
+    MAX_REPLIES,
+    MAX_REPLY_CHARACTERS,
+    parse_sighting,
+)
+from codebotler.perception.open import DETECTOR_SETTINGS
 from codebotler.rtl.reasoning.backtracking import RepeatedText, is_slow
 from server import Fault, Request, Server
 
@@ -38,14 +44,14 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
 
 @pytest.fixture
 def detector(server: Server) -> Iterator[Detector]:
-    detector = open_detector("openai-chat:eyes", replace(LOOKING, base_url=server.url, timeout=5))
+    detector = open_detector("openai-chat:eyes", replace(DETECTOR_SETTINGS, base_url=server.url, timeout=5))
     yield detector
     detector.close()
 
 
 @pytest.fixture
 def _hurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rate_limit, "LONGEST_WAIT", 0.01)
+    monkeypatch.setattr(rate_limit, "MAX_WAIT", 0.01)
 
 
 def shown(request: Request) -> tuple[str, bytes]:
@@ -66,7 +72,7 @@ def test_picture_and_name_arrive_and_the_answer_comes_back(server: Server, detec
     assert json.loads(shown(second)[0]) == "mug"
     assert picture == jpeg_of(PICTURE)
     assert image_of(picture).size == (64, 40)
-    assert first.body["messages"][0] == {"role": "system", "content": SYSTEM}
+    assert first.body["messages"][0] == {"role": "system", "content": DETECTOR_PROMPT}
     assert (first.body["model"], first.body["temperature"]) == ("eyes", 0.0)
 
 
@@ -114,7 +120,7 @@ def test_what_is_no_name_is_refused(server: Server, detector: Detector, label: s
     ],
 )  # fmt: skip
 def test_replies_that_can_be_used(reply: str, sighting: Sighting) -> None:
-    assert sighting_in(reply) == sighting
+    assert parse_sighting(reply) == sighting
 
 
 def boxed(*numbers: object) -> str:
@@ -147,17 +153,17 @@ def boxed(*numbers: object) -> str:
         (boxed(-0.1, 0, 1, 1), "between 0 and 1"),
         (boxed(0.8, 0, 0.2, 1), "left"),
         (boxed(0, 0.5, 1, 0.5), "top"),
-        (" " * (LONGEST_REPLY + 1), "20,001 characters"),
+        (" " * (MAX_REPLY_CHARACTERS + 1), "20,001 characters"),
     ],
 )
 def test_replies_that_cannot_be_used(reply: str, fault: str) -> None:
     with pytest.raises(ValueError, match=re.escape(fault)):
-        sighting_in(reply)
+        parse_sighting(reply)
 
 
 @pytest.mark.parametrize("unit", ["\n", " ", " \n", "\n ```"])
 def test_a_fence_is_looked_for_in_linear_time(unit: str) -> None:
-    assert not is_slow(FENCED.fullmatch, RepeatedText(unit, "```json\n", "x"))
+    assert not is_slow(FENCED_JSON.fullmatch, RepeatedText(unit, "```json\n", "x"))
 
 
 def test_model_is_told_what_was_wrong_and_asked_again(server: Server, detector: Detector) -> None:
@@ -178,7 +184,7 @@ def test_model_that_never_answers_as_asked_is_an_error_in_a_sentence(
     server.answer = lambda _: f"[bold]I can't\x1b[31m help[/bold]\nwith {KEY}"
     with pytest.raises(PerceptionError) as error:
         detector.look(PICTURE, "mug")
-    assert len(server.requests) == TRIES
+    assert len(server.requests) == MAX_REPLIES
     assert re.match("openai-chat:eyes .* 3 tries", error.value.sentence)
     assert "[bold]I can't" in error.value.sentence
     assert KEY not in error.value.sentence

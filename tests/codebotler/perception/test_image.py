@@ -14,7 +14,7 @@ from PIL import Image
 
 from codebotler.core.errors import UserError
 from codebotler.perception import Sighting, boxed, image_from_ros, image_of, jpeg_of, read_image
-from codebotler.perception.image import MAX_BYTES
+from codebotler.perception.image import MAX_IMAGE_BYTES
 
 RED, BLUE = (255, 0, 0), (0, 0, 255)
 
@@ -98,7 +98,7 @@ def test_other_modes_become_colour(mode: str) -> None:
         (png_of_size(10_000, 5_000), "10,000 x 5,000 pixels, more than 40,000,000"),
         (png_of_size(11_000, 11_000), "11,000 x 11,000 pixels, more than 40,000,000"),
         (png_of_size(60_000, 60_000), "more than 40,000,000 pixels"),
-        (b"\xff" * (MAX_BYTES + 1), "50,000,000 bytes"),
+        (b"\xff" * (MAX_IMAGE_BYTES + 1), "50,000,000 bytes"),
     ],
 )
 def test_bad_picture_is_said_in_a_sentence(data: bytes, sentence: str) -> None:

@@ -12,9 +12,9 @@ from PIL import Image
 
 from codebotler.missions import pictures as missionpictures
 from codebotler.perception import Sighting, read_image
-from codebotler.perception.base import LONGEST_LABEL
-from codebotler.perception.image import ENCODINGS, LONGEST_SIDE, MAX_BYTES, MAX_PIXELS, MIN_SIDE
-from codebotler.perception.open import LEAST_SCORE, LOOKING
+from codebotler.perception.base import MAX_LABEL_CHARACTERS
+from codebotler.perception.image import ENCODINGS, LONGEST_SIDE, MAX_IMAGE_BYTES, MAX_PIXELS, MIN_SIDE
+from codebotler.perception.open import DETECTOR_SETTINGS, MIN_SCORE
 from server import Server
 
 PAGE = (Path(__file__).parents[3] / "docs" / "perception.md").read_text()
@@ -39,12 +39,12 @@ def test_code_looks_into_a_picture(tmp_path: Path) -> None:
 
 def test_limits_are_those_of_the_code() -> None:
     for told in (
-        f"at most {MAX_BYTES // 10**6} MB and {MAX_PIXELS // 10**6} million pixels",
+        f"at most {MAX_IMAGE_BYTES // 10**6} MB and {MAX_PIXELS // 10**6} million pixels",
         f"at least {MIN_SIDE} pixels a side",
         f"at most {LONGEST_SIDE:,} pixels a side",
-        f"at most {LONGEST_LABEL} characters",
-        f"from a score of {LEAST_SCORE} on",
-        f"temperature={LOOKING.temperature:g}, timeout={LOOKING.timeout:g}",
+        f"at most {MAX_LABEL_CHARACTERS} characters",
+        f"from a score of {MIN_SCORE} on",
+        f"temperature={DETECTOR_SETTINGS.temperature:g}, timeout={DETECTOR_SETTINGS.timeout:g}",
         f"more than {missionpictures.MOST_BYTES // 10**6} MB is left out",
         f"beyond {missionpictures.MOST_IN_ALL // 10**6} MB in one mission",
     ):

@@ -117,12 +117,12 @@ def test_what_is_no_detector_is_refused(tmp_path: Path, folder: Path) -> None:
 
 
 def test_box_ends_with_the_picture() -> None:
-    from codebotler.perception.zeroshot import _within  # noqa: PLC0415 - it imports torch
+    from codebotler.perception.zeroshot import _to_shares  # noqa: PLC0415 - it imports torch
 
-    assert _within(-7, 20, 40) == (0, 0.5)
-    assert _within(30, 55, 40) == (0.75, 1)
-    assert _within(40, 40, 40) == (39 / 40, 1)
-    assert _within(10, 10, 40) == (0.25, 11 / 40)
+    assert _to_shares(-7, 20, 40) == (0, 0.5)
+    assert _to_shares(30, 55, 40) == (0.75, 1)
+    assert _to_shares(40, 40, 40) == (39 / 40, 1)
+    assert _to_shares(10, 10, 40) == (0.25, 11 / 40)
 
 
 def test_broken_weights_are_refused(tmp_path: Path, folder: Path) -> None:

@@ -6,11 +6,14 @@ from hypothesis import strategies as st
 
 from codebotler.core.program import flaws, undefined_names
 from codebotler.core.skills.table import SkillTable
-from codebotler.models.recorded import NAMES, recorded_model
+from codebotler.models.recorded import RECORDED_NAMES, open_recorded
 from codebotler.prompts.extract import extract, program_of
 
 RECORDED = [
-    reply for name in NAMES for them in recorded_model(f"recorded:{name}").replies.values() for reply in them
+    reply
+    for name in RECORDED_NAMES
+    for them in open_recorded(f"recorded:{name}").replies.values()
+    for reply in them
 ]
 UNPARSABLE = {"SyntaxError", "IndentationError"}
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.base import Argument, CancelledError, Feedback, Result, no_feedback
+from codebotler.robots.base import CancelledError, Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.clock import Clock
 
 
@@ -21,7 +21,7 @@ class Answering:
     rooms_are_regexes = has_pose = False
     missing: Mapping[str, str] = MappingProxyType({})
 
-    def __init__(self, answer: Callable[[str, str], Result] = lambda *_: None) -> None:
+    def __init__(self, answer: Callable[[str, str], RobotResult] = lambda *_: None) -> None:
         self.answer, self.clock, self.skills = answer, Clock(None), SKILLS
         self.done: list[str] = []
         self.cancels = self.connections = 0
@@ -31,7 +31,9 @@ class Answering:
         self.cancels = 0
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = no_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
+    ) -> RobotResult:
         if self.cancels:
             raise CancelledError
         first = str(arguments[0]) if arguments else ""
@@ -47,16 +49,16 @@ class Answering:
         self.connections -= 1
 
 
-def raising(error: Exception) -> Callable[[str, str], Result]:
+def raising(error: Exception) -> Callable[[str, str], RobotResult]:
     """An answer that is an error."""
 
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         raise error
 
     return answer
 
 
-def giving(*results: Result) -> Callable[[str, str], Result]:
+def giving(*results: RobotResult) -> Callable[[str, str], RobotResult]:
     """Answers, one after the other."""
     rest = iter(results)
     return lambda _skill, _first: next(rest)

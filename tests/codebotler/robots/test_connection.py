@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.ros.connection import Connection, SkillCall, connection_of
+from codebotler.robots.ros.connection import Connection, SkillCall, default_connection
 from codebotler.robots.ros.connection_file import read_connection
 from codebotler.robots.ros.motion import Motion
 
@@ -47,7 +47,7 @@ def test_what_a_file_maps_is_what_the_robot_has(tmp_path: Path) -> None:
         ("skills:\n  dance: {topic: /a, type: a/msg/B}\n", 2, "--skills"),
         ("skills:\n  say: {topic: /a}\n", 2, "type"),
         ("skills:\n  say: {topic: /a, action: /b, type: a/msg/B}\n", 2, "one of"),
-        ("skills:\n  say: {topic: a b, type: a/msg/B}\n", 2, "name of ROS"),
+        ("skills:\n  say: {topic: a b, type: a/msg/B}\n", 2, "ROS name"),
         ("skills:\n  say: {topic: /a, type: String}\n", 2, "package"),
         ("skills:\n  say: {topic: /a, type: a/msg/B, goal: {data: 1}}\n", 2, '"message"'),
         ("skills:\n  say:\n    topic: /a\n    type: a/msg/B\n    message: {data: $text}\n", 5, "$message"),
@@ -106,7 +106,7 @@ def test_fields_are_filled_from_arguments() -> None:
 
 
 def test_actions_of_the_skill_table_are_calls_as_well() -> None:
-    call = connection_of(SKILLS).calls["ask"]
+    call = default_connection(SKILLS).calls["ask"]
     fields = call.fields({"person": "ann", "question": "tea?", "options": ("yes", "no")})
     assert fields == {"person": "ann", "question": "tea?", "options": ("yes", "no")}
     assert call.answer({"result": "yes"}) == "yes"
@@ -117,7 +117,7 @@ def test_actions_of_the_skill_table_are_calls_as_well() -> None:
     [
         ({"ok": False, "error_code": 206, "error_msg": "in a wall"}, "in a wall (error 206)"),
         ({"ok": False, "error_code": 0, "message": "it jams"}, "it jams"),
-        ({"ok": False}, "/open says that it failed"),
+        ({"ok": False}, "/open reports a failure"),
     ],
 )
 def test_why_a_skill_failed(received: dict[str, Any], message: str) -> None:
@@ -149,7 +149,7 @@ def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None
         (0.1, {**pose, "y": 0.1}),
     ):
         now += later
-        seen.take(said)
+        seen.record(said)
         states.append((seen.is_still, seen.is_moving))
     now += 1.5
     states.append((seen.is_still, seen.is_moving))  # it says no more
@@ -163,7 +163,7 @@ def test_robot_is_unseen_when_it_drives_on_without_a_pose(monkeypatch: pytest.Mo
     seen, unseen = Motion(), []
     for _ in range(4):
         now += 0.3
-        seen.take({"is": "velocity", "speed": 1.5})
+        seen.record({"is": "velocity", "speed": 1.5})
         unseen.append(seen.is_unseen)
-    seen.take({"is": "pose", "x": 1.0, "y": 0.0, "yaw": 0.0, "frame": "map"})
+    seen.record({"is": "pose", "x": 1.0, "y": 0.0, "yaw": 0.0, "frame": "map"})
     assert [*unseen, seen.is_unseen] == [False, True, True, True, False]

@@ -12,21 +12,21 @@ import yaml
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros.connection import Watched
+from codebotler.robots.ros.connection import MotionTopic
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.discovery import first_connection, offers_of
+from codebotler.robots.ros.discovery import discover_offers, draft_connection
 
 NAV2 = "action /navigate_to_pose nav2_msgs/action/NavigateToPose"
 
 
 def written(*offers: str, robot: str = "ros2") -> dict[str, Any]:
     """What is not in a comment."""
-    read: dict[str, Any] = yaml.safe_load(first_connection(robot, offers))
+    read: dict[str, Any] = yaml.safe_load(draft_connection(robot, offers))
     return read
 
 
 def comments(*offers: str, robot: str = "ros2") -> str:
-    lines = first_connection(robot, offers).splitlines()
+    lines = draft_connection(robot, offers).splitlines()
     return "\n".join(line.strip() for line in lines if line.lstrip().startswith("#"))
 
 
@@ -47,7 +47,7 @@ def test_drive_of_nav2_waits_for_places() -> None:
 
 
 def test_move_base_of_ros_1_is_a_drive() -> None:
-    text = first_connection("ros1", ["action /move_base move_base_msgs/MoveBase"])
+    text = draft_connection("ros1", ["action /move_base move_base_msgs/MoveBase"])
     assert yaml.safe_load(text)["robot"] == "ros1"
     goal = "# go_to: {action: /move_base, type: move_base_msgs/MoveBase, goal: {target_pose: $place}}"
     assert goal in text
@@ -165,14 +165,14 @@ def test_hostile_names_stay_out_of_the_file() -> None:
 @pytest.mark.parametrize("robot", ["sim", "rosbridge"])
 def test_other_robots_cannot_be_looked_at(robot: str) -> None:
     with pytest.raises(UserError, match=robot):
-        offers_of(robot, "", ROS_PYTHON)
+        discover_offers(robot, "", ROS_PYTHON)
 
 
 def test_what_is_written_connects_a_robot(tmp_path: Path) -> None:
     speech, file = "hears /speech std_msgs/msg/String", tmp_path / "robot.yaml"
-    file.write_text(first_connection("ros2", [NAV2, TF, ODOM, speech]))
+    file.write_text(draft_connection("ros2", [NAV2, TF, ODOM, speech]))
     read = read_connection(file, SKILLS)
-    assert (read.robot, {*read.calls}, read.velocity) == ("ros2", {"say"}, Watched("/odom"))
+    assert (read.robot, {*read.calls}, read.velocity) == ("ros2", {"say"}, MotionTopic("/odom"))
     (tmp_path / "places.yaml").write_text("places: {hall: {x: 1, y: 2}}")
     file.write_text(file.read_text().replace("# places:", "places:").replace("# go_to:", "go_to:"))
     assert read_connection(file, SKILLS).calls["go_to"].request == {"pose": "$place"}
@@ -180,7 +180,7 @@ def test_what_is_written_connects_a_robot(tmp_path: Path) -> None:
 
 def test_own_actions_connect_a_robot(tmp_path: Path) -> None:
     offers = [f"action {s.ros.server} robot_actions_pkg/{s.ros.type}" for s in SKILLS.rows if s.ros]
-    (tmp_path / "robot.yaml").write_text(first_connection("ros1", offers))
+    (tmp_path / "robot.yaml").write_text(draft_connection("ros1", offers))
     assert read_connection(tmp_path / "robot.yaml", SKILLS).calls.keys() == SKILLS.keys()
 
 
@@ -195,4 +195,4 @@ def test_example_of_the_guide() -> None:
         "sends /camera/image_raw sensor_msgs/msg/Image",
         "sends /scan sensor_msgs/msg/LaserScan",
     )
-    assert f"```yaml\n{first_connection('ros2', offers)}```" in page
+    assert f"```yaml\n{draft_connection('ros2', offers)}```" in page

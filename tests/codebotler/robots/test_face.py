@@ -19,16 +19,15 @@ from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import missing_skills
-from codebotler.robots.base import Argument, CancelledError, Options
+from codebotler.robots.base import AnswerError, CancelledError, Options, RobotArgument
 from codebotler.robots.face import (
-    TIMED_OUT,
-    AnswerError,
+    ASK_TIMEOUT,
     Face,
-    Question,
+    FaceQuestion,
     RobotWithFace,
     without_speech,
 )
-from codebotler.robots.open import KINDS, open_with_face
+from codebotler.robots.open import ROBOT_MODULES, open_with_face
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from doubles import Answering
@@ -53,7 +52,7 @@ def faced(seconds: float = LONG) -> tuple[RobotWithFace, Face]:
     return RobotWithFace(Simulated(WORLD, speed=None, skills=without_speech()), face), face
 
 
-def question_of(face: Face, number: int = 0) -> Question:
+def question_of(face: Face, number: int = 0) -> FaceQuestion:
     """The first question with a number above this one."""
     ends = time.monotonic() + LONG
     while (question := face.shown.question) is None or question.number <= number:
@@ -127,7 +126,7 @@ def test_what_the_face_has_the_robot_may_lack() -> None:
     assert len(missing_skills(f"{TEA}    pick('mug')\n", robot)) == 1
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "pyrobosim"])
+@pytest.mark.parametrize("kind", [kind for kind in ROBOT_MODULES if kind != "pyrobosim"])
 def test_the_robot_behind_a_face_is_asked_for_nothing_that_is_spoken(kind: str) -> None:
     robot = open_with_face(kind, Options(world=WORLD), Face())
     assert isinstance(robot, RobotWithFace)
@@ -170,7 +169,7 @@ def test_nobody_answers() -> None:
     robot.connect()
     with pytest.raises(RobotError, match=r'"Tea\?" .*0\.05 s') as error:
         robot.perform("ask", ["ann", "Tea?", ("Yes",)])
-    assert error.value.kind == TIMED_OUT
+    assert error.value.kind == ASK_TIMEOUT
     ended = face.shown.ended
     assert ended is not None
     assert (ended.how, face.shown.question) == ("unanswered", None)
@@ -220,7 +219,7 @@ def test_a_stop_takes_the_question_back_at_once_and_nothing_more_is_spoken() -> 
         with pytest.raises(AnswerError, match="it was withdrawn"):
             face.answer(number, 0)
     assert isinstance(ended[0], CancelledError)
-    calls: list[tuple[str, list[Argument]]] = [
+    calls: list[tuple[str, list[RobotArgument]]] = [
         ("say", ["hello"]),
         ("ask", ["ann", "Tea?", ("Yes",)]),
         ("go_to", ["kitchen"]),
@@ -265,9 +264,9 @@ def test_who_shows_it_is_counted_and_told() -> None:
     changes: list[int] = []
     face.changed = lambda: changes.append(face.screens)
     robot.perform("say", ["a"], told.append)
-    with face.watched(), face.watched():
+    with face.count_screen(), face.count_screen():
         robot.perform("say", ["b"], told.append)
-    with face.watched():
+    with face.count_screen():
         robot.perform("say", ["c"], told.append)
     assert [re.findall(r"\bno\b|\d", str(text)) for text in told] == [["no"], ["2"], ["1"]]
     assert face.screens == 0
@@ -315,10 +314,10 @@ def test_a_mission_that_is_stopped_while_it_asks(tmp_path: Path) -> None:
 def test_a_program_can_catch_that_nobody_answers(tmp_path: Path) -> None:
     mission = run(tmp_path, PATIENT, 0.05, lambda _mission, _face: None)
     assert mission.state is State.DONE
-    silence = rf'{TIMED_OUT}: .*"Tea\?" .*0\.05 s'
+    silence = rf'{ASK_TIMEOUT}: .*"Tea\?" .*0\.05 s'
     assert re.match(silence, mission.trace[-1].text)
     failed = run(tmp_path, TEA, 0.05, lambda _mission, _face: None)
     assert failed.state is State.FAILED
     assert re.match(silence, failed.summary.reason)
     (error,) = [line for line in events_of(failed.folder) if line["event"] == "error"]
-    assert error["kind"] == TIMED_OUT
+    assert error["kind"] == ASK_TIMEOUT

@@ -239,7 +239,7 @@ def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:
         ("from pathlib import Path as Spot\n", r"it has no class Spot"),
         (
             "class Spot:\n    stop = rooms = print\n    def say(self): pass\n",
-            r"line 3: Spot\.say does not take what programs pass; write def say\(self, message\)",
+            r"line 3: Spot\.say has the wrong parameters; write def say\(self, message\)",
         ),
         ("class Spot:\n    def rooms(self): pass\n", r"line 1: Spot has no method stop, which stops"),
         ("class Spot:\n    def stop(self): pass\n", r"Spot has no method rooms, which lists"),

@@ -133,7 +133,7 @@ def test_places_come_from_several_files(tmp_path: Path) -> None:
         ("places:\n  a: {x: 1, y: 1, yaw: .inf}\n", 2, ['"a"', "inf"]),
         ("places:\n  a: {x: 1}\n", 2, ['"a"']),
         ("places:\n  a: {}\n", 2, ['"a"']),
-        ("places:\n  a: {x: 1, y: 1}\n  A: {x: 2, y: 1}\n", 3, ['"A"', '"a"', "capitals", "skip: [A]"]),
+        ("places:\n  a: {x: 1, y: 1}\n  A: {x: 2, y: 1}\n", 3, ['"A"', '"a"', "case", "skip: [A]"]),
         ("places:\n  a: {x: 1, y: 1, yw: 2}\n", 2, ["yw"]),
         ("places:\n  a: {x: 1, y: 1, polygon: [[0, 0], [1, 1]]}\n", 2, ['"a"', "three"]),
         ("places:\n  a: {x: 1, y: 1, polygon: 7}\n", 2, ['"a"', "three"]),

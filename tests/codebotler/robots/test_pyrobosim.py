@@ -27,12 +27,12 @@ from codebotler.missions.live import LiveRobot
 from codebotler.missions.log import State
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight
-from codebotler.models.recorded import recorded_model
-from codebotler.robots.base import CancelledError, NotReadyError, Picture
-from codebotler.robots.open import all_readiness
+from codebotler.models.recorded import open_recorded
+from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError
+from codebotler.robots.open import check_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, OFFICE, ROBOT_RULES
+from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATED_RULES
 from codebotler.rtl import parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.rule_guard import Rule
@@ -70,7 +70,7 @@ def connected(world: World = WORLD, speed: float | None = None) -> Pyrobosim:
     return robot
 
 
-def places(told: Sequence[str | Picture]) -> list[Point]:
+def places(told: Sequence[str | CameraPicture]) -> list[Point]:
     read = (str(phrase).removeprefix("at (").removesuffix(")").split(", ") for phrase in told)
     return [(float(x), float(y)) for x, y in read]
 
@@ -84,7 +84,7 @@ def position(robot: Pyrobosim) -> Point:
 def lying(robot: Pyrobosim) -> dict[str, list[str]]:
     """What lies where, as pyrobosim has it."""
     assert robot._drivable is not None
-    rooms = {room.name: robot._drivable.lying_in(room.name) for room in robot._world.rooms}
+    rooms = {room.name: robot._drivable.objects_in(room.name) for room in robot._world.rooms}
     return {name: [robot._things[body].label for body in bodies] for name, bodies in rooms.items() if bodies}
 
 
@@ -99,7 +99,7 @@ def worker() -> Iterator[Worker]:
 
 
 def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
-    model = recorded_model("recorded:careful")
+    model = open_recorded("recorded:careful")
     tasks = [
         (task.name, model.solution(task.prompts[0], 0).program, scenario.world)
         for task in paper.tasks.values()
@@ -107,10 +107,10 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
         if not scenario.world.may_wait_forever
     ]
     pairs = [(program, world) for _, program, world in tasks]
-    expected = list(run(pairs, workers=1, rules=ROBOT_RULES))
+    expected = list(run(pairs, workers=1, rules=SIMULATED_RULES))
     manipulating = set()
     for (name, program, world), outcome in zip(tasks, expected, strict=True):
-        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=ROBOT_RULES.clock_starts)
+        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=SIMULATED_RULES.clock_starts)
         found = worker.run_live(program, robot)
         assert (found.status, found.error) == (outcome.status, outcome.error), name
         assert found.trace == outcome.trace, name
@@ -191,7 +191,7 @@ def test_what_is_held_moves_with_the_robot() -> None:
 
 
 def test_robot_drives_to_the_table_for_it() -> None:
-    robot, told = connected(), list[str | Picture]()
+    robot, told = connected(), list[str | CameraPicture]()
     robot.perform("go_to", ["kitchen"])
     robot.perform("pick", ["mug"], told.append)
     assert len(told) >= 2
@@ -237,7 +237,7 @@ def goes_through_no_wall(robot: Pyrobosim, way: Sequence[Point]) -> bool:
 
 
 def test_it_drives_around_walls_and_takes_its_time() -> None:
-    robot, told = connected(), list[str | Picture]()
+    robot, told = connected(), list[str | CameraPicture]()
     start = position(robot)
     robot.perform("go_to", ["study"], told.append)
     way = [start, *places(told)]
@@ -252,16 +252,16 @@ def test_it_drives_around_walls_and_takes_its_time() -> None:
 
 
 def test_feedback_tells_places_on_the_way() -> None:
-    robot, told = connected(speed=10), list[str | Picture]()
+    robot, told = connected(speed=10), list[str | CameraPicture]()
     began = time.monotonic()
     robot.perform("go_to", ["study"], told.append)
-    assert len(told) <= 2 + (time.monotonic() - began) / FEEDBACK_EVERY
+    assert len(told) <= 2 + (time.monotonic() - began) / FEEDBACK_SECONDS
     assert len(places(told)) >= 3
     assert robot.clock.now == pytest.approx(10 * (time.monotonic() - began), rel=0.5)
 
 
 def test_measured_rooms_are_where_they_are_and_all_can_be_reached() -> None:
-    robot, told = connected(MEASURED), list[str | Picture]()
+    robot, told = connected(MEASURED), list[str | CameraPicture]()
     assert position(robot) == pytest.approx((3.0, 1.0))
     for room, corner in (("kitchen", (4.0, 4.0)), ("shed", (9.0, 2.0)), ("hall", (3.0, 1.0))):
         robot.perform("go_to", [room], told.append)
@@ -392,7 +392,7 @@ def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after(*, held: bool) 
 
 
 def test_cancel_while_it_plans_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, told = connected(), list[str | Picture]()
+    robot, told = connected(), list[str | CameraPicture]()
     at, stage = position(robot), robot._drivable
     assert stage is not None
     plan = stage.robot.plan_path
@@ -492,7 +492,7 @@ def test_command_keeps_a_house_rule(tmp_path: Path) -> None:
 
 
 def test_it_is_listed() -> None:
-    (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
+    (kind,) = (kind for kind in check_readiness() if kind.name == "pyrobosim")
     assert kind.works
 
 

@@ -9,16 +9,16 @@ import pytest
 from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
 from codebotler.robots.base import Options, Robot
-from codebotler.robots.open import all_readiness, open_robot
+from codebotler.robots.open import check_readiness, open_robot
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
 MEND = "pip install 'codebotler[pyrobosim]'"
 
 
 def test_what_is_missing_is_said_with_the_mend(monkeypatch: pytest.MonkeyPatch) -> None:
-    all_readiness()  # imports the other kinds, which are to keep the real function
+    check_readiness()  # imports the other kinds, which are to keep the real function
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
-    (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
+    (kind,) = (kind for kind in check_readiness() if kind.name == "pyrobosim")
     assert (kind.works, kind.mend) == (False, MEND)
     assert "pyrobosim" in kind.missing
     with pytest.raises(UserError, match="pyrobosim") as error:
@@ -39,8 +39,8 @@ def test_it_is_opened_by_its_name_and_needs_a_world(monkeypatch: pytest.MonkeyPa
 def test_nothing_heavy_is_imported_before_it_is_connected() -> None:
     program = (
         "import sys\n"
-        "from codebotler.robots.open import all_readiness\n"
-        "all_readiness()\n"
+        "from codebotler.robots.open import check_readiness\n"
+        "check_readiness()\n"
         "print(sorted({'numpy', 'pyrobosim', 'scipy', 'shapely'} & set(sys.modules)))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)

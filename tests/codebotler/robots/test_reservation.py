@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.robots.base import NotReadyError, Options
 from codebotler.robots.open import open_robot
-from codebotler.robots.reservation import Reservation, endpoint, lock_folder
+from codebotler.robots.reservation import Reservation, lock_folder, normalize_address
 from doubles import Answering
 
 
@@ -28,7 +28,7 @@ def addressed(address: str) -> Answering:
     ],
 )
 def test_addresses_of_one_robot_are_one(address: str) -> None:
-    assert endpoint(address) == "ws://robot:9090"
+    assert normalize_address(address) == "ws://robot:9090"
 
 
 @pytest.mark.parametrize(
@@ -40,16 +40,19 @@ def test_addresses_of_one_robot_are_one(address: str) -> None:
 )
 def test_names_of_this_machine_are_one(host: str) -> None:
     assert (
-        endpoint(open_robot("ros1", Options(address=f"http://{host}:11311/")).address)
+        normalize_address(open_robot("ros1", Options(address=f"http://{host}:11311/")).address)
         == "http://127.0.0.1:11311"
     )
-    assert endpoint(open_robot("rosbridge", Options(address=f"ws://{host}")).address) == "ws://127.0.0.1:80"
-    assert endpoint(open_robot("rosbridge").address) == "ws://127.0.0.1:9090"
+    assert (
+        normalize_address(open_robot("rosbridge", Options(address=f"ws://{host}")).address)
+        == "ws://127.0.0.1:80"
+    )
+    assert normalize_address(open_robot("rosbridge").address) == "ws://127.0.0.1:9090"
 
 
 @pytest.mark.parametrize("address", ["nonsense", "", "ws://", "ws://robot:a", "ws://[::1", "ftp://robot"])
 def test_what_is_no_address_stays_as_it_is(address: str) -> None:
-    assert endpoint(address) == address
+    assert normalize_address(address) == address
 
 
 def test_addresses_of_other_robots_stay_apart() -> None:
@@ -63,7 +66,7 @@ def test_addresses_of_other_robots_stay_apart() -> None:
         "ws://[fe80::1]:1",
         "ws://10.0.0.1:1",
     )
-    assert len({endpoint(address) for address in others}) == len(others)
+    assert len({normalize_address(address) for address in others}) == len(others)
 
 
 def test_robot_with_an_address_is_kept_whatever_the_home(tmp_path: Path) -> None:

@@ -12,10 +12,10 @@ import pytest
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Person, Room, World
-from codebotler.robots.base import CancelledError, Options, Picture, Robot
-from codebotler.robots.open import all_readiness, open_robot
-from codebotler.robots.ros.ros1 import MEND
-from codebotler.robots.ros.ros2 import mend_of
+from codebotler.robots.base import CameraPicture, CancelledError, Options, Robot
+from codebotler.robots.open import check_readiness, open_robot
+from codebotler.robots.ros.ros1 import INSTALL_ROS1
+from codebotler.robots.ros.ros2 import find_fix
 from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
 
 WORLD = World(
@@ -49,7 +49,7 @@ def test_driving_may_take_no_time() -> None:
 
 
 def test_feedback_tells_places_on_the_way() -> None:
-    told: list[str | Picture] = []
+    told: list[str | CameraPicture] = []
     connected(speed=10).perform("go_to", ["kitchen"], told.append)
     assert told[-1] == "at (4.0, 5.0)"
     assert 2 <= len(told) <= 8
@@ -134,7 +134,7 @@ def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
 
 
 def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
-    kinds = {kind.name: kind for kind in all_readiness()}
+    kinds = {kind.name: kind for kind in check_readiness()}
     assert list(kinds) == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert kinds["sim"].works
     assert all(kind.works or kind.missing for kind in kinds.values())
@@ -142,7 +142,7 @@ def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
 
 @pytest.mark.parametrize("python", [Path(sys.executable), Path("/no/such/python")])
 def test_robots_on_ros_are_judged_by_the_python_that_is_named(python: Path) -> None:
-    kinds = {kind.name: kind for kind in all_readiness(python)}
+    kinds = {kind.name: kind for kind in check_readiness(python)}
     for name in ("ros1", "ros2"):
         assert not kinds[name].works
         assert kinds[name].missing.startswith(str(python))
@@ -150,14 +150,18 @@ def test_robots_on_ros_are_judged_by_the_python_that_is_named(python: Path) -> N
 
 def test_each_mend_is_a_command(tmp_path: Path) -> None:
     mends = [
-        kind.mend for path in (sys.executable, "/no", "/bin/false") for kind in all_readiness(Path(path))
+        kind.mend for path in (sys.executable, "/no", "/bin/false") for kind in check_readiness(Path(path))
     ]
-    mends += [MEND, mend_of(["robot_actions_pkg"]), mend_of(["rclpy", "robot_actions_pkg"], tmp_path)]
+    mends += [
+        INSTALL_ROS1,
+        find_fix(["robot_actions_pkg"]),
+        find_fix(["rclpy", "robot_actions_pkg"], tmp_path),
+    ]
     for version in ("humble", "noetic"):
         (tmp_path / version / "share").mkdir(parents=True)
         (tmp_path / version / "setup.bash").touch()
     (tmp_path / "humble" / "share" / "rclpy").mkdir()
-    assert mend_of(["rclpy"], tmp_path) == f"source {tmp_path}/humble/setup.bash"
+    assert find_fix(["rclpy"], tmp_path) == f"source {tmp_path}/humble/setup.bash"
     for mend in filter(None, mends):
         assert mend.split()[0] in {"apt-get", "cd", "codebotler", "pip", "python3", "source"}
         subprocess.run(["bash", "-n", "-c", mend], check=True)

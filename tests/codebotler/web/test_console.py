@@ -22,12 +22,12 @@ from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
-from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.open import open_model
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import open_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.robots.base import CancelledError, Result, Robot
+from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
@@ -56,15 +56,15 @@ class Author:
         self.asked: list[Prompt] = []
         self.is_closed = False
 
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:  # noqa: ARG002 - as models have it
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - as models have it
         self.asked.append(prompt)
         if not self.programs:
             raise ModelError("the model is not there", may_pass=False)
         program = self.programs.pop(0)
-        heard(program[:10])
+        on_text(program[:10])
         if self.waits:
             await asyncio.sleep(60)
-        heard(program[10:])
+        on_text(program[10:])
         return Reply(
             program, program, Usage(), 0.0, "stop", no_program=None if "def" in program else "no-code"
         )
@@ -130,7 +130,7 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
 
 
 def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> None:
-    world, model = read_world(OFFICE), recorded_model("recorded")
+    world, model = read_world(OFFICE), open_recorded("recorded")
     robot = Simulated(world, speed=None)
     with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
         assert len(examples(console)) >= 3
@@ -144,7 +144,7 @@ def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> 
 
 
 def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: Path) -> None:
-    office, model = read_world(OFFICE), recorded_model("recorded")
+    office, model = read_world(OFFICE), open_recorded("recorded")
     for world, count in ((office, 3), (WORLD, 0)):
         robot = Simulated(world, speed=None)
         with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
@@ -441,7 +441,7 @@ def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> N
             super().cancel()
             told.set()
 
-    def answer(_skill: str, _first: str) -> Result:
+    def answer(_skill: str, _first: str) -> RobotResult:
         if not told.wait(10):
             return ["hall"]
         raise CancelledError
@@ -587,7 +587,7 @@ def test_viewers_are_woken_at_each_change(console: Console) -> None:
 
 def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
     """What a viewer does not read does not pile up anywhere: a view is all there is."""
-    answers: dict[str, Result] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
+    answers: dict[str, RobotResult] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
     robot = Answering(lambda skill, _: answers.get(skill))
     with desk_of(tmp_path, robot) as console:
         approved(console, "def task_program():\n    for n in range(300):\n        say(str(n))\n")

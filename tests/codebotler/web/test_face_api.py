@@ -20,7 +20,7 @@ from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import UNCONFIRMED
 from codebotler.missions.store import missions
 from codebotler.missions.view import SessionView
-from codebotler.robots.face import Face, Question
+from codebotler.robots.face import Face, FaceQuestion
 from codebotler.robots.simulated import Simulated
 from codebotler.web.access import SHORTEST_TOKEN
 from codebotler.web.console import Console
@@ -302,5 +302,5 @@ def test_texts_are_cut_and_made_visible_but_keep_their_lines() -> None:
 
 
 def test_more_options_than_a_screen_holds_are_counted() -> None:
-    data = question_data(Question(1, "ann", "Which?", tuple(map(str, range(MOST_OPTIONS + 7)))))
+    data = question_data(FaceQuestion(1, "ann", "Which?", tuple(map(str, range(MOST_OPTIONS + 7)))))
     assert (len(data["options"]), data["more_options"]) == (MOST_OPTIONS, 7)

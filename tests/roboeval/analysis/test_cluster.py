@@ -3,7 +3,7 @@
 import json
 from typing import Any, cast
 
-from codebotler.models.no_program import IN_WORDS
+from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from made_results import results_of
 from roboeval.analysis.cluster import cluster_data, describe_groups, group_failures, nearest_fix
 from roboeval.cli.views.groups import cluster_view
@@ -79,9 +79,9 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     results = results_of(rows, SUITE, programs)
     refused, empty = describe_groups(group_failures(cast("list[Row]", rows[:3]), programs), results)
     assert [len(one.members) for one in (refused, empty)] == [2, 1]
-    assert (refused.fix, refused.why) == (None, IN_WORDS["refusal"])
+    assert (refused.fix, refused.why) == (None, NO_PROGRAM_SENTENCES["refusal"])
     text = printed(cluster_view(refused))
-    assert IN_WORDS["refusal"] in text
+    assert NO_PROGRAM_SENTENCES["refusal"] in text
     assert 'in "' not in text, "no robot was in a world"
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from codebotler.core.terminal import visible
-from codebotler.models.no_program import IN_WORDS
+from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from made_results import results_of, table_of
 from roboeval.analysis.counts import tally_of
 from roboeval.analysis.summary import summarise
@@ -61,7 +61,7 @@ def test_replies_without_a_program_are_said_in_words() -> None:
     found = results(rows=[row(0, 0, ("NoProgram", "cut-off"))])
     text = printed(prompt_view(prompt_data(found, "Visit", 0)))
     assert "no program: cut-off" in text
-    assert IN_WORDS["cut-off"] in text
+    assert NO_PROGRAM_SENTENCES["cut-off"] in text
 
 
 def test_text_of_the_suite_is_marked_where_the_instruction_was_not_recorded() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.files import read_rows
-from codebotler.models.recorded import NOTICE
+from codebotler.models.recorded import RECORDED_NOTICE
 from command_line import ENVIRONMENT, refused, roboeval
 from forked import Forked
 from seals import unseal
@@ -145,7 +145,7 @@ def test_rejected_programs_are_requested_again_in_rounds(option: str, tmp_path: 
 def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
     ended = roboeval("generate", "--tasks", "LunchTime", "--num-completions", "1", cwd=tmp_path)
     assert (ended.status, ended.out) == (0, "")
-    assert ended.err.splitlines()[0] == NOTICE
+    assert ended.err.splitlines()[0] == RECORDED_NOTICE
     assert ended.err.count("\n") == 2
     assert " runs/recorded-careful; " in ended.err
     assert "`roboeval evaluate runs/recorded-careful`" in ended.err

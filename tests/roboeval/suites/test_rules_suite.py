@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from codebotler.models.recorded import Solution, recorded_model
+from codebotler.models.recorded import Solution, open_recorded
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.lint import lint
@@ -104,7 +104,7 @@ def test_programs_end_as_they_are_declared(programs: list[Judged]) -> None:
 def test_recorded_models_know_each_instruction(suite: Suite) -> None:
     for task in suite.tasks.values():
         careful, hasty = (
-            recorded_model(f"recorded:{name}").replies[task.prompts[0]] for name in ("careful", "hasty")
+            open_recorded(f"recorded:{name}").replies[task.prompts[0]] for name in ("careful", "hasty")
         )
         assert all(one.fails is None for one in careful)
         assert all(one.fails is not None for one in hasty)

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from codebotler.core.errors import UserError
-from codebotler.models.recorded import recorded_model
+from codebotler.models.recorded import open_recorded
 from roboeval.suites.load import Suite, Task
 from roboeval.suites.solutions import equivalent_mutants, solutions
 
@@ -25,7 +25,7 @@ def test_replies_of_recorded_models_come_first(paper: Suite) -> None:
             reply
             for name in ("careful", "hasty")
             for prompt in task.prompts
-            for reply in recorded_model(name).replies[prompt]
+            for reply in open_recorded(name).replies[prompt]
         ]
         written = solutions(task)[len(replies) :]
         assert solutions(task)[: len(replies)] == tuple(replies)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from codebotler.core.files import to_line
-from codebotler.models.no_program import IN_WORDS
+from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.evaluation.runs.folder import Run
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import RunState, state_of
@@ -132,7 +132,7 @@ def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
     run = opened(runs / "hasty")
     shown = run.row(f"{first['task']}/{first['prompt']}/{first['index']}")
     assert shown is not None
-    assert (shown["why"], shown["worlds"]) == (IN_WORDS["empty"], "")
+    assert (shown["why"], shown["worlds"]) == (NO_PROGRAM_SENTENCES["empty"], "")
     assert run.failures[0].name == "NoProgram"
 
 

@@ -1,4 +1,1 @@
-"""The robot in pyrobosim: start with `robot.py`.
-
-`world.py` and `floorplan.py` build the world; importing them needs pyrobosim and takes a second.
-"""
+"""The robot in pyrobosim; start with `robot.py`. Importing `world.py` and `floorplan.py` takes a second."""

@@ -1,4 +1,4 @@
-"""The robot in pyrobosim: it plans its way around walls and drives it."""
+"""The robot in pyrobosim: it plans paths around walls and drives along them."""
 
 from __future__ import annotations
 
@@ -11,38 +11,35 @@ from typing import TYPE_CHECKING
 from codebotler.core.errors import UserError, install_command
 from codebotler.robots.base import (
     ROS_PYTHON,
-    Argument,
     Feedback,
     Options,
     Readiness,
-    Result,
-    no_feedback,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
 )
-from codebotler.robots.simulated import Simulated, performed
+from codebotler.robots.simulated import Simulated, perform_at_once
 from codebotler.simulator.robot import Thing
 
 if TYPE_CHECKING:
     from codebotler.robots.pyrobosim.world import DrivableWorld
 
-MISSING, MEND = "pyrobosim is not installed", install_command("pyrobosim")
+NOT_INSTALLED, INSTALL_PYROBOSIM = "pyrobosim is not installed", install_command("pyrobosim")
 
 
 class Pyrobosim(Simulated):
-    """A robot in pyrobosim, which knows where it is, what it holds, and what lies where.
-
-    People, errors and names of objects are those of the simulated robot.
-    """
+    """A robot whose position and objects are in pyrobosim; the rest is simulated as usual."""
 
     name = "pyrobosim"
     if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended with the tool", True
     _drivable: DrivableWorld
 
     def connect(self) -> None:
-        """Build the world in pyrobosim as it is at the start."""
+        """Build the world in pyrobosim in its initial state."""
         logger = logging.getLogger("pyrobosim")
-        if not logger.handlers:  # or it logs to the terminal
+        if not logger.handlers:  # otherwise it logs to the terminal
             logger.addHandler(logging.NullHandler())
-        from codebotler.robots.pyrobosim.world import DrivableWorld  # noqa: PLC0415 - takes a second, is an extra
+        from codebotler.robots.pyrobosim.world import DrivableWorld  # noqa: PLC0415 - slow, and optional
 
         super().connect()
         self._drivable = DrivableWorld(self._world, self.clock)
@@ -52,28 +49,30 @@ class Pyrobosim(Simulated):
             for body, thing in zip(bodies, self._robot.things[room], strict=True)
         }
 
-    def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
-        """Execute a skill, taking its time."""
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
+        """Execute a skill; it takes time."""
         self._wait(0.0)
         self._update()
         if skill not in {"pick", "place"}:
             return super().perform(skill, arguments, feedback)
         request, room = str(arguments[0]), self._robot.room
-        performed(self._robot, skill, arguments)  # raises if there is nothing to pick up or to put down
+        perform_at_once(self._robot, skill, arguments)  # raises if there is no object to pick or place
         if skill == "place":
             self._drivable.place(room, request, feedback)
             return None
-        lying = self._drivable.lying_in(room)
-        body = next(body for body in lying if self._things[body].is_meant_by(request))
+        objects = self._drivable.objects_in(room)
+        body = next(body for body in objects if self._things[body].is_meant_by(request))
         self._drivable.pick(body, request, feedback)
         self._things[body] = Thing(request, is_pattern=False)
         return None
 
     def _update(self) -> None:
-        """Copy from pyrobosim where the robot is, what it holds, and what lies where."""
+        """Copy the robot's room, the held object and all objects from pyrobosim."""
         world, robot = self._drivable, self._robot
-        robot.room = world.here or robot.room
-        robot.things = {room: [self._things[body] for body in world.lying_in(room)] for room in robot.rooms}
+        robot.room = world.room or robot.room
+        robot.things = {room: [self._things[body] for body in world.objects_in(room)] for room in robot.rooms}
         robot.held = None if world.held is None else self._things[world.held].label
 
     def _drive(self, room: str, feedback: Feedback) -> None:
@@ -81,16 +80,16 @@ class Pyrobosim(Simulated):
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """Whether pyrobosim is installed."""
+    """Return whether pyrobosim is installed."""
     if importlib.util.find_spec("pyrobosim") is None:
-        return Readiness("pyrobosim", works=False, missing=MISSING, mend=MEND)
+        return Readiness("pyrobosim", works=False, missing=NOT_INSTALLED, mend=INSTALL_PYROBOSIM)
     return Readiness("pyrobosim", works=True, note="plans and drives through --world FILE, without a window")
 
 
 def robot(options: Options) -> Pyrobosim:
-    """The robot of these options, which must name a world."""
+    """Open the robot; UserError if the options name no world, or pyrobosim is not installed."""
     if options.world is None:
         raise UserError("the robot in pyrobosim needs a world; name one with --world FILE")
     if importlib.util.find_spec("pyrobosim") is None:
-        raise UserError(f"{MISSING}; `{MEND}` installs it")
+        raise UserError(f"{NOT_INSTALLED}; `{INSTALL_PYROBOSIM}` installs it")
     return Pyrobosim(options.world, speed=options.speed, skills=options.skills)

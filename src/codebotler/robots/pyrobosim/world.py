@@ -1,4 +1,4 @@
-"""A world file built in pyrobosim, with a robot that plans its way and drives. Importing this is slow."""
+"""Build a world file in pyrobosim, with a robot that plans paths and drives. This module imports slowly."""
 
 from __future__ import annotations
 
@@ -23,34 +23,34 @@ from shapely.geometry import LineString
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import World
-from codebotler.robots.base import CancelledError, Feedback, no_feedback
+from codebotler.robots.base import CancelledError, Feedback, ignore_feedback
 from codebotler.robots.clock import Clock
-from codebotler.robots.pyrobosim.floorplan import RADIUS, Floorplan, Table, plan_floor
-from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND
+from codebotler.robots.pyrobosim.floorplan import ROBOT_RADIUS, Floorplan, Table, plan_floor
+from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND
 
 RADIANS_PER_SECOND = math.pi / 2
-MOVES_EVERY = 0.05  # real seconds between two places on the way
-WALLS = 0.001  # metres around a floor in which pyrobosim puts nothing else; the floor plan has left more
-NEAR = 1e-6  # metres by which a computed point may miss the edge it lies on
+STEP_SECONDS = 0.05  # real seconds between two positions of a drive
+WALL_WIDTH = 0.001  # metres around a floor; the floor plan leaves more space
+TOLERANCE = 1e-6  # metres between a computed point and its edge
 T = TypeVar("T")
 
 
 class DrivableWorld:
-    """A world of pyrobosim with a robot in it.
+    """A world of pyrobosim with a robot.
 
-    Nothing random of pyrobosim is used: objects lie in cells of tables, and ways are planned on a graph.
+    It uses nothing random: objects are in cells of tables, and paths are planned on a graph.
     """
 
     def __init__(self, world: World, clock: Clock) -> None:
         plan = plan_floor(world)
         names = [room.name for room in world.rooms]
         self._clock, self._motor = clock, Motor(clock)
-        self._world = Pyroworld(name="pyrobosim.world", inflation_radius=RADIUS, object_radius=0.0)
-        self._floors = self._built(plan)
+        self._world = Pyroworld(name="pyrobosim.world", inflation_radius=ROBOT_RADIUS, object_radius=0.0)
+        self._floors = self._build(plan)
         self._rooms = dict(zip(names, self._floors, strict=False))  # the corridor has no name
         self._stands = dict(zip(names, plan.stands, strict=False))
         self._tables = {
-            name: self._furnished(floor, table)
+            name: self._add_table(floor, table)
             for (name, floor), table in zip(self._rooms.items(), plan.tables, strict=True)
             if table is not None
         }
@@ -58,57 +58,59 @@ class DrivableWorld:
         divided = {n: t.cells(count) for n, t in zip(names, plan.tables, strict=True) if t is not None}
         self._cells = {name: cells for name, (cells, _) in divided.items()}
         size = min((width for _, width in divided.values()), default=0.0) / 2
-        self.objects = {room.name: self._laid(room.name, len(room.objects), size) for room in world.rooms}
-        """What lies in each room at the start, in the order of the world."""
+        self.objects = {
+            room.name: self._add_objects(room.name, len(room.objects), size) for room in world.rooms
+        }
+        """The initial objects of each room, in the order of the world."""
 
         for number, floor in enumerate(self._floors):
             places = [*plan.stands[number].coords, *plan.corners(number)]
             floor.nav_poses = [Pose(x, y) for x, y in places]
-        self.robot = Robot(name="pyrobosim.robot", radius=RADIUS, start_sensor_threads=False)
+        self.robot = Robot(name="pyrobosim.robot", radius=ROBOT_RADIUS, start_sensor_threads=False)
         self.robot.set_path_executor(self._motor)
         self._world.add_robot(self.robot, loc=self._rooms[world.robot], pose=self._pose(world.robot))
         self.robot.set_path_planner(Roadmap())
 
     @property
-    def here(self) -> str | None:
-        """The room that the robot is in; None between rooms."""
+    def room(self) -> str | None:
+        """The robot's room; None between rooms."""
         pose = self.robot.get_pose()
         return next((name for name, floor in self._rooms.items() if floor.is_inside(pose)), None)
 
     @property
     def held(self) -> Object | None:
-        """What the robot holds."""
+        """The object that the robot holds."""
         return self.robot.manipulated_object
 
-    def lying_in(self, room: str) -> list[Object]:
-        """The objects in a room, in the order in which they came there."""
+    def objects_in(self, room: str) -> list[Object]:
+        """Return the objects in a room, in the order of their arrival."""
         return list(self._tables[room].children) if room in self._tables else []
 
     def drive(self, room: str, feedback: Feedback) -> None:
-        """Drive to where the robot stops in a room."""
+        """Drive to the robot's stop in a room."""
         self._navigate(self._pose(room), feedback, "GoToInvalidLocation", f'drive to "{room}"')
 
     def pick(self, thing: Object, name: str, feedback: Feedback) -> None:
-        """Drive to the table with an object of this room, and take it; programs call it `name`."""
-        what = f'pick up "{name}"'
-        self._navigate(thing.parent, feedback, "PickFailed", what)
+        """Drive to the table with an object of this room, and pick it up; programs call it `name`."""
+        action = f'pick up "{name}"'
+        self._navigate(thing.parent, feedback, "PickFailed", action)
         self._wait(SKILLS["pick"].seconds)
-        _succeed(self.robot.pick_object(thing), "PickFailed", what)
+        _succeed(self.robot.pick_object(thing), "PickFailed", action)
 
     def place(self, room: str, name: str, feedback: Feedback) -> None:
-        """Drive to the table in the robot's room, and put down there what the robot holds."""
-        what, table = f'place "{name}"', self._tables.get(room)
+        """Drive to the table in this room, and put the held object there."""
+        action, table = f'place "{name}"', self._tables.get(room)
         if table is None:
-            raise RobotError("PlaceFailed", f'the robot cannot {what}: no table fits into "{room}"')
-        self._navigate(table, feedback, "PlaceFailed", what)
+            raise RobotError("PlaceFailed", f'the robot cannot {action}: no table fits into "{room}"')
+        self._navigate(table, feedback, "PlaceFailed", action)
         self._wait(SKILLS["place"].seconds)
-        taken = {(lying.pose.x, lying.pose.y) for lying in table.children}
-        x, y = next(cell for cell in self._cells[room] if cell not in taken)
-        _succeed(self.robot.place_object(Pose(x, y)), "PlaceFailed", what)
+        occupied = {(thing.pose.x, thing.pose.y) for thing in table.children}
+        x, y = next(cell for cell in self._cells[room] if cell not in occupied)
+        _succeed(self.robot.place_object(Pose(x, y)), "PlaceFailed", action)
 
-    def _navigate(self, goal: Pose | Entity, feedback: Feedback, kind: str, what: str) -> None:
+    def _navigate(self, goal: Pose | Entity, feedback: Feedback, kind: str, action: str) -> None:
         self._motor.feedback = feedback
-        _succeed(self.robot.navigate(goal=goal), kind, what)
+        _succeed(self.robot.navigate(goal=goal), kind, action)
 
     def _wait(self, seconds: float) -> None:
         if not self._clock.wait(seconds):
@@ -117,81 +119,81 @@ class DrivableWorld:
     def _pose(self, room: str) -> Pose:
         return Pose(self._stands[room].x, self._stands[room].y)
 
-    # --- building
-
-    def _built(self, plan: Floorplan) -> list[Room]:
-        """The rooms, with passages between them."""
+    def _build(self, plan: Floorplan) -> list[Room]:
+        """Add the rooms, with passages between them."""
         floors = []
         for number, floor in enumerate(plan.floors):
             corners = list(floor.exterior.coords)
-            added = self._world.add_room(name=f"floor{number}", footprint=corners, wall_width=WALLS)
-            floors.append(_added(added))
+            added = self._world.add_room(name=f"floor{number}", footprint=corners, wall_width=WALL_WIDTH)
+            floors.append(_expect_added(added))
         for passage in plan.passages:
             start, end = (floors[number] for number in passage.ends)
             hallway = self._world.add_hallway(
                 room_start=start,
                 room_end=end,
                 width=passage.width,
-                wall_width=WALLS,
+                wall_width=WALL_WIDTH,
                 conn_method="points",
                 conn_points=list(passage.line.coords),
             )
-            _added(hallway)
+            _expect_added(hallway)
         return floors
 
-    def _furnished(self, floor: Room, table: Table) -> ObjectSpawn:
-        """The top of a new table."""
+    def _add_table(self, floor: Room, table: Table) -> ObjectSpawn:
+        """Add a table, and return its top."""
         kind = f"table on {floor.name}"
         self._world.get_location_metadata().data[kind] = {
             "footprint": {"type": "box", "dims": list(table.size)},
             "nav_poses": [[x, y, 0.0, angle] for x, y, angle in table.stands],
             "locations": [{"name": "top"}],
         }
-        added = _added(self._world.add_location(category=kind, parent=floor, pose=Pose(*table.centre)))
+        added = _expect_added(self._world.add_location(category=kind, parent=floor, pose=Pose(*table.centre)))
         (top,) = added.children
         return top
 
-    def _laid(self, room: str, count: int, size: float) -> list[Object]:
-        """New objects on the table in a room."""
+    def _add_objects(self, room: str, count: int, size: float) -> list[Object]:
+        """Add objects to the table in a room."""
         metadata = self._world.get_object_metadata().data
         metadata["thing"] = {"footprint": {"type": "box", "dims": [size, size]}}
         return [
-            _added(self._world.add_object(category="thing", parent=self._tables[room], pose=Pose(x, y)))
+            _expect_added(
+                self._world.add_object(category="thing", parent=self._tables[room], pose=Pose(x, y))
+            )
             for x, y in self._cells.get(room, [])[:count]
         ]
 
 
 class Roadmap(WorldGraphPlanner):
-    """pyrobosim's planner on a graph; it samples whether places see each other, and this computes it."""
+    """pyrobosim's planner on a graph, but with exact instead of sampled visibility between places."""
 
     plugin_name = "codebotler"
 
     def reset(self) -> None:
-        """Rebuild the graph from the world as it is now."""
+        """Rebuild the graph from the current world."""
         world = self.robot and self.robot.world
         if world is not None:
-            self._space = world.total_internal_polygon.buffer(NEAR)
+            self._space = world.total_internal_polygon.buffer(TOLERANCE)
             shapely.prepare(self._space)
         super().reset()
 
     def connect_neighbors(self, node: Node) -> None:
-        """Join a place with all others in sight."""
-        here = (node.pose.x, node.pose.y)
+        """Connect a place with all visible places."""
+        start = (node.pose.x, node.pose.y)
         for other in self.graph.nodes:
-            if other is not node and self._space.covers(LineString([here, (other.pose.x, other.pose.y)])):
+            if other is not node and self._space.covers(LineString([start, (other.pose.x, other.pose.y)])):
                 self.graph.add_edge(node, other)
 
 
 class Motor(PathExecutor):
-    """Drives along a path by a clock, and stands still when that is stopped.
+    """Drives along a path by a clock, and stops with the clock.
 
-    pyrobosim's own executor checks for a cancel only between naps, and forgets one that comes too early.
+    pyrobosim's own executor notices a cancel only after a delay, and ignores an early one.
     """
 
     def __init__(self, clock: Clock) -> None:
         super().__init__()
         self.clock = clock
-        self.feedback: Feedback = no_feedback
+        self.feedback: Feedback = ignore_feedback
 
     def execute(self, path: Path, *_: float, **__: float) -> ExecutionResult:
         """Drive along a path to its end, or until the clock is stopped."""
@@ -208,13 +210,13 @@ class Motor(PathExecutor):
             is_due = now >= due or moment >= corners[-1] or self.clock.speed is None
             if is_due and phrase != last:
                 self.feedback(phrase)
-                last, due = phrase, now + FEEDBACK_EVERY
+                last, due = phrase, now + FEEDBACK_SECONDS
         self.following_path = False
         arrived = moment >= corners[-1]
         return ExecutionResult(ExecutionStatus.SUCCESS if arrived else ExecutionStatus.CANCELED)
 
     def _moments(self, corners: list[float]) -> Iterator[float]:
-        """Seconds since the start of a drive, as they come, until its end or a stop."""
+        """Yield the seconds since the start of a drive, in real time, until its end or a stop."""
         speed, began, moment = self.clock.speed, self.clock.now, 0.0
         if speed is None:
             for corner in corners:
@@ -222,14 +224,14 @@ class Motor(PathExecutor):
                     return
                 yield (moment := corner)
             return
-        while self.clock.wait(min(MOVES_EVERY * speed, corners[-1] - moment)):
+        while self.clock.wait(min(STEP_SECONDS * speed, corners[-1] - moment)):
             yield (moment := min(self.clock.now - began, corners[-1]))
             if moment >= corners[-1]:
                 return
 
 
 def _pose_at(way: Trajectory, moment: float) -> Pose:
-    """The pose at a moment of a drive, between its corners on a straight line."""
+    """Interpolate the pose at a moment of a drive."""
     number = min(bisect.bisect_right(way.t_pts, moment), len(way.t_pts) - 1)
     start, end = way.poses[number - 1], way.poses[number]
     begins, ends = way.t_pts[number - 1], way.t_pts[number]
@@ -242,14 +244,14 @@ def _pose_at(way: Trajectory, moment: float) -> Pose:
     )
 
 
-def _added(made: T | None) -> T:
-    assert made is not None, "pyrobosim refuses a part of the floor plan"
-    return made
+def _expect_added(part: T | None) -> T:
+    assert part is not None, "pyrobosim accepts the floor plan"
+    return part
 
 
-def _succeed(result: ExecutionResult, kind: str, what: str) -> None:
-    """Raise the error of an action that failed or was stopped."""
+def _succeed(result: ExecutionResult, kind: str, action: str) -> None:
+    """Raise an error if an action failed or was stopped."""
     if result.status == ExecutionStatus.CANCELED:
         raise CancelledError
     if not result.is_success():
-        raise RobotError(kind, f"the robot cannot {what}: {result.message}")
+        raise RobotError(kind, f"the robot cannot {action}: {result.message}")

@@ -1,4 +1,4 @@
-"""Files of `--connect`: what a robot offers for each skill, and where its places are."""
+"""Read files of `--connect`: the calls for a robot's skills, and its places."""
 
 from __future__ import annotations
 
@@ -11,64 +11,70 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.yaml_files import YamlFile
 from codebotler.robots.places import Places, read_places
-from codebotler.robots.ros.connection import OF_PLACE, Connection, SkillCall, Watched, variables_in
+from codebotler.robots.ros.connection import (
+    PLACE_VARIABLES,
+    Connection,
+    MotionTopic,
+    SkillCall,
+    find_variables,
+)
 
 
-def _as_topic(text: str) -> str:
+def _check_topic(text: str) -> str:
     if not re.fullmatch(r"~?/?\w+(/\w+)*", text):
-        raise ValueError("must be a name of ROS, such as /navigate_to_pose")
+        raise ValueError("must be a ROS name, such as /navigate_to_pose")
     return text
 
 
-def _as_type(text: str) -> str:
+def _check_type(text: str) -> str:
     if not re.fullmatch(r"\w+/((action|srv|msg)/)?\w+", text):
         raise ValueError("must be a type with its package, such as std_msgs/msg/String")
     return text
 
 
-Topic = Annotated[str, Field(strict=True), AfterValidator(_as_topic)]
-Type = Annotated[str, Field(strict=True), AfterValidator(_as_type)]
+Topic = Annotated[str, Field(strict=True), AfterValidator(_check_topic)]
+Type = Annotated[str, Field(strict=True), AfterValidator(_check_type)]
 
 
-class _Form(BaseModel):
+class _ConnectionPart(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class FramesForm(_Form):
-    """The frames between which tf tells the pose."""
+class FramesForm(_ConnectionPart):
+    """The frames for a pose from tf."""
 
     from_: Annotated[str, Field(alias="from")] = "map"
     to: str = "base_link"
 
 
-class PoseForm(_Form):
-    """Where a pose comes from."""
+class PoseForm(_ConnectionPart):
+    """The source of poses."""
 
     topic: Topic | None = None
     tf: FramesForm | None = None
 
-    def watched(self) -> Watched:
-        """The topic."""
+    def motion_topic(self) -> MotionTopic:
+        """Return the topic of the poses."""
         if self.tf is not None:
-            return Watched(self.topic or "/tf", (self.tf.from_, self.tf.to))
-        return Watched(self.topic or "/amcl_pose")
+            return MotionTopic(self.topic or "/tf", (self.tf.from_, self.tf.to))
+        return MotionTopic(self.topic or "/amcl_pose")
 
 
-class VelocityForm(_Form):
-    """Where a velocity comes from."""
+class VelocityForm(_ConnectionPart):
+    """The source of velocities."""
 
     topic: Topic
 
 
-class KeepoutForm(_Form):
+class KeepoutForm(_ConnectionPart):
     """The topics of Nav2's keepout filter."""
 
     mask: Topic
     info: Topic
 
 
-class SkillForm(_Form):
-    """How a robot is told to perform one skill."""
+class SkillForm(_ConnectionPart):
+    """The call or the camera for a skill."""
 
     action: Topic | None = None
     service: Topic | None = None
@@ -84,8 +90,8 @@ class SkillForm(_Form):
     image: Topic | None = None
 
 
-class ConnectionForm(_Form):
-    """A file that connects a robot."""
+class ConnectionForm(_ConnectionPart):
+    """The contents of a connection file."""
 
     robot: Literal["ros1", "rosbridge", "ros2"] = "ros2"
     places: Any = None
@@ -96,23 +102,14 @@ class ConnectionForm(_Form):
     skills: Annotated[dict[str, SkillForm], Field(min_length=1)]
 
 
-SENT = {"action": "goal", "service": "request", "topic": "message"}
-"""The key of what is sent, for each kind."""
-
-FOLDERS = {"action": "action", "service": "srv", "topic": "msg"}
-"""The middle of a type, for each kind."""
+MESSAGE_KEYS = {"action": "goal", "service": "request", "topic": "message"}
+"""The key of the message to send, for each kind."""
+TYPE_FOLDERS = {"action": "action", "service": "srv", "topic": "msg"}
+"""The middle part of a type, for each kind."""
 
 
 def read_connection(path: Path, skills: SkillTable) -> Connection:
-    """Read a file that connects a robot.
-
-    Args:
-        path: the file.
-        skills: those that it may map.
-
-    Raises:
-        UserError: something is wrong; it names the line, and how to mend it.
-    """
+    """Read a connection file for some of these skills; UserError if it is invalid."""
     file = YamlFile.read(path)
     form = file.validate(ConnectionForm)
     places = None if form.places is None else read_places(form.places, file)
@@ -134,8 +131,8 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
         calls,
         form.robot,
         places,
-        None if form.pose is None else form.pose.watched(),
-        None if form.velocity is None else Watched(form.velocity.topic),
+        None if form.pose is None else form.pose.motion_topic(),
+        None if form.velocity is None else MotionTopic(form.velocity.topic),
         folders,
         cameras,
         None if form.keepout is None else (form.keepout.mask, form.keepout.info),
@@ -152,39 +149,41 @@ def _camera(file: YamlFile, name: str, form: SkillForm, skill: Skill) -> tuple[s
 
 def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) -> SkillCall:
     at = ("skills", skill.name)
-    named = [(kind, name) for kind in SENT if (name := getattr(form, kind)) is not None]
+    named = [(kind, name) for kind in MESSAGE_KEYS if (name := getattr(form, kind)) is not None]
     if len(named) != 1 or form.type is None:
         raise file.wrong('write one of "action", "service" and "topic", and its "type"', *at)
     kind, name = named[0]
-    for other in {*SENT.values()} - {SENT[kind]}:
+    for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
         if getattr(form, other):
-            raise file.wrong(f'what is sent to {kind}s stands under "{SENT[kind]}"', *at, other)
+            raise file.wrong(f'for {kind}s, use "{MESSAGE_KEYS[kind]}" instead', *at, other)
     if skill.returns.annotation != "None" and not form.result:
-        raise file.wrong(f'say in "result" which field {skill.signature} returns', *at)
-    request = getattr(form, SENT[kind])
+        raise file.wrong(f'name in "result" the field that {skill.signature} returns', *at)
+    request = getattr(form, MESSAGE_KEYS[kind])
     known = {parameter.name for parameter in skill.parameters}
-    known |= {*OF_PLACE} if places and skill.is_drive else set()
+    known |= {*PLACE_VARIABLES} if places and skill.is_drive else set()
     if known and not request:
-        raise file.wrong(f'say in "{SENT[kind]}" what is sent, such as {{data: ${min(known)}}}', *at)
-    for variable in variables_in(request):
+        raise file.wrong(f'write the message in "{MESSAGE_KEYS[kind]}", such as {{data: ${min(known)}}}', *at)
+    for variable in find_variables(request):
         if variable not in known:
-            lacks = "; name a file under places" if variable in OF_PLACE and skill.is_drive else ""
+            lacks = "; name a file under places" if variable in PLACE_VARIABLES and skill.is_drive else ""
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"
-            raise file.wrong(f"${variable} is unknown here{lacks}; known are: {given}", *at, SENT[kind])
+            raise file.wrong(
+                f"${variable} is unknown here{lacks}; known are: {given}", *at, MESSAGE_KEYS[kind]
+            )
     try:
         SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
-        raise file.wrong("a field is both a value and the start of a path", *at, SENT[kind]) from None
+        raise file.wrong("a field is both a value and the start of a path", *at, MESSAGE_KEYS[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
-    whole, ros = _whole(kind, form.type), skill.ros
+    whole, ros = _full_type(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
     definition = ros.definition if ros is not None and is_ours else ""
-    return SkillCall(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]
+    return SkillCall(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]  # kind is a str here
 
 
-def _whole(kind: str, text: str) -> str:
-    """A type as ROS 2 writes it, such as std_srvs/srv/Trigger, from that or from how ROS 1 does."""
+def _full_type(kind: str, text: str) -> str:
+    """Convert a type to the form of ROS 2, such as std_srvs/srv/Trigger."""
     package, *middle, name = text.split("/")
     if kind == "action" and middle != ["action"]:
         name = name.removesuffix("Action")
-    return f"{package}/{FOLDERS[kind]}/{name}"
+    return f"{package}/{TYPE_FOLDERS[kind]}/{name}"

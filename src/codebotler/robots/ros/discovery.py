@@ -1,4 +1,4 @@
-"""Looks at what the nodes of a robot offer, and writes a first file for `--connect` from it."""
+"""List the offers of a robot's nodes, and draft a file for `--connect` from them."""
 
 from __future__ import annotations
 
@@ -10,72 +10,82 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import NotReadyError
 from codebotler.robots.ros import ros1, ros2
-from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.ros.connection import default_connection
 from codebotler.robots.ros.worker import RosWorker
 
 
 def _own_actions() -> Iterator[tuple[str, str, str, str]]:
-    for skill, call in connection_of(SKILLS).calls.items():
-        text = f"{ACTION}{call.request}{', result: result' if call.result else ''}".replace("'", "")
+    for skill, call in default_connection(SKILLS).calls.items():
+        text = f"{ACTION_LINE}{call.request}{', result: result' if call.result else ''}".replace("'", "")
         yield rf"action \S+ {call.type.replace('/action/', '/')}", skill, text, ""
 
 
-ACTION, SERVICE = "action: NAME, type: TYPE, goal: ", "service: NAME, type: TYPE, request: "
-SAY = "topic: NAME, type: TYPE, message: {data: $message}"
-PLACES, DETECTOR, OWN = "name places first", "choose a detector first", "declare this skill of yours first"
-FRAME = "only if the places are in its frame"
-USES = (
+ACTION_LINE, SERVICE_LINE = "action: NAME, type: TYPE, goal: ", "service: NAME, type: TYPE, request: "
+SAY_LINE = "topic: NAME, type: TYPE, message: {data: $message}"
+PLACES_FIRST, DETECTOR_FIRST, SKILL_FIRST = (
+    "name places first",
+    "choose a detector first",
+    "declare this skill of yours first",
+)
+CHECK_FRAME = "only if the places are in its frame"
+MAPPINGS = (
     *_own_actions(),
-    (r"action \S+ nav2_msgs/NavigateToPose", "go_to", ACTION + "{pose: $place}", PLACES),
-    (r"action \S+ move_base_msgs/MoveBase", "go_to", ACTION + "{target_pose: $place}", PLACES),
-    (r"hears \S*[/_](say|speak|speech|tts|talk)(_text|_output)? std_msgs/String", "say", SAY, ""),
-    (r"sends \S+ sensor_msgs/(Compressed)?Image", "is_in_room", "detector: hf:PATH, image: NAME", DETECTOR),
-    (r"service \S+ std_srvs/Trigger", "", SERVICE + "{}, success: success", OWN),
-    (r"service \S+ std_srvs/SetBool", "", SERVICE + "{data: $on}, success: success", OWN),
+    (r"action \S+ nav2_msgs/NavigateToPose", "go_to", ACTION_LINE + "{pose: $place}", PLACES_FIRST),
+    (r"action \S+ move_base_msgs/MoveBase", "go_to", ACTION_LINE + "{target_pose: $place}", PLACES_FIRST),
+    (r"hears \S*[/_](say|speak|speech|tts|talk)(_text|_output)? std_msgs/String", "say", SAY_LINE, ""),
+    (
+        r"sends \S+ sensor_msgs/(Compressed)?Image",
+        "is_in_room",
+        "detector: hf:PATH, image: NAME",
+        DETECTOR_FIRST,
+    ),
+    (r"service \S+ std_srvs/Trigger", "", SERVICE_LINE + "{}, success: success", SKILL_FIRST),
+    (r"service \S+ std_srvs/SetBool", "", SERVICE_LINE + "{data: $on}, success: success", SKILL_FIRST),
     (r"sends \S*/(amcl_)?pose geometry_msgs/Pose(WithCovariance)?Stamped", "pose", "topic: NAME", ""),
     (r"sends /tf tf2_msgs/TFMessage", "pose", "tf: {from: map, to: base_link}", ""),
-    (r"sends \S+ nav_msgs/Odometry", "pose", "topic: NAME", FRAME),
+    (r"sends \S+ nav_msgs/Odometry", "pose", "topic: NAME", CHECK_FRAME),
     (r"sends \S+ nav_msgs/Odometry", "velocity", "topic: NAME", ""),
 )
-"""A regex of offers, the key that they are for (an empty one is named after the offer), what the key maps to,
-and what must be done first; the line is a comment then."""
+"""Rows of: a regex for offers; the key in the draft, empty to derive it from the offer; its value; and a task
+for the user, which makes the line a comment.
+"""
 
-OF_ROS = re.compile(
+INTERNAL_OFFERS = re.compile(
     r"\S+ \S*((lifecycle|controller)_manager|costmap|rosbag|rosbridge|rosapi|rviz|/_|/tf_static|_logger).*"
     r"|.* (rcl_interfaces|lifecycle_msgs|\w+_interfaces|rosgraph_msgs|actionlib_msgs|bond|dynamic_reconfigure"
     r"|diagnostic_msgs)/\w+|.*Action(Goal|Result|Feedback)"
 )
-"""Offers that nobody maps, such as the services for parameters that each node has."""
+"""Offers that are never mapped, such as each node's services for parameters."""
 
-COMMON = ("geometry_msgs", "nav_msgs", "robot_actions_pkg", "sensor_msgs", "std_msgs", "std_srvs")
-"""Packages that come with CodeBotler's ROS 2, or that it builds by itself."""
+COMMON_PACKAGES = ("geometry_msgs", "nav_msgs", "robot_actions_pkg", "sensor_msgs", "std_msgs", "std_srvs")
+"""Packages that come with CodeBotler's ROS 2, or that it builds itself."""
 
-ABOUT = ("pose", "velocity")  # the keys that are not skills
-EXPECTED = {
+NOT_SKILLS = ("pose", "velocity")
+EXPECTED_KEYS = {
     "places": "places (name a file of them)",
     "pose": "pose (a topic that says where the robot is)",
     **{skill: skill for skill in SKILLS if skill not in {"get_all_rooms", "get_current_location"}},
 }
 
 
-def offers_of(robot: str, address: str, python: Path) -> list[str]:
-    """What the nodes of a robot offer: kind (action, service, hears or sends), name and type in a line.
+def discover_offers(robot: str, address: str, python: Path) -> list[str]:
+    """List the offers of a robot's nodes, each as kind (action, service, hears or sends), name and type.
 
     Args:
         robot: ros1 or ros2.
         address: the URI of the master, or a domain; empty for the default.
-        python: the interpreter that the robot's ROS belongs to.
+        python: the Python of the robot's ROS installation.
 
     Raises:
-        UserError: the kind or the address is wrong.
-        NotReadyError: there is no ROS, no master or no node.
+        UserError: the kind or the address is invalid.
+        NotReadyError: ROS, the master or all nodes are missing.
     """
     if robot not in {"ros1", "ros2"}:
-        raise UserError(f'"{robot}" cannot be looked at; use ros1 or ros2, on a machine with its ROS')
+        raise UserError(f'"{robot}" cannot be explored; use ros1 or ros2, on a machine with its ROS')
     if robot == "ros1":
         environment = {"ROS_MASTER_URI": ros1.master_uri(address)}
     else:
-        environment, python = {"ROS_DOMAIN_ID": ros2.domain_of(address)}, ros2.python_of(python)
+        environment, python = {"ROS_DOMAIN_ID": ros2.domain_of(address)}, ros2.choose_python(python)
     worker = RosWorker(python, "discovery_worker.py", {"robot": robot}, environment)
     worker.leave()
     if not worker.about["offers"]:
@@ -84,22 +94,19 @@ def offers_of(robot: str, address: str, python: Path) -> list[str]:
     return [" ".join(offer) for offer in worker.about["offers"]]
 
 
-def first_connection(robot: str, offers: Iterable[str]) -> str:
-    """The text of a first file for `--connect`; what is not ready, or is not mapped, is in comments.
-
-    Args:
-        robot: ros1 or ros2.
-        offers: as `offers_of` returns them.
-    """
+def draft_connection(robot: str, offers: Iterable[str]) -> str:
+    """Return a draft for `--connect`, from `discover_offers`; incomplete and unmapped offers are comments."""
     by_form = {re.sub("/(action|srv|msg)/", "/", offer): offer for offer in sorted(offers)}
     forms = [
-        form for form in by_form if re.fullmatch(r"\w+ [\w/]+ [\w/]+", form) and not OF_ROS.fullmatch(form)
+        form
+        for form in by_form
+        if re.fullmatch(r"\w+ [\w/]+ [\w/]+", form) and not INTERNAL_OFFERS.fullmatch(form)
     ]
     rest = {by_form[form].partition(" ")[2] for form in forms}
     ready: set[str] = set()
     packages: set[str] = set()
-    lines: list[tuple[bool, str]] = []  # whether each is about a skill
-    for pattern, use, text, first in USES:
+    lines: list[tuple[bool, str]] = []  # each with whether it is about a skill
+    for pattern, use, text, first in MAPPINGS:
         for form in (form for form in forms if re.fullmatch(pattern, form)):
             _, name, kind = by_form[form].split()
             key = use or "_".join(reversed(name.strip("/").lower().split("/")))
@@ -107,12 +114,12 @@ def first_connection(robot: str, offers: Iterable[str]) -> str:
             line = f"{key}: {{{text.replace('TYPE', kind).replace('NAME', name)}}}"
             why = first or "another one" * (key in ready)
             ready |= set() if why else {key}
-            lines.append((key not in ABOUT, f"# {line}  # {why}" if why else line))
+            lines.append((key not in NOT_SKILLS, f"# {line}  # {why}" if why else line))
             rest.discard(f"{name} {kind}")
     if "get_all_rooms" in ready:
         ready.add("places")
-    rare = sorted(packages - {*COMMON}) if robot == "ros2" else []
-    lacks = [what for key, what in EXPECTED.items() if key not in ready]
+    rare = sorted(packages - {*COMMON_PACKAGES}) if robot == "ros2" else []
+    lacks = [what for key, what in EXPECTED_KEYS.items() if key not in ready]
     return "".join(
         f"{line}\n"
         for line in (

@@ -1,4 +1,4 @@
-"""The zones of house rules that no path may enter, as messages for the keepout filter of Nav2."""
+"""Convert forbidden rooms of house rules to messages for the keepout filter of Nav2."""
 
 from __future__ import annotations
 
@@ -11,45 +11,43 @@ from codebotler.core.world import Room, crossings
 from codebotler.rtl import And, EventPattern, Exists, Formula, Not
 from codebotler.simulator.rule_guard import Rule
 
-RESOLUTION = 0.05  # metres
-NOWHERE = ((0.0, 0.0), (RESOLUTION, RESOLUTION))  # what an empty mask covers, which replaces an earlier one
+MASK_RESOLUTION = 0.05  # metres
+EMPTY_MASK = ((0.0, 0.0), (MASK_RESOLUTION, MASK_RESOLUTION))  # an empty mask replaces an earlier mask
 
 
-def keepout(
+def keepout_messages(
     rules: Sequence[Rule], rooms: Sequence[Room], frame: str = "map", topic: str = "/keepout_filter_mask"
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A nav_msgs/OccupancyGrid and a nav2_msgs/CostmapFilterInfo.
+    """Build a nav_msgs/OccupancyGrid for a latched topic, and its nav2_msgs/CostmapFilterInfo.
 
-    Args:
-        rules: the rules in force; those of the form `always: not tr.Exists(inside(...))` count.
-        rooms: the rooms with their footprints.
-        frame: of the footprints.
-        topic: on which the grid will be published, latched.
+    Only rules of the form `always: not tr.Exists(inside(...))` have an effect; `frame` is that of footprints.
     """
-    never = [element for rule in rules if rule.when == "always" for element in _never(rule.formula)]
-    zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in never)]
-    xs, ys = zip(*(corner for zone in zones or [NOWHERE] for corner in zone), strict=True)
-    left, bottom = (math.floor(min(each) / RESOLUTION) * RESOLUTION for each in (xs, ys))
-    width, height = (math.ceil((max(each) - low) / RESOLUTION) for each, low in ((xs, left), (ys, bottom)))
+    patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
+    zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]
+    xs, ys = zip(*(corner for zone in zones or [EMPTY_MASK] for corner in zone), strict=True)
+    left, bottom = (math.floor(min(each) / MASK_RESOLUTION) * MASK_RESOLUTION for each in (xs, ys))
+    width, height = (
+        math.ceil((max(each) - low) / MASK_RESOLUTION) for each, low in ((xs, left), (ys, bottom))
+    )
     cells = [0] * (width * height)
     for row in range(height):
         for zone in zones:
-            edges = crossings(bottom + (row + 0.5) * RESOLUTION, zone)
-            columns = [round((edge - left) / RESOLUTION) for edge in edges]
+            edges = crossings(bottom + (row + 0.5) * MASK_RESOLUTION, zone)
+            columns = [round((edge - left) / MASK_RESOLUTION) for edge in edges]
             for first, end in zip(columns[::2], columns[1::2], strict=True):
                 cells[row * width + first : row * width + end] = [100] * (end - first)
     origin = {"position": {"x": left, "y": bottom, "z": 0.0}, "orientation": {"w": 1.0}}
-    info = {"resolution": RESOLUTION, "width": width, "height": height, "origin": origin}
+    info = {"resolution": MASK_RESOLUTION, "width": width, "height": height, "origin": origin}
     header = {"frame_id": frame}
     about = {"header": header, "type": 0, "filter_mask_topic": topic, "base": 0.0, "multiplier": 1.0}
     return {"header": header, "info": info, "data": cells}, about
 
 
-def _never(formula: Formula) -> Iterator[EventPattern]:
-    """The elements of `inside` that a formula forbids at any time, whatever the robot holds."""
+def _forbidden(formula: Formula) -> Iterator[EventPattern]:
+    """Yield the `inside` patterns that a formula forbids at all times, whatever the robot holds."""
     match formula:
         case And(parts):
             for part in parts:
-                yield from _never(part)
+                yield from _forbidden(part)
         case Not(Exists(element, ())) if element == EventPattern(INSIDE, element.text):
             yield element

@@ -1,4 +1,4 @@
-"""What robots on ROS have in common: a worker that sends goals to one action server per skill."""
+"""Robots on ROS: a worker sends goals to one action server per skill."""
 
 from __future__ import annotations
 
@@ -12,41 +12,36 @@ from pathlib import Path
 from codebotler.core.errors import RobotError
 from codebotler.robots.base import (
     ROS_PYTHON,
-    Argument,
+    STOP_BY_HAND,
+    CameraPicture,
     CancelledError,
     Feedback,
     NotReadyError,
     Options,
-    Picture,
     Readiness,
-    Result,
+    RobotArgument,
     RobotLostError,
-    no_feedback,
+    RobotResult,
+    ignore_feedback,
 )
 from codebotler.robots.clock import Clock
-from codebotler.robots.reservation import file_of
-from codebotler.robots.ros.connection import Connection, SkillCall, Values, connection_of
-from codebotler.robots.ros.worker import Message, RosWorker, lacks
+from codebotler.robots.reservation import robot_file
+from codebotler.robots.ros.connection import Connection, SkillCall, Values, default_connection
+from codebotler.robots.ros.worker import RosWorker, WorkerMessage, find_missing
 
-OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
-UNCANCELLED = "its goals could not be cancelled: STOP THE ROBOT BY HAND"
-CANCELS = 1.0  # seconds within which the worker must have passed on a cancel
+USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
+NOT_CANCELLED = f"its goals could not be cancelled: {STOP_BY_HAND}"
+CANCEL_SECONDS = 1.0  # for the worker to send a cancel
 NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Waits:
-    """Time limits, in seconds above 0.
+class Timeouts:
+    """Time limits, in seconds above 0."""
 
-    Args:
-        patience: for an action server to appear, accept a goal, confirm a stop, or send a result.
-        silence: between two statuses of a server; after that it counts as dead.
-        longest: for a skill to end.
-    """
-
-    patience: float = 5.0
-    silence: float = 3.0
-    longest: float = 600.0
+    patience: float = 5.0  # for a server to appear, accept a goal, confirm a stop, or send a result
+    silence: float = 3.0  # between two statuses of a server; after that it counts as dead
+    longest: float = 600.0  # for a skill
 
 
 class RosRobot:
@@ -54,12 +49,12 @@ class RosRobot:
 
     Args:
         name: the kind of robot.
-        address: of the robot.
-        script: what the worker runs, a file of `workers/` or a path.
-        options: a user's; a speed other than 1 is for a virtual robot with that speed.
+        address: the robot's address.
+        script: the worker's script, a file of `workers/` or a path.
+        options: the user's options; a speed other than 1 is for a virtual robot with that speed.
         environment: variables for the worker.
         waits: time limits.
-        node: the worker's name on the graph, which only one node can have.
+        node: the worker's unique name on the graph.
     """
 
     if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
@@ -73,28 +68,32 @@ class RosRobot:
         options: Options,
         environment: Mapping[str, str],
         *,
-        waits: Waits | None = None,
+        waits: Timeouts | None = None,
         node: str = "codebotler",
     ) -> None:
-        self.connection = options.connection or connection_of(options.skills)
+        self.connection = options.connection or default_connection(options.skills)
         self.name, self.address = name, address
         self.skills = options.skills if options.connection is None else self.connection.skills(options.skills)
         self.clock = Clock(options.speed)
         self.missing: Mapping[str, str] = {}
         self._script, self._python, self._environment = script, options.ros_python, environment
         self._node = node
-        self._waits = waits or Waits()
+        self._waits = waits or Timeouts()
         self._worker: RosWorker | None = None
-        self._in_doubt = False  # whether an unwatched goal may still be going on
+        self._in_doubt = False  # whether a goal may run unobserved
         self._stopped, self._number = True, 0
-        self._order = threading.Lock()  # what was asked for before a stop is sent before it
+        self._send_lock = threading.Lock()  # requests before a stop are sent before it
         self._rescue_lock = threading.RLock()
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Set further attributes of a subclass."""
 
     def connect(self) -> None:
         """Start a worker, wait for the action servers, and set the clock to 0.
 
         Raises:
-            NotReadyError: there is no ROS, master or action server, or another tool uses the robot.
+            NotReadyError: ROS, the master or all servers are missing, or another tool uses the robot.
         """
         self.disconnect()
         worker = self._start(cancel_all=self._in_doubt)
@@ -105,49 +104,51 @@ class RosRobot:
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
         """Send a goal and wait for its end.
 
         Raises:
-            RobotError: the server rejects or aborts it.
-            CancelledError: it was cancelled, by us or by another client.
+            RobotError: the server rejected or aborted the goal.
+            CancelledError: this or another client cancelled the goal.
             RobotLostError: the server or the worker died, or does not answer.
         """
         names = (parameter.name for parameter in self.skills[skill].parameters)
-        return self._called(skill, dict(zip(names, arguments, strict=True)), feedback)
+        return self._call(skill, dict(zip(names, arguments, strict=True)), feedback)
 
-    def _called(self, skill: str, values: Values, feedback: Feedback) -> Result:
-        """Perform a skill by its call, with values for the variables of that."""
+    def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
+        """Perform a skill by its call, with values for the call's variables."""
         call = self.connection.calls.get(skill)
         if call is None:
             raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
-        order = {"do": "perform", "skill": skill, "fields": call.fields(values)}
-        result: Result = call.answer(self._received(call, order, feedback))
+        request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
+        result: RobotResult = call.answer(self._request(call, request, feedback))
         return result
 
-    def _received(self, call: SkillCall, order: Message, feedback: Feedback) -> Values:
-        """Send an order to perform a call, and return what the robot answers."""
-        message = self._awaited(order, feedback)
+    def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
+        """Send a request to the worker, and return the robot's answer."""
+        message = self._await_end(request, feedback)
         match message:
             case {"is": "result", "values": dict(values)}:
                 return values
             case {"is": "error", "text": str(text), "state": str(state)}:
-                raise error_of(call, text or call.why(message.get("values", {})), state)
+                raise to_robot_error(call, text or call.why(message.get("values", {})), state)
             case {"is": "cancelled"}:
                 raise CancelledError
         self._in_doubt = self._in_doubt or message["is"] == "lost"
         raise RobotLostError(message["text"])
 
-    def _awaited(self, order: Message, feedback: Feedback) -> Message:
-        """Send an order, and return the worker's last message about it."""
-        worker, number = self._sent(order)
+    def _await_end(self, request: WorkerMessage, feedback: Feedback) -> WorkerMessage:
+        """Send a request, and return the worker's last message about it."""
+        worker, number = self._send(request)
         at = ""
         while True:
             match worker.receive(self._waits.patience * 2):
                 case None:
                     raise RobotLostError(f"the worker of {self.name} does not answer; {self._rescue(worker)}")
                 case {"is": "ended"}:
-                    how = worker.how_it_ended()
+                    how = worker.describe_end()
                     raise RobotLostError(
                         f"the worker of {self.name} has died ({how}); {self._rescue(worker)}"
                     )
@@ -157,7 +158,7 @@ class RosRobot:
                 case {"id": int(goal), "is": "feedback", "text": str(text)} if goal == number:
                     feedback(text)
                 case {"id": int(goal), "is": "picture", "data": str(data)} if goal == number:
-                    feedback(Picture(base64.b64decode(data)))
+                    feedback(CameraPicture(base64.b64decode(data)))
                 case {"is": "pose", "x": float(x), "y": float(y)}:
                     before, at = at, f"at ({x:z.2f}, {y:z.2f})"
                     if at != before:
@@ -165,33 +166,33 @@ class RosRobot:
                 case {"id": int(goal)} as message if goal == number:
                     return message
 
-    def _sent(self, order: Message) -> tuple[RosWorker, int]:
-        """Send an order, unless the robot was stopped; to which worker, and its number."""
-        with self._order:
+    def _send(self, request: WorkerMessage) -> tuple[RosWorker, int]:
+        """Send a request unless the robot was stopped; return the worker and the request's number."""
+        with self._send_lock:
             if self._stopped:
                 raise CancelledError
             assert self._worker is not None, "the robot is not connected"
             self._number += 1
-            self._worker.send({**order, "id": self._number})
+            self._worker.send({**request, "id": self._number})
             return self._worker, self._number
 
     def cancel(self) -> None:
-        """Have the worker cancel the goal; if it hangs, have another one cancel all goals."""
-        has_order = self._order.acquire(timeout=CANCELS)  # a worker that hangs may not even read a long goal
+        """Have the worker cancel the goal; if it hangs, have a new worker cancel all goals."""
+        has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a worker that hangs can block a sender
         try:
             self._stopped = True
             worker = self._worker
             self.clock.stop()
-            if worker is None or (has_order and worker.cancel(CANCELS)):
+            if worker is None or (has_lock and worker.cancel(CANCEL_SECONDS)):
                 return
         finally:
-            if has_order:
-                self._order.release()
+            if has_lock:
+                self._send_lock.release()
         self._rescue(worker)
 
     def disconnect(self) -> None:
-        """Have the worker cancel what goes on, and end it."""
-        with self._order:
+        """Have the worker cancel the goal, and end the worker."""
+        with self._send_lock:
             self._stopped = True
             worker, self._worker = self._worker, None
         self.clock.stop()
@@ -199,35 +200,34 @@ class RosRobot:
             self._in_doubt = True
 
     def _start(self, *, cancel_all: bool) -> RosWorker:
-        here = self.connection
-        start: Message = {
+        start: WorkerMessage = {
             "address": self.address,
             "node": self._node,
-            "calls": calls_data(here),
-            "packages": here.packages,
-            "pose": here.pose and vars(here.pose),
-            "velocity": here.velocity and vars(here.velocity),
-            "keepout": here.keepout or [],
+            "calls": calls_data(self.connection),
+            "packages": self.connection.packages,
+            "pose": self.connection.pose and vars(self.connection.pose),
+            "velocity": self.connection.velocity and vars(self.connection.velocity),
+            "keepout": self.connection.keepout or [],
             "cancel_all": cancel_all,
-            "sign": str(file_of(self.name, self.address, f"{self._node}.goal")),
+            "sign": str(robot_file(self.name, self.address, f"{self._node}.goal")),
             **vars(self._waits),
         }
         return RosWorker(self._python, self._script, start, self._environment)
 
     def _rescue(self, worker: RosWorker) -> str:
-        """Replace a lost worker by one that cancels all goals; the outcome as a clause."""
+        """Replace a lost worker by one that cancels all goals; return the outcome as a clause."""
         with self._rescue_lock:
             if self._worker is not worker:
-                return UNCANCELLED if self._in_doubt else "all goals were cancelled"
+                return NOT_CANCELLED if self._in_doubt else "all goals were cancelled"
             worker.kill()
             self._worker, self._in_doubt = None, True
             try:
                 other = self._start(cancel_all=True)
             except NotReadyError as error:
-                return f"its goals could not be cancelled ({error.sentence}): STOP THE ROBOT BY HAND"
+                return f"its goals could not be cancelled ({error.sentence}): {STOP_BY_HAND}"
             other.leave()
             if not other.about["cancelled_all"]:
-                return UNCANCELLED
+                return NOT_CANCELLED
             self._in_doubt = False
             return "another worker has cancelled all goals"
 
@@ -235,28 +235,30 @@ class RosRobot:
 def ros_readiness(
     name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
 ) -> Readiness:
-    """Whether an interpreter has the modules that a worker needs; `mend` names what installs the missing."""
-    missing = lacks(python, needs)
+    """Return whether an interpreter has the modules of a worker; `mend` finds the command to install them."""
+    missing = find_missing(python, needs)
     if missing is None:
-        return Readiness(name, works=False, missing=f"{python} cannot be run", mend=OTHER_PYTHON, note=note)
+        return Readiness(
+            name, works=False, missing=f"{python} cannot be run", mend=USE_OTHER_PYTHON, note=note
+        )
     if missing:
         lacking = f"{python} lacks {', '.join(missing)}"
         return Readiness(name, works=False, missing=lacking, mend=mend(missing), note=note)
     return Readiness(name, works=True, note=note)
 
 
-def calls_data(connection: Connection) -> Message:
-    """What a worker must know of the calls of a connection, by skill."""
+def calls_data(connection: Connection) -> WorkerMessage:
+    """Return a connection's calls as data for a worker, by skill."""
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()
     }
 
 
-def error_of(call: SkillCall, text: str, state: str) -> RobotError:
-    """The error of a goal that was rejected or aborted (`state`), in the server's words.
+def to_robot_error(call: SkillCall, text: str, state: str) -> RobotError:
+    """Convert a failed goal (`state` is rejected or aborted) to an error with the server's message.
 
-    They may begin with the kind, as in `PickInvalidObject: there is no mug`.
+    The message may begin with the kind of error, such as `PickInvalidObject: there is no mug`.
     """
     named = NAMED_ERROR.fullmatch(text)
     if named is not None:

@@ -1,4 +1,4 @@
-"""A robot on ROS 2: rclpy, in a worker of the robot's own Python, or of ours if that has rclpy."""
+"""A robot on ROS 2; its worker uses rclpy in the robot's Python, or in ours."""
 
 from __future__ import annotations
 
@@ -12,47 +12,43 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
 from codebotler.robots.ros.classes import class_for
-from codebotler.robots.ros.robot import RosRobot, Waits, ros_readiness
-from codebotler.robots.ros.worker import lacks
+from codebotler.robots.ros.robot import RosRobot, Timeouts, ros_readiness
+from codebotler.robots.ros.worker import find_missing
 
-NEEDS = ("rclpy", "action_msgs", "sensor_msgs")
-INSTALL = "pip install 'codebotler[ros2]'"
+ROS2_MODULES = ("rclpy", "action_msgs", "sensor_msgs")
+INSTALL_ROS2 = "pip install 'codebotler[ros2]'"
 
 
-def robot(options: Options, waits: Waits | None = None) -> RosRobot:
-    """A robot on ROS 2; its address is a domain, by default that of ROS_DOMAIN_ID, or 0."""
+def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
+    """Open a robot on ROS 2; its address is a domain, by default that of ROS_DOMAIN_ID, or 0."""
     domain = domain_of(options.address)
-    options = replace(options, ros_python=python_of(options.ros_python))
+    options = replace(options, ros_python=choose_python(options.ros_python))
     variables = {"ROS_DOMAIN_ID": domain}
     return class_for(options)("ros2", domain, "ros2_worker.py", options, variables, waits=waits)
 
 
 def domain_of(address: str = "") -> str:
-    """The number of a domain: the given one, that of ROS_DOMAIN_ID, or 0.
-
-    Raises:
-        UserError: it is no number.
-    """
+    """Return the given domain, that of ROS_DOMAIN_ID, or 0; UserError if it is no number."""
     domain = address or os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal():
         raise UserError(f'"{domain}" is not a ROS_DOMAIN_ID; write a number such as 0')
     return domain
 
 
-def python_of(named: Path = ROS_PYTHON) -> Path:
-    """The interpreter that is named; by default the system's, if ROS 2 is sourced there, or else ours."""
+def choose_python(named: Path = ROS_PYTHON) -> Path:
+    """Choose the given interpreter; by default the system's if ROS 2 is sourced there, or else ours."""
     if named != ROS_PYTHON or find_spec("rclpy") is None:
         return named
-    return named if lacks(named, NEEDS) == [] else Path(sys.executable)
+    return named if find_missing(named, ROS2_MODULES) == [] else Path(sys.executable)
 
 
 def readiness(python: Path = ROS_PYTHON) -> Readiness:
-    """Whether the interpreter has rclpy; actions are built where they are missing."""
-    python = python_of(python)
-    return ros_readiness("ros2", python, NEEDS, mend_of, f"with {python}; see ROS_DOMAIN_ID")
+    """Return whether the interpreter has rclpy; missing actions are built later."""
+    python = choose_python(python)
+    return ros_readiness("ros2", python, ROS2_MODULES, find_fix, f"with {python}; see ROS_DOMAIN_ID")
 
 
-def mend_of(_missing: Sequence[str], installed: Path = Path("/opt/ros")) -> str:
-    """The command that gives an interpreter its missing modules of ROS 2."""
+def find_fix(_missing: Sequence[str], installed: Path = Path("/opt/ros")) -> str:
+    """Return the command that provides the missing modules of ROS 2."""
     setups = sorted(path for path in installed.glob("*/setup.bash") if (path.parent / "share/rclpy").is_dir())
-    return f"source {setups[-1]}" if setups else INSTALL
+    return f"source {setups[-1]}" if setups else INSTALL_ROS2

@@ -1,4 +1,4 @@
-"""A robot behind a rosbridge: ROS over a websocket, with nothing of ROS on this machine."""
+"""A robot behind a rosbridge: ROS over a websocket, without ROS on this machine."""
 
 from __future__ import annotations
 
@@ -9,22 +9,24 @@ from pathlib import Path
 
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
 from codebotler.robots.ros.classes import class_for
-from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.robot import RosRobot, Timeouts
 
-ADDRESS = "ws://localhost:9090"
-NOTE = "robots of ROS 2 behind it were tested against a stand-in for the protocol only"
+ROSBRIDGE_ADDRESS = "ws://localhost:9090"
+ROSBRIDGE_NOTE = "with ROS 2, tested only against a simulated rosbridge"
 
 
-def robot(options: Options, waits: Waits | None = None) -> RosRobot:
-    """A robot behind a rosbridge, by default one on this machine; its worker runs under our own Python."""
+def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
+    """Open a robot behind a rosbridge, by default on this machine; the worker uses our Python."""
     readiness()
-    ours = replace(options, ros_python=Path(sys.executable))
-    address = options.address or ADDRESS
-    return class_for(options)("rosbridge", address, "rosbridge_worker.py", ours, {}, waits=waits)
+    options = replace(options, ros_python=Path(sys.executable))
+    address = options.address or ROSBRIDGE_ADDRESS
+    return class_for(options)("rosbridge", address, "rosbridge_worker.py", options, {}, waits=waits)
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """It needs websockets, which would else be missed by its worker only."""
+    """Return that it works; check for websockets here, before the worker fails without it."""
     if find_spec("websockets") is None:
         raise ModuleNotFoundError("websockets is not installed", name="websockets")
-    return Readiness("rosbridge", works=True, note=f"at --address, {ADDRESS} by default; {NOTE}")
+    return Readiness(
+        "rosbridge", works=True, note=f"at --address, {ROSBRIDGE_ADDRESS} by default; {ROSBRIDGE_NOTE}"
+    )

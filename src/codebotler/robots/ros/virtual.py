@@ -1,4 +1,4 @@
-"""The virtual robot: a simulated one that offers its skills on a real ROS graph."""
+"""The virtual robot: a simulated robot that offers its skills on a real ROS graph."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import World
-from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
-from codebotler.robots.ros.connection import connection_of
+from codebotler.robots.base import ROS_PYTHON, CancelledError, RobotArgument, RobotLostError
+from codebotler.robots.ros.connection import default_connection
 from codebotler.robots.ros.robot import calls_data
 from codebotler.robots.ros.ros1 import master_uri
-from codebotler.robots.ros.ros2 import domain_of, python_of
-from codebotler.robots.ros.worker import Message, RosWorker
+from codebotler.robots.ros.ros2 import choose_python, domain_of
+from codebotler.robots.ros.worker import RosWorker, WorkerMessage
 from codebotler.robots.simulated import Simulated
 
-NODE = "virtual_robot"
-HERE = ("localhost", "127.0.0.1")
-HEARS = 3600.0  # seconds of one wait for messages
+VIRTUAL_NODE = "virtual_robot"
+LOOPBACK_HOSTS = ("localhost", "127.0.0.1")
+LISTEN_SECONDS = 3600.0  # per wait for a message
 
 
 class VirtualRobot:
-    """A robot with one body: goals are executed one after the other.
+    """Executes goals one after the other.
 
-    On ROS 1, it starts a master that is reached from this machine only if none answers; on ROS 2, it is
-    reached from this machine only unless ROS_AUTOMATIC_DISCOVERY_RANGE is set.
+    On ROS 1, it starts a master for this machine if none answers. On ROS 2, only this machine can reach it,
+    unless ROS_AUTOMATIC_DISCOVERY_RANGE is set.
 
     Args:
-        world: where it is.
+        world: its world.
         speed: seconds of its clock per real second; None if nothing takes real time.
         ros: 1 or 2.
-        port: of the master of ROS 1; None for that of ROS_MASTER_URI.
-        python: an interpreter that has rclpy, or rospy, and rosmaster if a master must be started.
+        port: the port of the ROS 1 master; None for that of ROS_MASTER_URI.
+        python: an interpreter with rclpy, or with rospy, and rosmaster if a master must be started.
         show: called with a line for each goal and for its end.
-        skills: what it offers.
+        skills: the skills that it offers.
 
     Raises:
         UserError: the speed is out of range, or ROS_MASTER_URI or ROS_DOMAIN_ID is invalid.
@@ -56,15 +56,15 @@ class VirtualRobot:
         show: Callable[[str], None] = lambda _: None,
         skills: SkillTable = SKILLS,
     ) -> None:
-        self._skills = skills
-        self._speed, self._python, self._show = speed, python, show
+        self._python, self._show = python, show
         if ros == 1:
             self.address = master_uri(f"http://localhost:{port}" if port else "")
         else:
-            self.address, self._python = domain_of(), python_of(python)
+            self.address, self._python = domain_of(), choose_python(python)
         self._ros = ros
-        self._body = self._at_start(world)
-        self._goals: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
+        self._body = Simulated(world, speed=speed, skills=skills)
+        self._body.connect()
+        self._goals: queue.SimpleQueue[WorkerMessage | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._current = ""
         self._cancelled: set[str] = set()
@@ -73,11 +73,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills; whether a master was started for that.
-
-        Raises:
-            NotReadyError: there is no ROS, or no master and none can be started.
-        """
+        """Offer the skills; return whether this has started a master; NotReadyError if there can be none."""
         worker = self._worker = self._ros1_servers() if self._ros == 1 else self._ros2_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
@@ -87,47 +83,42 @@ class VirtualRobot:
         return bool(worker.about["has_master"])
 
     def wait(self) -> None:
-        """Serve for ever.
-
-        Raises:
-            RobotLostError: the worker died.
-        """
+        """Serve until the worker dies; then raise RobotLostError."""
         self._ended.wait()
-        assert self._worker is not None, "it was not started"
-        raise RobotLostError(f"the worker of the virtual robot has died ({self._worker.how_it_ended()})")
+        assert self._worker is not None, "the caller has started it"
+        raise RobotLostError(f"the worker of the virtual robot has died ({self._worker.describe_end()})")
 
     def stop(self) -> None:
-        """End what goes on, and leave the graph."""
+        """End the current skill, and leave the graph."""
         self._body.cancel()
         if self._worker is not None:
             self._worker.leave()
         for thread in self._threads:
-            thread.join(HEARS)
+            thread.join(LISTEN_SECONDS)
 
     def _ros1_servers(self) -> RosWorker:
         where = urlsplit(self.address)
-        port = where.port if where.hostname in HERE else None
+        port = where.port if where.hostname in LOOPBACK_HOSTS else None
         environment = {"ROS_MASTER_URI": self.address}
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
-        start = {"node": NODE, "actions": calls_data(connection_of(self._body.skills)), "port": port}
+        start = {
+            "node": VIRTUAL_NODE,
+            "actions": calls_data(default_connection(self._body.skills)),
+            "port": port,
+        }
         return RosWorker(self._python, "servers.py", start, environment)
 
     def _ros2_servers(self) -> RosWorker:
         environment = {"ROS_DOMAIN_ID": self.address}
         if "ROS_AUTOMATIC_DISCOVERY_RANGE" not in os.environ:
             environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        start = {"node": NODE, "actions": calls_data(connection_of(self._body.skills))}
+        start = {"node": VIRTUAL_NODE, "actions": calls_data(default_connection(self._body.skills))}
         return RosWorker(self._python, "ros2_servers.py", start, environment)
-
-    def _at_start(self, world: World) -> Simulated:
-        body = Simulated(world, speed=self._speed, skills=self._skills)
-        body.connect()
-        return body
 
     def _listen(self, worker: RosWorker) -> None:
         while True:
-            match worker.receive(HEARS):
+            match worker.receive(LISTEN_SECONDS):
                 case {"is": "goal"} as goal:
                     self._goals.put(goal)
                 case {"is": "cancel", "id": str(number)}:
@@ -160,7 +151,7 @@ class VirtualRobot:
             self._show("  " + " ".join(str(part) for part in ending.values()))
             worker.send({**ending, "id": number})
 
-    def _ending(self, skill: str, arguments: Sequence[Argument]) -> Message:
+    def _ending(self, skill: str, arguments: Sequence[RobotArgument]) -> WorkerMessage:
         try:
             return {"do": "succeed", "value": self._body.perform(skill, arguments)}
         except RobotError as error:

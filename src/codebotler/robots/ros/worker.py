@@ -1,4 +1,4 @@
-"""CodeBotler's handle on a worker process under the robot's Python; they exchange lines of JSON."""
+"""Control a worker process that runs under the robot's Python; both exchange lines of JSON."""
 
 from __future__ import annotations
 
@@ -21,44 +21,45 @@ from codebotler.core.terminal import note
 from codebotler.robots.base import NotReadyError
 from codebotler.robots.ros.motion import Motion
 
-Message: TypeAlias = dict[str, Any]
+WorkerMessage: TypeAlias = dict[str, Any]
 
-FROM_WHEELS = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"  # set where ROS from wheels has started Python once more
-WORKERS = Path(__file__).with_name("workers")
-READY = 30.0  # seconds within which it must report that it is ready
-BUILDS = 600.0  # seconds for that, if it says what it does meanwhile
-LEAVES = 4.0  # seconds that it may take to end by itself
-BEAT = 0.1  # seconds between two signs of life of this process, without which it stops the robot
-MOTIONS = ("pose", "velocity")
-LAST_LINES = 5  # of its error output, kept for error messages
+WHEELS_MARK = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"  # ROS from wheels sets it when it restarts Python
+WORKERS_FOLDER = Path(__file__).with_name("workers")
+READY_SECONDS = 30.0
+BUILD_SECONDS = 600.0  # to become ready, while it reports progress
+EXIT_SECONDS = 4.0  # to exit by itself
+HEARTBEAT_SECONDS = 0.1  # the worker stops the robot without them
+MOTION_MESSAGES = ("pose", "velocity")
+ERROR_LINES = 5  # of error output, kept for messages
 
 
 class RosWorker:
-    """A process that runs one of our scripts; when it has ended, `{"is": "ended"}` is received.
+    """A process that runs a script of `workers/`; its last message is `{"is": "ended"}`.
 
-    It has a session of its own, so that Ctrl-C does not reach it before the robot was told to stop. It
-    cancels the goal if this process gives no sign of life: a process that is suspended, or in which a long
-    call lets no other thread run, hears neither Ctrl-C nor a request to stop.
+    It runs in its own session, so that Ctrl-C does not reach it before the robot has stopped. It cancels the
+    goal when this process sends no heartbeat, since a suspended process reacts to neither Ctrl-C nor a stop.
 
     Args:
         python: the interpreter.
         script: a file of `workers/`, or a path.
-        start: the first message it receives.
-        environment: variables beyond those of this process.
+        start: the first message to the worker.
+        environment: variables in addition to those of this process.
 
     Raises:
-        NotReadyError: it cannot be started, or reports that it cannot work.
+        NotReadyError: the worker does not start, or reports that it cannot work.
     """
 
-    def __init__(self, python: Path, script: str, start: Message, environment: Mapping[str, str]) -> None:
-        self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
+    def __init__(
+        self, python: Path, script: str, start: WorkerMessage, environment: Mapping[str, str]
+    ) -> None:
+        self._messages: queue.SimpleQueue[WorkerMessage] = queue.SimpleQueue()
         self.motion = Motion()
-        self._printed: deque[str] = deque(maxlen=LAST_LINES)
+        self._printed: deque[str] = deque(maxlen=ERROR_LINES)
         self._writing = threading.Lock()
         self._cancel_sent, self._leaves = threading.Event(), threading.Event()
         try:
-            self._process = subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that the user names
-                [executable(python), str(WORKERS / script)],
+            self._process = subprocess.Popen(  # noqa: S603 - our own script, run by the interpreter that the user names
+                [executable(python), str(WORKERS_FOLDER / script)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
@@ -74,39 +75,39 @@ class RosWorker:
             ) from None
         pipes = (self._process.stdin, self._process.stdout, self._process.stderr)
         self._stdin, self._stdout, self._stderr = cast("tuple[IO[str], IO[str], IO[str]]", pipes)
-        jobs = (self._listen, self._keep, self._beat)
+        jobs = (self._listen, self._keep_errors, self._send_heartbeats)
         self._threads = [threading.Thread(target=job, daemon=True) for job in jobs]
         for thread in self._threads:
             thread.start()
         self.send(start)
-        self.about = self._ready(python)
+        self.about = self._wait_until_ready(python)
 
-    def send(self, message: Message) -> None:
-        """Send a message; if the process has died, that is received."""
+    def send(self, message: WorkerMessage) -> None:
+        """Send a message; a dead process shows in the next `receive`."""
         with self._writing, suppress(OSError, ValueError):
             self._stdin.write(json.dumps(message) + "\n")
             self._stdin.flush()
 
-    def receive(self, seconds: float) -> Message | None:
-        """Its next message; None if none comes for so many seconds."""
+    def receive(self, seconds: float) -> WorkerMessage | None:
+        """Return the next message; None if none comes within `seconds`."""
         try:
             return self._messages.get(timeout=seconds)
         except queue.Empty:
             return None
 
     def cancel(self, seconds: float) -> bool:
-        """Have it cancel what goes on; False if it did not pass that on within so many seconds."""
+        """Have the worker cancel the goal; return whether it sent the cancel within `seconds`."""
         self._cancel_sent.clear()
         self.send({"do": "cancel"})
         return self._cancel_sent.wait(seconds)
 
     def leave(self) -> bool:
-        """End it by closing its input, or by force; False if it had to be killed, or failed."""
+        """End the worker by closing its input; return False if it failed or had to be killed."""
         self._leaves.set()
         with self._writing, suppress(OSError):
             self._stdin.close()
         try:
-            self._process.wait(LEAVES)
+            self._process.wait(EXIT_SECONDS)
         except subprocess.TimeoutExpired:
             self.kill()
             return False
@@ -114,37 +115,37 @@ class RosWorker:
         return self._process.returncode == 0
 
     def kill(self) -> None:
-        """End it and all its children at once."""
+        """Kill the worker and all its children."""
         self._leaves.set()
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
         self._close()
 
-    def how_it_ended(self) -> str:
-        """Its exit status or signal, and the last line it printed."""
-        self._process.wait(LEAVES)
+    def describe_end(self) -> str:
+        """Return the exit status or signal, and the last line of output."""
+        self._process.wait(EXIT_SECONDS)
         status = self._process.returncode
         how = f"signal {-status}" if status < 0 else f"status {status}"
         return f"{how}: {self._printed[-1]}" if self._printed else how
 
-    def _ready(self, python: Path) -> Message:
-        until = time.monotonic() + READY
-        while (message := self.receive(max(0.0, until - time.monotonic()))) is not None:
+    def _wait_until_ready(self, python: Path) -> WorkerMessage:
+        deadline = time.monotonic() + READY_SECONDS
+        while (message := self.receive(max(0.0, deadline - time.monotonic()))) is not None:
             match message:
                 case {"is": "ready"}:
                     return message
                 case {"is": "progress", "text": str(text)}:
                     note(text)
-                    until = time.monotonic() + BUILDS
+                    deadline = time.monotonic() + BUILD_SECONDS
                 case {"is": "not-ready", "text": str(text)}:
                     self.leave()
                     raise NotReadyError(text)
                 case {"is": "ended"}:
                     self.kill()
-                    raise NotReadyError(f"the worker of {python} ended at once ({self.how_it_ended()})")
+                    raise NotReadyError(f"the worker of {python} ended at once ({self.describe_end()})")
         self.kill()
-        raise NotReadyError(f"the worker of {python} was not ready within {READY:g} s")
+        raise NotReadyError(f"the worker of {python} was not ready within {READY_SECONDS:g} s")
 
     def _listen(self) -> None:
         for line in self._stdout:
@@ -156,53 +157,55 @@ class RosWorker:
             if message["is"] == "cancel-sent":
                 self._cancel_sent.set()
                 continue
-            if message["is"] in MOTIONS:
-                self.motion.take(message)
-            if message["is"] not in {"alive", *MOTIONS} or self._messages.empty():  # one sign is enough
+            if message["is"] in MOTION_MESSAGES:
+                self.motion.record(message)
+            if (
+                message["is"] not in {"alive", *MOTION_MESSAGES} or self._messages.empty()
+            ):  # do not pile up signs of life
                 self._messages.put(message)
         self._messages.put({"is": "ended"})
 
-    def _beat(self) -> None:
-        while not self._leaves.wait(BEAT):
-            with suppress(OSError, ValueError):  # a worker that hangs must not make this thread hang as well
+    def _send_heartbeats(self) -> None:
+        while not self._leaves.wait(HEARTBEAT_SECONDS):
+            with suppress(OSError, ValueError):  # writing to a worker that hangs would block this thread
                 if select.select([], [self._stdin], [], 0)[1]:
                     self.send({"do": "alive"})
 
-    def _keep(self) -> None:
+    def _keep_errors(self) -> None:
         self._printed.extend(line.strip() for line in self._stderr if line.strip())
 
     def _close(self) -> None:
         for thread in self._threads:
-            thread.join(LEAVES)
+            thread.join(EXIT_SECONDS)
         for pipe in (self._stdin, self._stdout, self._stderr):
-            with suppress(OSError):  # of what was not yet written
+            with suppress(OSError):  # flushing may fail
                 pipe.close()
 
 
 def executable(python: Path) -> str:
-    """An interpreter as a command; a name without a folder is looked for here first, then in PATH."""
+    """Return an interpreter as a command; look for a bare name in this folder first, then in PATH."""
     return str(python.absolute() if python.exists() else python)
 
 
 def outer_environment() -> dict[str, str]:
-    """The environment without what ROS from wheels has set for this interpreter alone."""
+    """Return the environment without the variables that ROS from wheels sets for this interpreter alone."""
     environment = dict(os.environ)
-    if environment.pop(FROM_WHEELS, None) is not None:
+    if environment.pop(WHEELS_MARK, None) is not None:
         folders = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
         others = [folder for folder in folders if folder and not Path(folder).is_relative_to(sys.prefix)]
         environment["LD_LIBRARY_PATH"] = os.pathsep.join(others)
     return environment
 
 
-def lacks(python: Path, modules: Sequence[str]) -> list[str] | None:
-    """Which modules an interpreter lacks; None if it cannot be run. Nothing is imported."""
+def find_missing(python: Path, modules: Sequence[str]) -> list[str] | None:
+    """Return the modules that an interpreter lacks, without importing any; None if it does not run."""
     code = "import sys, importlib.util as u; print(*(m for m in sys.argv[1:] if u.find_spec(m) is None))"
     try:
         done = subprocess.run(  # noqa: S603 - the interpreter that the user names
             [executable(python), "-c", code, *modules],
             capture_output=True,
             text=True,
-            timeout=READY,
+            timeout=READY_SECONDS,
             check=True,
             env=outer_environment(),
         )

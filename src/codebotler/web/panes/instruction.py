@@ -15,14 +15,14 @@ from codebotler.missions.preflight import known_instructions
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView
 from codebotler.models.recorded import is_recorded
-from codebotler.models.usable import SETUP
+from codebotler.models.usable import MODEL_HINT
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
 
 UNKNOWN = "There is no recorded program for this instruction."
 NO_MODEL = (
-    f"For other instructions, {SETUP}, and add --model NAME to codebotler serve; "
+    f"For other instructions, {MODEL_HINT}, and add --model NAME to codebotler serve; "
     "codebotler models lists the names."
 )
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400

@@ -137,9 +137,9 @@ class ProgramPane:
         self._despite.set_visibility(open_ and bool(view.problems) and view.can_run)
         if not view.problems:
             self._despite.value = False
-        may_listen = view.waits_for_program and none is not None and none.may_listen
-        self._repair.text = "Ask for the program only" if may_listen else "Repair"
-        self._repair.set_visibility(may_again and (bool(view.problems) or may_listen))
+        can_repair = view.waits_for_program and none is not None and none.can_repair
+        self._repair.text = "Ask for the program only" if can_repair else "Repair"
+        self._repair.set_visibility(may_again and (bool(view.problems) or can_repair))
         self._again_button.set_visibility(may_again)
         higher = none.higher_limit if none is not None and may_again else None
         self._raise.say(f"Raise the limit to {higher:,} tokens" if higher else "")

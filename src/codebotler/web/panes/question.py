@@ -6,7 +6,8 @@ from nicegui import ui
 
 from codebotler.core.terminal import shortened
 from codebotler.core.words import counted
-from codebotler.robots.face import AnswerError, Face, Question
+from codebotler.robots.base import AnswerError
+from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.frame import Button, PlainText, warn
 
 MOST_OPTIONS, MOST_TEXT = 50, 200
@@ -17,7 +18,7 @@ class QuestionPane:
 
     def __init__(self, face: Face) -> None:
         self._face = face
-        self._drawn: Question | None = None
+        self._drawn: FaceQuestion | None = None
         self._screens = PlainText("p", "", "quiet")
         self._box = ui.element("div").classes("asking").props('role=group aria-label="What the robot asks"')
 
@@ -37,7 +38,7 @@ class QuestionPane:
                 with self._box:
                     self._draw(question)
 
-    def _draw(self, question: Question) -> None:
+    def _draw(self, question: FaceQuestion) -> None:
         PlainText("p", f"Waiting for an answer from {shortened(question.person, MOST_TEXT)}:", "quiet")
         PlainText("p", shortened(question.text), "question")
         with ui.element("div").classes("word"):
@@ -45,7 +46,7 @@ class QuestionPane:
                 words = shortened(option, MOST_TEXT).strip() or "(blank)"
                 Button(words, lambda at=position: self._answer(question, at), "plain")
 
-    def _answer(self, question: Question, position: int) -> None:
+    def _answer(self, question: FaceQuestion, position: int) -> None:
         try:
             self._face.answer(question.number, position)
         except AnswerError as error:

@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.core.words import counted
 from codebotler.models.base import Reply
-from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, is_cut_off, why_no_program
+from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, classify_reply, is_cut_off
 from codebotler.prompts.extract import read_reply
 from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
@@ -119,7 +119,7 @@ class Completion:
         is_chat = isinstance(reply, str) and not (self.model or "").startswith("completions:")
         has_code = read_reply(str(reply)).has_code if is_chat else bool(self.program.strip())
         text = reply if isinstance(reply, str) else None
-        return why_no_program(text, self.program, self.finish_reason, has_code=has_code)
+        return classify_reply(text, self.program, self.finish_reason, has_code=has_code)
 
     @property
     def program_sha256(self) -> str:

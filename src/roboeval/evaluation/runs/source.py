@@ -8,7 +8,7 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines
-from codebotler.models.recorded import NAMES, RecordedModel, recorded_model
+from codebotler.models.recorded import RECORDED_NAMES, RecordedModel, open_recorded
 from roboeval.evaluation.runs.completions import COMPLETIONS, EXAMPLE, Completion, read_completions
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.published import passed_over, published_completions
@@ -69,11 +69,11 @@ def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
     Raises:
         UserError: there is no such model.
     """
-    model = recorded_model(name, None if suite.folder is None else suite.folder / "solutions")
+    model = open_recorded(name, None if suite.folder is None else suite.folder / "solutions")
     short = model.name.removeprefix("recorded:")
-    if short not in NAMES:
+    if short not in RECORDED_NAMES:
         return model
-    known = {one.instruction: one.by(short) for one in suite.recorded}
+    known = {one.instruction: one.replies_of(short) for one in suite.recorded}
     return replace(model, replies={**model.replies, **known})
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.models.no_program import IN_WORDS
+from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.cli.views.completions import MOST_REPLY, completion_view
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.runs.completions import Completion
@@ -75,7 +75,7 @@ def test_texts_are_shown_only_on_request() -> None:
 def test_of_a_reply_without_a_program_the_reason_is_told_and_no_world() -> None:
     text = view(WRITTEN, ("NoProgram", "cut-off"))
     assert "no program: cut-off" in text
-    assert IN_WORDS["cut-off"] in text
+    assert NO_PROGRAM_SENTENCES["cut-off"] in text
     assert "World 1" not in text
 
 

@@ -1,4 +1,4 @@
-"""What runs under the robot's own Python: scripts, and what they share.
+"""Scripts for the robot's own Python, which must not import codebotler.
 
-Nothing here may import codebotler or, but for the worker of a rosbridge, need more than Python 3.8.
+All of them run on Python 3.8, except those for a rosbridge.
 """

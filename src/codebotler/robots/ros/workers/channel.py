@@ -1,4 +1,4 @@
-"""Lines of JSON between a worker and the tool, and the worker's main loop."""
+"""Exchange lines of JSON with CodeBotler, and run a worker's main loop."""
 
 from __future__ import annotations
 
@@ -14,44 +14,44 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import IO, Any, Dict
 
-Message = Dict[str, Any]
-WRITES = 1.0  # seconds for the tool to read the last lines
+Fields = Dict[str, Any]
+WRITE_SECONDS = 1.0  # for the last lines
 
 
 class SetupError(Exception):
-    """The robot cannot be used; the text says why and what to do."""
+    """The robot cannot be used; the text says why, and how to fix it."""
 
 
 class Channel:
-    """Standard input and output as lines of JSON; whatever else rospy prints goes to standard error."""
+    """Lines of JSON on standard input and output; other output of rospy goes to standard error."""
 
     def __init__(self) -> None:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
         os.dup2(2, 1)
         self._in: IO[str] = os.fdopen(os.dup(0), "r", encoding="utf-8")
-        # A tool that is suspended reads nothing: who stops the robot then must not wait for it.
+        # Write in a thread, since a suspended tool does not read, and stopping the robot must not wait.
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
-        self.heard = float("inf")  # when the tool last sent something; infinite while a worker acts upon it
+        self.last_sign = float("inf")  # the time of the last input; infinite while the worker handles it
 
-    def send(self, what: str, **more: Any) -> None:
-        """Have a line written; a tool that is gone is noticed at the end of the input."""
-        self._lines.put(json.dumps({"is": what, **more}, default=str) + "\n")
+    def send(self, kind: str, **more: Any) -> None:
+        """Queue a message; a dead tool shows at the end of the input."""
+        self._lines.put(json.dumps({"is": kind, **more}, default=str) + "\n")
 
     def finish(self) -> None:
-        """Wait a moment until all is written."""
+        """Wait briefly until all lines are written."""
         self._lines.put(None)
-        self._writer.join(WRITES)
+        self._writer.join(WRITE_SECONDS)
 
-    def lines(self) -> Iterator[Message]:
-        """Incoming messages but for signs of life, until the tool closes its end or dies."""
+    def lines(self) -> Iterator[Fields]:
+        """Yield incoming messages except signs of life, until the tool closes its end or dies."""
         for line in iter(self._in.readline, ""):
             message = json.loads(line)
             if message.get("do") != "alive":
-                self.heard = float("inf")
+                self.last_sign = float("inf")
                 yield message
-            self.heard = time.monotonic()
+            self.last_sign = time.monotonic()
 
     def _write(self) -> None:
         for line in iter(self._lines.get, None):
@@ -60,8 +60,8 @@ class Channel:
                 self._out.flush()
 
 
-def serve(make_worker: Callable[[Channel, Message], Any]) -> None:
-    """Make a worker from the first line and have it obey the others; however that ends, stop the robot."""
+def serve(make_worker: Callable[[Channel, Fields], Any]) -> None:
+    """Make a worker from the first line, and let it obey the others; stop the robot in any case."""
     channel = Channel()
     worker, status = None, 1
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -82,11 +82,11 @@ def serve(make_worker: Callable[[Channel, Message], Any]) -> None:
         for line in lines:
             worker.obey(line)
         status = 0
-    except Exception:  # noqa: BLE001 - whatever it is, the robot must be stopped
+    except Exception:  # noqa: BLE001 - after any error, the robot must stop
         traceback.print_exc()
     finally:
         if worker is not None:
             worker.leave()
         channel.finish()
         sys.stderr.flush()
-        os._exit(status)  # rospy's threads would go on
+        os._exit(status)  # rospy's threads would keep the process alive

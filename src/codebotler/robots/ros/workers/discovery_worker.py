@@ -1,4 +1,4 @@
-"""Lists what a robot's nodes offer: `python3 discovery_worker.py`, by a Python that has rclpy or rospy."""
+"""List the offers of a robot's nodes, in a Python that has rclpy or rospy."""
 
 from __future__ import annotations
 
@@ -7,37 +7,37 @@ import time
 from contextlib import suppress
 from typing import Any, Iterator, Tuple
 
-from channel import Channel, Message, SetupError, serve
+from channel import Channel, Fields, SetupError, serve
 
-QUIET = 2.0  # seconds without anything new, after which discovery has ended
-LONGEST = 10.0  # seconds for that, also where nothing or always something new comes
+QUIET_SECONDS = 2.0  # without new offers, until discovery ends
+MAX_DISCOVERY_SECONDS = 10.0
 Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), a name and a type
 
 
 class DiscoveryWorker:
-    """Sends all offers with its first message; the first line has the `robot`, ros1 or ros2."""
+    """Sends all offers in its first message; the first line has the `robot`, ros1 or ros2."""
 
-    def __init__(self, channel: Channel, start: Message) -> None:
+    def __init__(self, channel: Channel, start: Fields) -> None:
         offers = set(offers_on_ros1()) if start["robot"] == "ros1" else offers_on_ros2()
         channel.send("ready", offers=sorted(offers))
 
     def leave(self) -> None:
-        """Do nothing: nodes end with the process."""
+        """Do nothing, since nodes end with the process."""
 
 
 def offers_on_ros2() -> set[Offer]:
-    """All offers that are discovered until nothing new comes."""
+    """Discover offers until no new ones appear."""
     import rclpy
 
     rclpy.init(args=None)
     node = rclpy.create_node(f"codebotler_discovers_{os.getpid()}")
     offers: set[Offer] = set()
-    begun = changed = now = time.monotonic()
-    while now - begun < LONGEST and (now - changed < QUIET or not offers):
+    start = change = now = time.monotonic()
+    while now - start < MAX_DISCOVERY_SECONDS and (now - change < QUIET_SECONDS or not offers):
         time.sleep(0.1)
         now, before = time.monotonic(), len(offers)
         offers.update(_offers_of_others(node))
-        changed = now if len(offers) > before else changed
+        change = now if len(offers) > before else change
     return offers
 
 
@@ -57,12 +57,12 @@ def _offers_of_others(node: Any) -> Iterator[Offer]:
 
 
 def offers_on_ros1() -> Iterator[Offer]:
-    """All offers that the master knows; it does not know the types of services."""
+    """Yield the offers that the master knows; it does not know the types of services."""
     import rosgraph
 
     from graph import Ros1Graph, no_master
 
-    graph = Ros1Graph("codebotler_discovers")  # never entered: the master answers everybody
+    graph = Ros1Graph("codebotler_discovers")  # a request to the master needs no node
     if not graph.is_online():
         raise SetupError(no_master(graph.uri))
     master = rosgraph.Master(graph.node)

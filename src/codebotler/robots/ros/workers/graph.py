@@ -1,4 +1,4 @@
-"""The ROS 1 graph, as its master knows it."""
+"""Our node on the ROS 1 graph, and the master's view of other nodes."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import xmlrpc.client
 from typing import Any
 
 from channel import SetupError
-from message_types import OFFERS, offer_of, parts_of
+from message_types import OFFER_NAMES, offer_of, parts_of
 
-LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
-MASTER_ANSWERS, NODE_ANSWERS = 5.0, 2.0  # seconds
+ROS1_EXIT_SECONDS = 3.0  # for another worker whose tool was just killed
+MASTER_SECONDS, NODE_SECONDS = 5.0, 2.0  # for answers
 
 
 class Ros1Graph:
-    """Our node and what the master knows of others; whoever has our node's name drives the robot."""
+    """Our node, whose unique name reserves the robot, and the master's view of other nodes."""
 
     def __init__(self, name: str) -> None:
-        import netifaces  # noqa: F401 - without it, rosgraph fails only later, within a thread
+        import netifaces  # noqa: F401 - fail here if it is missing, not later in a thread of rosgraph
         import rosgraph
 
         self.node = rosgraph.names.resolve_name(name, rosgraph.names.get_ros_namespace())
@@ -27,14 +27,14 @@ class Ros1Graph:
         self._rosgraph = rosgraph
 
     def enter(self) -> bool:
-        """Register our node; whether an earlier one of its name had died without leaving."""
+        """Register our node; return whether a dead worker has left a node with its name."""
         import rospy
 
         if not self.is_online():
             raise SetupError(no_master(self.uri))
-        until = time.monotonic() + LEAVES
+        deadline = time.monotonic() + ROS1_EXIT_SECONDS
         while (address := self.address_of(self.node)) is not None and is_alive(address):
-            if time.monotonic() > until:
+            if time.monotonic() > deadline:
                 raise SetupError(
                     f"another codebotler is using this robot (the node {self.node} at {address}); "
                     "stop it first"
@@ -55,8 +55,8 @@ class Ros1Graph:
 
         rospy.signal_shutdown("the end")
 
-    def is_left(self) -> bool:
-        """Whether our node has ended; the master ends it when another one of its name registers."""
+    def has_left(self) -> bool:
+        """Whether our node has ended; the master ends it when another node registers its name."""
         import rospy
 
         return bool(rospy.is_shutdown())
@@ -64,25 +64,25 @@ class Ros1Graph:
     def is_online(self) -> bool:
         """Whether the master answers."""
         before = socket.getdefaulttimeout()
-        socket.setdefaulttimeout(MASTER_ANSWERS)
+        socket.setdefaulttimeout(MASTER_SECONDS)
         try:
             return bool(self._rosgraph.is_master_online(self.uri))
         finally:
             socket.setdefaulttimeout(before)
 
     def address_of(self, node: str) -> str | None:
-        """The address of a node, if the master knows one."""
+        """Return the address of a node, or None if the master knows none."""
         try:
             return str(self._master.lookupNode(node))
         except self._rosgraph.MasterException:
             return None
 
-    def why_left(self) -> str:
-        """Error message for a node that has ended."""
+    def explain_end(self) -> str:
+        """Return the message for `has_left`."""
         return f"another node called {self.node} has taken over; stop it, and connect again"
 
     def nodes_of(self, server: str) -> list[str]:
-        """Nodes registered for an action's goals, a topic or a service; they may have died."""
+        """Return the nodes that serve an action, a topic or a service; some may be dead."""
         _, subscribers, services = self._master.getSystemState()
         name = self._rosgraph.names.resolve_name(server, self.node)
         return [
@@ -90,12 +90,12 @@ class Ros1Graph:
         ]
 
     def has_publisher(self, topic: str) -> bool:
-        """Whether a publisher of a topic is registered."""
+        """Whether a topic has a registered publisher."""
         name = self._rosgraph.names.resolve_name(topic, self.node)
         return name in (one for one, _ in self._master.getSystemState()[0])
 
-    def why_missing(self, server: str, type_name: str) -> str:
-        """Why there is no connection with what a robot offers."""
+    def explain_missing(self, server: str, type_name: str) -> str:
+        """Return why a server cannot be reached."""
         if not self.is_online():
             return f"{server} is gone, and so is the ROS master at {self.uri}; start it again"
         if self.address_of(self.node) is None:
@@ -108,7 +108,7 @@ class Ros1Graph:
         if address is None or not is_alive(address):
             return f"the {what} at {server} (node {nodes[0]}) has died; start it again"
         whole, goal = "/".join(parts_of(type_name)), ""
-        if what == OFFERS["action"]:
+        if what == OFFER_NAMES["action"]:
             whole, goal = whole + "Action", "Goal"
         return (
             f"the {what} at {server} (node {nodes[0]}) is running, but does not accept our "
@@ -118,14 +118,14 @@ class Ros1Graph:
 
 
 def no_master(uri: str) -> str:
-    """Error message for a missing master."""
+    """Return the message for a missing master."""
     return f"no ROS master answers at {uri}; start one (roscore), or set ROS_MASTER_URI"
 
 
 class _ShortTimeout(xmlrpc.client.Transport):
     def make_connection(self, host: Any) -> Any:
         connection = super().make_connection(host)
-        connection.timeout = NODE_ANSWERS
+        connection.timeout = NODE_SECONDS
         return connection
 
 

@@ -1,4 +1,4 @@
-"""Where a robot is, and how fast it moves, from messages of ROS as plain data."""
+"""Report a robot's poses and velocities from ROS messages as plain data."""
 
 from __future__ import annotations
 
@@ -7,47 +7,47 @@ import math
 import time
 from typing import Any
 
-from channel import Channel, Message
+from channel import Channel, Fields
 
-EVERY = 0.05  # seconds between two poses, or velocities, that the tool is told
+REPORT_INTERVAL = 0.05  # seconds between two poses, or velocities, to the tool
 Turn = tuple[float, float, float]  # x, y and yaw of a frame in another
 
 
 class MotionReports:
-    """Tells the tool a robot's poses and velocities.
+    """Sends a robot's poses and velocities to the tool.
 
-    With `frames`, of the map and of the robot, poses come from transforms; otherwise from messages that
-    have a pose with a position and an orientation in them, at any depth.
+    With `frames`, those of the map and of the robot, poses come from transforms; otherwise from messages
+    that contain a position and an orientation at any depth.
     """
 
     def __init__(self, channel: Channel, frames: list[str] | None) -> None:
         self._channel, self._frames = channel, frames
-        self._links: dict[str, tuple[str, Turn]] = {}  # of each frame its parent, and how it lies in that
-        self._told = {"pose": 0.0, "velocity": 0.0}
+        self._links: dict[str, tuple[str, Turn]] = {}  # for each frame: its parent, and its pose there
+        self._last_sent = {"pose": 0.0, "velocity": 0.0}
 
-    def hear_pose(self, message: Message) -> None:
-        """Tell the pose in a message."""
-        found = self._transformed(message) if self._frames else _pose_in(message)
+    def report_pose(self, message: Fields) -> None:
+        """Send the pose in a message."""
+        found = self._transform(message) if self._frames else _pose_in(message)
         if found is not None:
             frame, (x, y, yaw) = found
-            self._tell("pose", x=x, y=y, yaw=yaw, frame=frame)
+            self._send("pose", x=x, y=y, yaw=yaw, frame=frame)
 
-    def hear_velocity(self, message: Message) -> None:
-        """Tell the velocity in a message, in metres or radians per second, whichever is more."""
+    def report_velocity(self, message: Fields) -> None:
+        """Send the velocity in a message, in metres or radians per second, whichever is higher."""
         while "linear" not in message and "twist" in message:
             message = message["twist"]
         if "linear" in message:
             linear, angular = message["linear"], message["angular"]
-            self._tell("velocity", speed=max(math.hypot(linear["x"], linear["y"]), abs(angular["z"])))
+            self._send("velocity", speed=max(math.hypot(linear["x"], linear["y"]), abs(angular["z"])))
 
-    def _transformed(self, message: Message) -> tuple[str, Turn] | None:
-        assert self._frames is not None, "poses come from transforms"
+    def _transform(self, message: Fields) -> tuple[str, Turn] | None:
+        assert self._frames is not None, "the caller has frames"
         for each in message["transforms"]:
             turn = _turn(each["transform"]["translation"], each["transform"]["rotation"])
             parent = each["header"]["frame_id"].lstrip("/")
             self._links[each["child_frame_id"].lstrip("/")] = parent, turn
         frame, robot = self._frames
-        at, yaw = 0j, 0.0  # where the robot is in the frame that the loop has come to, x + iy
+        at, yaw = 0j, 0.0  # the position x + iy in the current frame of the loop
         for _ in self._links:
             if robot not in self._links:
                 return None
@@ -57,21 +57,21 @@ class MotionReports:
                 return frame, (at.real, at.imag, yaw)
         return None
 
-    def _tell(self, what: str, **values: Any) -> None:
+    def _send(self, kind: str, **values: Any) -> None:
         now = time.monotonic()
-        if now - self._told[what] >= EVERY:
-            self._told[what] = now
-            self._channel.send(what, **values)
+        if now - self._last_sent[kind] >= REPORT_INTERVAL:
+            self._last_sent[kind] = now
+            self._channel.send(kind, **values)
 
 
-def _pose_in(message: Message) -> tuple[str, Turn] | None:
+def _pose_in(message: Fields) -> tuple[str, Turn] | None:
     frame = message.get("header", {}).get("frame_id", "").lstrip("/")
     while "position" not in message and "pose" in message:
         message = message["pose"]
     return (frame, _turn(message["position"], message["orientation"])) if "position" in message else None
 
 
-def _turn(position: Message, rotation: Message) -> Turn:
+def _turn(position: Fields, rotation: Fields) -> Turn:
     x, y, z, w = (rotation[axis] for axis in "xyzw")
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return float(position["x"]), float(position["y"]), yaw

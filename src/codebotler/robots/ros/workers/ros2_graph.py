@@ -1,4 +1,4 @@
-"""The ROS 2 graph, which has no master: nodes discover each other."""
+"""Our node on the ROS 2 graph, where nodes discover each other without a master."""
 
 from __future__ import annotations
 
@@ -16,41 +16,43 @@ from channel import SetupError
 from message_types import as_data, offer_of
 from ros2_types import message_types
 
-DISCOVERY = 1.0  # seconds after which a node knows most others
-ANSWERS = 2.0  # seconds within which another node of our name answers, if it is alive
-LEAVES = 3.0  # seconds for another worker to end whose tool was just killed
-TAKEN = "another codebotler is using this robot (the node {}); stop it first"
+DISCOVERY_SECONDS = 1.0  # a node then knows most others
+ANSWER_SECONDS_ROS2 = 2.0  # for another node with our name, if it is alive
+ROS2_EXIT_SECONDS = 3.0  # for another worker whose tool was just killed
+NODE_IN_USE = "another codebotler is using this robot (the node {}); stop it first"
 
 
 class Ros2Graph:
-    """Our node, whose executor runs in a thread; whoever has our node's name drives the robot."""
+    """Our node, with its executor in a thread; its unique name reserves the robot."""
 
-    def __init__(self, name: str, taken: str = TAKEN) -> None:
+    def __init__(self, name: str, taken: str = NODE_IN_USE) -> None:
         import rclpy
         import rclpy.executors
         from rclpy.signals import SignalHandlerOptions
 
         self._rclpy, self.node, self._taken = rclpy, name, taken
         self._is_left_behind = self._has_ended = False
-        rclpy.init(args=None, signal_handler_options=SignalHandlerOptions.NO)  # the robot must stop first
+        rclpy.init(
+            args=None, signal_handler_options=SignalHandlerOptions.NO
+        )  # the worker must stop the robot first
 
     def enter(self, *, is_rescue: bool = False) -> bool:
-        """Start our node; whether an earlier one of its name had died without leaving.
+        """Start our node; return whether a dead worker has left a node with its name.
 
-        On one machine, no two workers pass; between machines, two that start together may, and then both
-        notice each other and stop. In a rescue, which must not wait, it was the tool that killed the other.
+        Workers of two machines that start together notice each other and stop. A rescue does not wait, since
+        the tool has killed the other worker.
         """
-        self._lock = self._locked()
-        self._is_left_behind = is_rescue or self._has_left()
+        self._lock = self._take_lock()
+        self._is_left_behind = is_rescue or self._has_dead_twin()
         self.ours = self._rclpy.create_node(self.node)
         self.executor = self._rclpy.executors.SingleThreadedExecutor()
         self.executor.add_node(self.ours)
         return self._is_left_behind
 
-    def _has_left(self) -> bool:
-        """Whether a node of our name is on the graph, but dead; SetupError if it is alive."""
+    def _has_dead_twin(self) -> bool:
+        """Whether a dead node with our name is on the graph; SetupError if it is alive."""
         probe = self._rclpy.create_node(f"{self.node}_looks_{os.getpid()}")
-        time.sleep(DISCOVERY)
+        time.sleep(DISCOVERY_SECONDS)
         is_there = self.node in probe.get_node_names()
         if is_there and self._answers(probe):
             self._rclpy.shutdown()
@@ -59,108 +61,106 @@ class Ros2Graph:
         return is_there
 
     def spin(self) -> None:
-        """Start the executor's thread, once all clients and servers are made.
+        """Start the executor's thread; call it after creating all clients and servers.
 
-        rclpy shows them to the executor before it has finished making them, which would end the thread.
+        rclpy shows incomplete ones to the executor, which would end the thread.
         """
         self._spinning = threading.Thread(target=self._spin, daemon=True)
         self._spinning.start()
 
     def leave(self) -> None:
-        """Destroy our node: if it were only shut down, others would see it until its lease is over."""
+        """Destroy our node; others would see a node that is only shut down until its lease ends."""
         self._rclpy.shutdown()
-        self._spinning.join(LEAVES)
+        self._spinning.join(ROS2_EXIT_SECONDS)
         for action in list(self.ours.waitables):
             action.destroy()
         self.ours.destroy_node()
 
-    def is_left(self) -> bool:
-        """Whether our node hears nothing any more, or another one of its name has come."""
+    def has_left(self) -> bool:
+        """Whether our node has ended, or another node with its name has appeared."""
         return not self._rclpy.ok() or self._has_ended or self._has_double()
 
-    def why_left(self) -> str:
-        """Error message for a node that must not go on."""
+    def explain_end(self) -> str:
+        """Return the message for `has_left`."""
         if self._has_ended:
             return f"the node {self.node} has failed in rclpy; connect again"
         if self._rclpy.ok():
-            return f"another node called {self.node} has come; stop it, and connect again"
+            return f"another node called {self.node} has appeared; stop it, and connect again"
         return f"the node {self.node} was shut down; connect again"
 
-    def why_missing(self, server: str, type_name: str) -> str:
-        """Why there is no connection with what a robot offers."""
+    def explain_missing(self, server: str, type_name: str) -> str:
+        """Return why a server cannot be reached."""
         return (
             f"there is no {offer_of(type_name)} of {type_name} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
-    def soon(self, does: Callable[..., object], *arguments: Any) -> None:
-        """Have the executor's thread call something."""
-        self.executor.create_task(does, *arguments)
+    def call_soon(self, function: Callable[..., object], *arguments: Any) -> None:
+        """Call a function in the executor's thread."""
+        self.executor.create_task(function, *arguments)
 
     def resolve(self, future: Any, value: Any) -> None:
-        """Give a future its value, and have the executor look again who waits for it."""
+        """Set a future's result, and wake the executor."""
 
         def resolve() -> None:
             future.set_result(value)
-            self.soon(lambda: None)
+            self.call_soon(lambda: None)
 
-        self.soon(resolve)
+        self.call_soon(resolve)
 
     def listen(
         self, topic: str, hear: Callable[[Any], object], packages: list[str], patience: float | None
     ) -> Callable[[], object] | None:
-        """Call `hear` with each message of a topic as plain data, of the type that its publishers have.
+        """Subscribe to a topic, with its publishers' type; return the function that unsubscribes.
 
-        It returns what ends that. Without `patience`, in seconds, a topic that nobody publishes is left out.
+        Wait up to `patience` seconds for a publisher; without `patience`, return None if there is none.
         """
         from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-        until = time.monotonic() + (patience or 0.0)
+        deadline = time.monotonic() + (patience or 0.0)
         while not (publishers := self.ours.get_publishers_info_by_topic(topic)):
-            if time.monotonic() > until:
+            if time.monotonic() > deadline:
                 if patience is None:
                     return None
-                raise SetupError(f"nothing publishes {topic}; start what does, or correct its name")
+                raise SetupError(f"nothing publishes {topic}; start its publisher, or correct its name")
             time.sleep(0.05)
         kind, offered = publishers[0].topic_type, publishers[0].qos_profile
         qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-        if (
-            offered.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        ):  # the last message is sent to who comes later
+        if offered.durability == DurabilityPolicy.TRANSIENT_LOCAL:  # to receive the last message
             qos = QoSProfile(depth=10, durability=offered.durability)
         spec = message_types([kind], map(Path, packages))[kind]
-        made: list[Any] = []
+        subscriptions: list[Any] = []
 
         def subscribe() -> None:
-            made.append(self.ours.create_subscription(spec, topic, lambda m: hear(as_data(m)), qos))
+            subscriptions.append(self.ours.create_subscription(spec, topic, lambda m: hear(as_data(m)), qos))
 
-        self.soon(subscribe)
-        return lambda: self.soon(lambda: self.ours.destroy_subscription(made.pop()))
+        self.call_soon(subscribe)
+        return lambda: self.call_soon(lambda: self.ours.destroy_subscription(subscriptions.pop()))
 
-    def _locked(self) -> socket.socket:
-        """A socket that only one process of this machine can have, for as long as it lives."""
+    def _take_lock(self) -> socket.socket:
+        """Bind a socket that only one process of this machine can have, until it ends."""
         lock = socket.socket(socket.AF_UNIX)
-        until = time.monotonic() + LEAVES
+        deadline = time.monotonic() + ROS2_EXIT_SECONDS
         while sys.platform == "linux":
             try:
                 lock.bind(f"\0codebotler ROS 2 {os.environ.get('ROS_DOMAIN_ID', '0')} {self.node}")
                 break
             except OSError:
-                if time.monotonic() > until:
+                if time.monotonic() > deadline:
                     self._rclpy.shutdown()
                     raise SetupError(self._taken.format(self.node)) from None
                 time.sleep(0.1)
         return lock
 
     def _answers(self, probe: Any) -> bool:
-        """Whether the node of our name is alive; a dead one stays on the graph for a while."""
+        """Whether the node with our name is alive; a dead one stays on the graph for a while."""
         from rcl_interfaces.srv import ListParameters
 
         client = probe.create_client(ListParameters, f"/{self.node}/list_parameters")
-        if not client.wait_for_service(timeout_sec=ANSWERS):
+        if not client.wait_for_service(timeout_sec=ANSWER_SECONDS_ROS2):
             return False
         answer = client.call_async(ListParameters.Request())
-        self._rclpy.spin_until_future_complete(probe, answer, timeout_sec=ANSWERS)
+        self._rclpy.spin_until_future_complete(probe, answer, timeout_sec=ANSWER_SECONDS_ROS2)
         return bool(answer.done())
 
     def _has_double(self) -> bool:

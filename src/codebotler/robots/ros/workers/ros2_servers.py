@@ -1,25 +1,22 @@
-"""Action servers of a virtual robot on ROS 2: `python3 ros2_servers.py`, run by a Python that has rclpy.
-
-Goals and cancels are passed to the tool, which decides how each goal ends.
-"""
+"""Action servers of a virtual robot, run by a Python that has rclpy; the tool decides how goals end."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from channel import Channel, Message, serve
+from channel import Channel, Fields, serve
 from message_types import as_data
 from ros2_graph import Ros2Graph
 from ros2_types import fill, message_types
 
-TAKEN = "there is another virtual robot (the node {}); stop it first"
+SERVERS_IN_USE = "there is another virtual robot (the node {}); stop it first"
 
 
 class Ros2ActionServers:
     """One action server for each skill; the first line has the `node` and the `actions` by skill."""
 
-    def __init__(self, channel: Channel, start: Message) -> None:
+    def __init__(self, channel: Channel, start: Fields) -> None:
         import rclpy.action
 
         self.channel = channel
@@ -27,14 +24,14 @@ class Ros2ActionServers:
         actions = start["actions"]
         texts = {action["type"]: action["definition"] for action in actions.values()}
         specs = message_types([*texts], [], lambda text: channel.send("progress", text=text), actions=texts)
-        self.graph = Ros2Graph(start["node"], TAKEN)
+        self.graph = Ros2Graph(start["node"], SERVERS_IN_USE)
         self.graph.enter()
         self.servers = [
             rclpy.action.ActionServer(
                 self.graph.ours,
                 specs[action["type"]],
                 action["server"],
-                self._executor(skill, specs[action["type"]]),
+                self._make_callback(skill, specs[action["type"]]),
                 cancel_callback=self._cancel,
             )
             for skill, action in actions.items()
@@ -42,7 +39,7 @@ class Ros2ActionServers:
         self.graph.spin()
         channel.send("ready", has_master=False)
 
-    def obey(self, line: Message) -> None:
+    def obey(self, line: Fields) -> None:
         """End a goal."""
         self.graph.resolve(self.ends.pop(line["id"]), line)
 
@@ -50,7 +47,7 @@ class Ros2ActionServers:
         """Leave the graph."""
         self.graph.leave()
 
-    def _executor(self, skill: str, spec: Any) -> Callable[[Any], Awaitable[Any]]:
+    def _make_callback(self, skill: str, spec: Any) -> Callable[[Any], Awaitable[Any]]:
         async def execute(handle: Any) -> Any:
             from rclpy.task import Future
 

@@ -1,4 +1,4 @@
-"""ROS 2 types, generated and compiled once if their packages are not installed, and messages from JSON."""
+"""ROS 2 types, generated and compiled once if their packages are not installed; messages from plain data."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Callable, Dict, Sequence
 
-from channel import Message, SetupError
+from channel import Fields, SetupError
 
-NEEDED = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
-"""The packages whose messages are part of each action."""
+ACTION_PACKAGES = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
+"""The packages whose messages every action contains."""
 
 GENERATORS = (
     "generator_type_description",
@@ -30,37 +30,37 @@ GENERATORS = (
     "typesupport_c",
     "generator_py",
 )
-SUPPORTS = ("rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c")
-PRELOADS = """\
+TYPE_SUPPORTS = ("rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c")
+PRELOAD_CODE = """\
 import ctypes
 import pathlib
 
-for support in {supports}:  # found by their names, once they are loaded
+for support in {supports}:  # ROS finds loaded libraries by name
     ctypes.CDLL(str(pathlib.Path(__file__).parent / f"lib{package}__{{support}}.so"))
 """
 COMPILERS = {".c": "cc", ".cpp": "c++"}
-USES = re.compile(r"^\s*(?:(\w+)/)?([A-Z]\w*)", re.MULTILINE)
-Tell = Callable[[str], object]
+USED_TYPE = re.compile(r"^\s*(?:(\w+)/)?([A-Z]\w*)", re.MULTILINE)
+ProgressListener = Callable[[str], object]
 Definitions = Dict[str, str]  # by kind and name, such as action/GoTo
 
 
 def message_types(
     names: Sequence[str],
     folders: Iterable[Path],
-    tell: Tell = lambda _: None,
+    tell: ProgressListener = lambda _: None,
     *,
     actions: Definitions | None = None,
 ) -> dict[str, Any]:
-    """Return the Python class of each message, service and action, by names such as std_msgs/msg/String.
+    """Return the Python classes of messages, services and actions by names such as std_msgs/msg/String.
 
     Args:
-        names: all that a process needs, since a package that is built has nothing else.
-        folders: packages to build where they are not installed, with their name and action/, msg/ or srv/.
-        tell: called with a sentence before a step that takes long.
-        actions: texts of .action files by names; what is installed must have the same fields.
+        names: all types that the process needs, since building a package includes no others.
+        folders: the folders of packages to build if they are not installed, with action/, msg/ or srv/.
+        tell: called with a sentence before a slow step.
+        actions: texts of .action files by name; installed types must have the same fields.
 
     Raises:
-        SetupError: a package or a definition is missing, differs, or cannot be built.
+        SetupError: a package or a definition is missing, different, or cannot be built.
     """
     sources, texts = {folder.name: folder for folder in folders}, actions or {}
     wanted: dict[str, Definitions] = {}
@@ -78,9 +78,11 @@ def message_types(
                     f"the ROS 2 package {package} is not installed; source it, or list its folder in packages"
                 )
             definitions.update(_definitions(sources[package], [*definitions]))
-        sys.path.insert(0, str(built(package, definitions, tell)))
+        sys.path.insert(0, str(build_package(package, definitions, tell)))
         importlib.invalidate_caches()
-    return {name: _checked(name, texts[name]) if name in texts else _class(name) for name in names}
+    return {
+        name: _check_action(name, texts[name]) if name in texts else _import_class(name) for name in names
+    }
 
 
 def fields_of(definition: str) -> list[list[str]]:
@@ -89,26 +91,26 @@ def fields_of(definition: str) -> list[list[str]]:
     return [[line.split()[1] for line in part.splitlines() if line.strip()] for part in parts]
 
 
-def fill(message: Any, values: Message, where: str = "") -> Any:
-    """Set fields of a message from nested dictionaries as JSON has them, and return it.
+def fill(message: Any, values: Fields, where: str = "") -> Any:
+    """Set fields of a message from nested dictionaries, and return the message.
 
     Args:
-        message: keeps the fields that are not given.
-        values: by name; a whole number may be meant as a float.
-        where: the path of the message, with a dot at its end.
+        message: the message; other fields stay unchanged.
+        values: by name; integers are allowed for floats.
+        where: the path of the message, with a dot at the end.
 
     Raises:
-        SetupError: there is no such field, or the value does not fit; it says the path.
+        SetupError: a field does not exist, or a value does not fit.
     """
     kinds = message.get_fields_and_field_types()
     if hasattr(message, "_check_fields"):
-        message._check_fields = True  # otherwise rclpy may crash at a wrong value
+        message._check_fields = True  # rclpy may crash at a wrong value otherwise
     for name, value in values.items():
         path = where + name
         if name not in kinds:
             raise SetupError(f"there is no field {path}, but {', '.join(where + kind for kind in kinds)}")
         try:
-            setattr(message, name, _fitted(getattr(message, name), kinds[name], value, path))
+            setattr(message, name, _fit(getattr(message, name), kinds[name], value, path))
         except (AssertionError, TypeError, ValueError, OverflowError):
             raise SetupError(
                 f"the field {path} is {kinds[name]}, which {json.dumps(value)} does not fit"
@@ -116,22 +118,22 @@ def fill(message: Any, values: Message, where: str = "") -> Any:
     return message
 
 
-def _fitted(default: Any, kind: str, value: Any, path: str) -> Any:
+def _fit(default: Any, kind: str, value: Any, path: str) -> Any:
     base = re.sub(r"sequence<|[,>\[].*", "", kind)
     if isinstance(value, list):
-        return [_fitted(None, base, each, f"{path}[{index}]") for index, each in enumerate(value)]
+        return [_fit(None, base, each, f"{path}[{index}]") for index, each in enumerate(value)]
     if "/" in base and base == kind and isinstance(value, dict):
-        return fill(default or _class(base.replace("/", "/msg/"))(), value, path + ".")
+        return fill(default or _import_class(base.replace("/", "/msg/"))(), value, path + ".")
     return float(value) if base in {"float", "double"} and type(value) is int else value
 
 
 def _is_installed(package: str) -> bool:
     spec = importlib.util.find_spec(package)
-    return spec is not None and spec.origin is not None  # a folder of definitions on the path has none
+    return spec is not None and spec.origin is not None  # a folder of definitions has none
 
 
 def _definitions(folder: Path, wanted: list[str]) -> Definitions:
-    """Return the texts of what is wanted of a package, and of the messages of its own that this uses."""
+    """Return the texts of definitions of a package, and of its messages that they use."""
     found: Definitions = {}
     while wanted:
         name, *wanted = wanted
@@ -139,13 +141,15 @@ def _definitions(folder: Path, wanted: list[str]) -> Definitions:
         try:
             found[name] = path.read_text(encoding="utf-8")
         except OSError:
-            raise SetupError(f"there is no file {path}; is the folder of {folder.name} complete?") from None
-        uses = {f"msg/{used}" for package, used in USES.findall(found[name]) if package in {"", folder.name}}
+            raise SetupError(f"there is no file {path}; complete the folder of {folder.name}") from None
+        uses = {
+            f"msg/{used}" for package, used in USED_TYPE.findall(found[name]) if package in {"", folder.name}
+        }
         wanted += sorted(uses - {*found, *wanted})
     return found
 
 
-def _class(name: str) -> Any:
+def _import_class(name: str) -> Any:
     package, kind, plain = name.split("/")
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), plain)
@@ -156,8 +160,8 @@ def _class(name: str) -> Any:
         ) from None
 
 
-def _checked(name: str, definition: str) -> Any:
-    spec = _class(name)
+def _check_action(name: str, definition: str) -> Any:
+    spec = _import_class(name)
     for part, fields in zip((spec.Goal, spec.Result), fields_of(definition)):
         installed = list(part.get_fields_and_field_types())
         if installed != fields:
@@ -168,18 +172,18 @@ def _checked(name: str, definition: str) -> Any:
     return spec
 
 
-def built(package: str, definitions: Definitions, tell: Tell = lambda _: None) -> Path:
-    """Return a folder for sys.path with a package of these types, built unless that was done before.
+def build_package(package: str, definitions: Definitions, tell: ProgressListener = lambda _: None) -> Path:
+    """Return a folder for sys.path with a package of these types; build the package the first time.
 
     Raises:
-        SetupError: a package whose messages it uses is missing, or a C++ compiler, or that fails.
+        SetupError: a used package or the C++ compiler is missing, or the build fails.
     """
-    os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # ROS from wheels lies in the environment itself
+    os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # the prefix of ROS from wheels
     from ament_index_python import PackageNotFoundError
     from ament_index_python import get_package_share_directory as share
 
-    used = {name for text in definitions.values() for name, _ in USES.findall(text)} - {"", package}
-    needed = sorted({*NEEDED, *used})
+    used = {name for text in definitions.values() for name, _ in USED_TYPE.findall(text)} - {"", package}
+    needed = sorted({*ACTION_PACKAGES, *used})
     try:
         shares = {name: Path(share(name)) for name in (*needed, *("rosidl_" + name for name in GENERATORS))}
     except PackageNotFoundError as error:
@@ -199,7 +203,7 @@ def built(package: str, definitions: Definitions, tell: Tell = lambda _: None) -
             f"{package} must be compiled once, but there is no {missing[0]}; "
             f"install g++, or build {package} with colcon and source it"
         )
-    tell(f"building the ROS 2 messages of {package}, once: this takes half a minute")
+    tell(f"building the ROS 2 messages of {package} once; this takes half a minute")
     home.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=str(home)) as temporary:
         _Build(package, Path(temporary), shares, needed).make(definitions)
@@ -212,17 +216,19 @@ def built(package: str, definitions: Definitions, tell: Tell = lambda _: None) -
 
 
 class _Build:
-    """Builds one package, as the CMake functions of ROS do, but only what rclpy needs."""
+    """Builds the part of a package that rclpy needs, like the CMake functions of ROS."""
 
     def __init__(self, package: str, work: Path, shares: dict[str, Path], needed: list[str]) -> None:
         self.package, self.work, self.shares, self.needed = package, work, shares, needed
         self.made = work / "made" / package
-        self.introspection = work / "introspection" / package  # other files of the same names
+        self.introspection = work / "introspection" / package  # its files have the same names as others
         self.prefixes = {shares[name].parents[1] for name in needed}
 
     def make(self, definitions: Definitions) -> None:
         (self.made / "msg").mkdir(parents=True)
-        (self.made / "__init__.py").write_text(PRELOADS.format(package=self.package, supports=SUPPORTS))
+        (self.made / "__init__.py").write_text(
+            PRELOAD_CODE.format(package=self.package, supports=TYPE_SUPPORTS)
+        )
         self._generate(definitions)
         module = f"{self.package}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
         includes = [argument for folder in self._includes() for argument in ("-I", str(folder))]
@@ -232,8 +238,8 @@ class _Build:
             str(self.made / module), f"-Wl,--allow-shlib-undefined,-soname,{module},--no-as-needed",
             *(f"-L{prefix / 'lib'}" for prefix in self.prefixes), *libraries, "-lstdc++"
         )  # fmt: skip
-        libraries = [f"lib{self.package}__{support}.so" for support in SUPPORTS]
-        for library in libraries:  # empty, but leads to all symbols of the module
+        libraries = [f"lib{self.package}__{support}.so" for support in TYPE_SUPPORTS]
+        for library in libraries:  # empty, but links to the module's symbols
             self._run(
                 "c++", "-shared", f"-Wl,-soname,{library}", "-Wl,--no-as-needed", "-Wl,-rpath,$ORIGIN",
                 "-Wl,--allow-shlib-undefined", str(self.made / module), "-o", str(self.made / library)
@@ -263,14 +269,14 @@ class _Build:
         for generator, folder in (
             (GenerateC("c"), self.made),
             (GenerateFastRTPSCTypesupport("fastrtps_c"), self.made),
-            (GenerateCTypesupport("c", typesupport_implementations=list(SUPPORTS)), self.made),
+            (GenerateCTypesupport("c", typesupport_implementations=list(TYPE_SUPPORTS)), self.made),
             (GenerateIntrospectionCTypesupport("introspection_c"), self.introspection),
             (GeneratePython("py", typesupport_implementations=["rosidl_typesupport_c"]), self.made),
         ):
             generator.generate(self.package, files, includes, output_path=folder)
 
     def _units(self) -> Iterator[Path]:
-        """What is compiled: one file for all of a language, but for descriptions, whose names collide."""
+        """Yield the files to compile: one for each language, and the descriptions, whose names collide."""
         for suffix in COMPILERS:
             files = sorted(self.work.rglob("*" + suffix))
             together = [path for path in files if not path.stem.endswith("__description")]
@@ -288,7 +294,7 @@ class _Build:
         return [*ours, *headers, *of_packages, Path(python), Path(get_include())]
 
     def _run(self, *command: str) -> None:
-        done = subprocess.run(  # noqa: S603 - the compiler, on what was generated
+        done = subprocess.run(  # noqa: S603 - the compiler, with generated files
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
         )
         if done.returncode:

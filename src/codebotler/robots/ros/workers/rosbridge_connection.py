@@ -1,4 +1,4 @@
-"""A websocket with a rosbridge, through which a worker sees the ROS graph."""
+"""The websocket to a rosbridge."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from typing import Any
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 
-from channel import Message
+from channel import Fields
 from rosbridge_protocol import ActionProtocol, GoalUpdate, Ros1Protocol, Ros2Protocol, service_updates
 
-ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
-VERSION = 2.0  # seconds that a rosbridge may take to tell its version of ROS; one without rosapi cannot
-SETTLES = 1.5  # seconds of statuses from a server after which its results come too, on a busy machine
-INSISTS, PAUSE = 3.0, 0.1  # seconds; what is sent first may come before the server listens
-OPENS, CLOSES = 5.0, 1.0  # seconds that a rosbridge may take for that
-FAULTS = (OSError, ValueError, WebSocketException)
+VERSION_REQUEST = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
+VERSION_SECONDS = 2.0  # for the version of ROS; a rosbridge without rosapi does not answer
+SETTLE_SECONDS = 1.5  # from the first status of a server until its results arrive, on a busy machine
+INSIST_SECONDS, RESEND_PAUSE = 3.0, 0.1  # seconds; the first messages may arrive before the server listens
+OPEN_SECONDS, SOCKET_CLOSE_SECONDS = 5.0, 1.0
+CONNECTION_FAULTS = (OSError, ValueError, WebSocketException)
 
 
 class RosbridgeConnection:
-    """Sends messages, and calls `hear` with news of goals, and `lost` once, in a thread of its own."""
+    """Sends messages; a thread calls `hear` with updates of goals, and `lost` once."""
 
     def __init__(
         self,
@@ -35,54 +35,59 @@ class RosbridgeConnection:
         lost: Callable[[], None],
     ) -> None:
         self.address, self._hear, self._lost = address, hear, lost
-        self._socket = connect(address, open_timeout=OPENS, close_timeout=CLOSES, max_size=None)
+        self._socket = connect(
+            address, open_timeout=OPEN_SECONDS, close_timeout=SOCKET_CLOSE_SECONDS, max_size=None
+        )
         self._version: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._heard_first: dict[str, float] = {}
-        self._listeners: dict[str, tuple[Callable[[Message], object], ...]] = {}
-        self.heard: dict[str, float] = {}  # when the last status of a server came, by the monotonic clock
-        self.settled: set[str] = set()  # servers heard for so long that their results are connected too
+        self._listeners: dict[str, tuple[Callable[[Fields], object], ...]] = {}
+        self.heard: dict[str, float] = {}  # the time of each server's last status
+        self.settled: set[str] = set()  # servers whose results arrive
         self.is_lost = self.has_ended = False
         self.complaint = ""
         self.protocol: ActionProtocol = Ros1Protocol()
         threading.Thread(target=self._read, daemon=True).start()
-        self.send(ASKS_VERSION)
-        with suppress(queue.Empty):  # it has no rosapi
-            if self._version.get(timeout=VERSION) == 2:  # noqa: PLR2004 - ROS 2
+        self.send(VERSION_REQUEST)
+        with suppress(queue.Empty):  # there is no rosapi
+            if self._version.get(timeout=VERSION_SECONDS) == 2:  # noqa: PLR2004 - ROS 2
                 self.protocol = Ros2Protocol()
         self.opening = [m for a in actions for m in self.protocol.opening(a["server"], a["type"])]
         for message in self.opening:
             self.send(message)
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Fields) -> None:
         """Send a message; a lost connection shows in `is_lost`."""
         with suppress(ConnectionClosed):
             self._socket.send(json.dumps(message))
 
-    def listen(self, topic: str, hear: Callable[[Message], object]) -> Callable[[], None]:
-        """Call `hear` with each message of a topic; what ends that for all who listen to it."""
+    def listen(self, topic: str, hear: Callable[[Fields], object]) -> Callable[[], None]:
+        """Subscribe to a topic; return the function that ends all its subscriptions."""
         if topic not in self._listeners:
             self.send({"op": "subscribe", "topic": topic})
         self._listeners[topic] = (*self._listeners.get(topic, ()), hear)
 
-        def ignore() -> None:
+        def unsubscribe() -> None:
             del self._listeners[topic]
             self.send({"op": "unsubscribe", "topic": topic})
 
-        return ignore
+        return unsubscribe
 
-    def insist(self, message: Message) -> bool:
-        """Send a message over another connection, again and again for a while; whether that was possible."""
-        until, is_sent = time.monotonic() + INSISTS, False
-        while time.monotonic() < until:
-            with suppress(*FAULTS), connect(self.address, open_timeout=OPENS, close_timeout=CLOSES) as other:
+    def insist(self, message: Fields) -> bool:
+        """Send a message repeatedly over another connection; return whether that was possible."""
+        deadline, is_sent = time.monotonic() + INSIST_SECONDS, False
+        while time.monotonic() < deadline:
+            with (
+                suppress(*CONNECTION_FAULTS),
+                connect(self.address, open_timeout=OPEN_SECONDS, close_timeout=SOCKET_CLOSE_SECONDS) as other,
+            ):
                 for first in self.opening:
                     if first["op"] == "advertise":
                         other.send(json.dumps(first))
-                while time.monotonic() < until:
+                while time.monotonic() < deadline:
                     other.send(json.dumps(message))
                     is_sent = True
-                    time.sleep(PAUSE)
-            time.sleep(PAUSE)
+                    time.sleep(RESEND_PAUSE)
+            time.sleep(RESEND_PAUSE)
         return is_sent
 
     def leave(self) -> None:
@@ -90,18 +95,18 @@ class RosbridgeConnection:
         self._lost = lambda: None
         self._socket.close()
 
-    def is_left(self) -> bool:
-        """Whether the connection was lost, and all is done that could be done about it."""
+    def has_left(self) -> bool:
+        """Whether the connection is lost, and the reaction to that is complete."""
         return self.has_ended
 
-    def why_left(self) -> str:
-        """Error message for a lost connection."""
+    def explain_end(self) -> str:
+        """Return the message for a lost connection."""
         return f"the connection with {self.address} was lost"
 
-    def why_missing(self, server: str, _type: str) -> str:
-        """Why there is no connection with an action server."""
+    def explain_missing(self, server: str, _type: str) -> str:
+        """Return why an action server cannot be reached."""
         if self.is_lost:
-            return self.why_left()
+            return self.explain_end()
         why = f" ({self.complaint})" if self.complaint else ""
         return f"there is no action server at {server}, or none that rosbridge could reach{why}"
 
@@ -116,15 +121,15 @@ class RosbridgeConnection:
         self._lost()
         self.has_ended = True
 
-    def _take(self, message: Message) -> None:
+    def _take(self, message: Fields) -> None:
         match message:
             case {"op": "service_response", "id": "version", "result": True, "values": {"version": int(ros)}}:
                 self._version.put(ros)
             case {"op": "service_response", "id": "version"}:
                 self._version.put(1)
-            case {"op": "publish", "topic": str(topic), "msg": dict(told)}:
+            case {"op": "publish", "topic": str(topic), "msg": dict(fields)}:
                 for hear in self._listeners.get(topic, ()):
-                    hear(told)
+                    hear(fields)
             case {"op": "status", "level": "error", "msg": str(complaint)}:
                 self.complaint = complaint
         for update in (*self.protocol.updates(message), *service_updates(message)):
@@ -132,5 +137,5 @@ class RosbridgeConnection:
                 self._hear(update)
             elif update.server:
                 self.heard[update.server] = now = time.monotonic()
-                if now - self._heard_first.setdefault(update.server, now) > SETTLES:
+                if now - self._heard_first.setdefault(update.server, now) > SETTLE_SECONDS:
                     self.settled.add(update.server)

@@ -1,4 +1,4 @@
-"""The worker for a robot behind a rosbridge, run by the tool's own Python."""
+"""The worker for a robot behind a rosbridge, run by CodeBotler's own Python."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import time
 import uuid
 from collections.abc import Callable
 
-from channel import Message, SetupError, serve
+from channel import Fields, SetupError, serve
 from goals import Goal, Server, SkillWorker
 from message_types import parts_of
-from rosbridge_connection import FAULTS, INSISTS, SETTLES, RosbridgeConnection
+from rosbridge_connection import CONNECTION_FAULTS, INSIST_SECONDS, SETTLE_SECONDS, RosbridgeConnection
 from rosbridge_protocol import GoalUpdate
 
-AGAIN = 0.5  # seconds after which a message without any effect is sent again
+RESEND_SECONDS = 0.5  # before a message without effect is sent again
 
 
 class RosbridgeServer(Server):
     """The action server of one skill, seen through a rosbridge."""
 
-    def __init__(self, connection: RosbridgeConnection, action: Message) -> None:
+    def __init__(self, connection: RosbridgeConnection, action: Fields) -> None:
         super().__init__(action)
         self.kind: str = action["kind"]
         self._connection = connection
@@ -26,20 +26,20 @@ class RosbridgeServer(Server):
         if self.kind == "topic":
             connection.send({"op": "advertise", "topic": self.name, "type": "/".join(parts_of(self.type))})
 
-    def heard(self) -> float:
-        """When its last status came, by the monotonic clock; now, if there are none."""
+    def last_sign(self) -> float:
+        """Return the time of its last status; now, if the protocol has none."""
         if self._connection.protocol.has_status and self.kind == "action":
             return self._connection.heard.get(self.name, 0.0)
         return time.monotonic()
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether no result of a goal, and no message, would be lost."""
+        """Whether goals, results and messages will arrive."""
         if self._connection.is_lost:
             return False
         if self.kind == "topic":
-            return time.monotonic() - self._since > SETTLES
-        is_heard = self._connection.protocol.has_status and self.kind == "action"
-        return not is_heard or self.name in self._connection.settled
+            return time.monotonic() - self._since > SETTLE_SECONDS
+        has_status = self._connection.protocol.has_status and self.kind == "action"
+        return not has_status or self.name in self._connection.settled
 
     def cancel(self, goal: str = "") -> None:
         """Cancel one goal, or all goals of all clients."""
@@ -51,45 +51,45 @@ class RosbridgeWorker(SkillWorker):
     """Performs skills over a rosbridge."""
 
     graph: RosbridgeConnection
-    settles = SETTLES
+    settles = SETTLE_SECONDS
 
-    def connect(self, start: Message) -> bool:
-        """Open the connection; an earlier worker that died leaves no sign."""
+    def connect(self, start: Fields) -> bool:
+        """Open the connection; return False, since dead workers leave no node."""
         calls = start["calls"]
         actions = [call for call in calls.values() if call["kind"] == "action"]
         try:
             self.graph = RosbridgeConnection(start["address"], actions, self._hear, self._lost)
-        except FAULTS as error:
+        except CONNECTION_FAULTS as error:
             raise SetupError(
                 f"no rosbridge answers at {start['address']} ({error}); start it, "
                 "or name another with --address"
             ) from None
         self.servers = {skill: RosbridgeServer(self.graph, call) for skill, call in calls.items()}
-        self._message: Message = {}
+        self._message: Fields = {}
         self._again = 0.0
         return False
 
     def listen(
-        self, topic: str, hear: Callable[[Message], object], *, is_needed: bool = True
+        self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object]:
-        """Call `hear` with each message of a topic as plain data; what ends that."""
-        del is_needed  # nobody knows whether it is there
+        """Subscribe to a topic, as in `SkillWorker.listen`; a missing topic stays unnoticed."""
+        del is_needed
         return self.graph.listen(topic, hear)
 
     def missing(self) -> dict[str, str]:
-        """Nothing: servers are seen only when their skills are performed."""
+        """Return nothing, since missing servers show only when their skills are performed."""
         return {}
 
     def cancel_all(self) -> bool:
-        """Cancel all goals, again and again for a while; on ROS 2 only single goals can be cancelled."""
+        """Cancel all goals repeatedly for a while; return False on ROS 2, which only cancels single goals."""
         if not self.graph.protocol.has_status:
             return False
-        until = time.monotonic() + INSISTS
-        while time.monotonic() < until:
+        deadline = time.monotonic() + INSIST_SECONDS
+        while time.monotonic() < deadline:
             super().cancel_all()
         return not self.graph.is_lost
 
-    def send(self, goal: Goal, fields: Message) -> None:
+    def send(self, goal: Goal, fields: Fields) -> None:
         """Send a goal, call a service, or publish a message."""
         server, protocol = goal.server, self.graph.protocol
         number = goal.handle = str(uuid.uuid4())
@@ -103,20 +103,20 @@ class RosbridgeWorker(SkillWorker):
             self._message = {"op": "publish", "topic": server.name, "msg": fields}
         goal.is_acknowledged = server.kind != "action" or not protocol.has_status
         goal.sent = time.monotonic()
-        self._again = goal.sent + AGAIN
+        self._again = goal.sent + RESEND_SECONDS
         self.graph.send(self._message)
         if server.kind == "topic":
             self.end(goal, "result", values={})
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
-        """Send again what has no effect."""
+        """Send messages without effect again."""
         if self.graph.is_lost:
             return
         super().look_after(goal, sent, now)
         with goal.lock:
             if not self.graph.protocol.has_status or goal.is_over or now < self._again:
                 return
-            self._again = now + AGAIN
+            self._again = now + RESEND_SECONDS
             if goal.cancelled is not None:
                 goal.cancel()
             elif not goal.is_acknowledged:
@@ -140,7 +140,7 @@ class RosbridgeWorker(SkillWorker):
             self.finish(goal, update.state, update.values, text)
 
     def _lost(self) -> None:
-        """Cancel the goal that goes on over another connection."""
+        """Cancel the current goal over another connection."""
         goal = self.goal
         if goal is not None and goal.sent is not None and not goal.is_over:
             where = self.graph.address

@@ -1,7 +1,4 @@
-"""Action servers of a virtual robot: `python3 servers.py`, run by a Python that has rospy.
-
-Goals and cancels are passed to the tool, which decides how each goal ends.
-"""
+"""Action servers of a virtual robot, run by a Python that has rospy; the tool decides how goals end."""
 
 from __future__ import annotations
 
@@ -10,38 +7,41 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from channel import Channel, Message, SetupError, serve
+from channel import Channel, Fields, SetupError, serve
 from graph import Ros1Graph, no_master
-from message_types import message_types
+from message_types import action_types
 
 
 class ActionServers:
     """One action server for each skill, and a master if none answers.
 
-    The first line has the `node`, the `actions` by skill, and the `port` on which a master may be started, or
-    null.
+    The first line has the `node`, the `actions` by skill, and the `port` for a master, or null.
     """
 
-    def __init__(self, channel: Channel, start: Message) -> None:
+    def __init__(self, channel: Channel, start: Fields) -> None:
         import actionlib
 
         self.channel = channel
         self.graph = Ros1Graph(start["node"])
-        self.master = None if self.graph.is_online() else started_master(start["port"], self.graph.uri)
+        self.master = None if self.graph.is_online() else start_master(start["port"], self.graph.uri)
         self.graph.enter()
         self.handles: dict[str, Any] = {}
         self.lock = threading.Lock()
-        specs = message_types(list(start["actions"].values()))
+        specs = action_types(list(start["actions"].values()))
         self.servers: list[Any] = []
         for skill, action in start["actions"].items():
             server = actionlib.ActionServer(
-                action["server"], specs[action["type"]], self._starter(skill), self._cancel, auto_start=False
+                action["server"],
+                specs[action["type"]],
+                self._make_callback(skill),
+                self._cancel,
+                auto_start=False,
             )
             server.start()
             self.servers.append(server)
         channel.send("ready", has_master=self.master is not None)
 
-    def obey(self, line: Message) -> None:
+    def obey(self, line: Fields) -> None:
         """End a goal."""
         with self.lock:
             handle = self.handles.pop(line["id"])
@@ -56,12 +56,12 @@ class ActionServers:
             handle.set_canceled(result, "cancelled")
 
     def leave(self) -> None:
-        """Leave the graph, and stop the master if it is ours."""
+        """Leave the graph, and stop our master."""
         self.graph.leave()
         if self.master is not None:
             self.master.stop()
 
-    def _starter(self, skill: str) -> Callable[[Any], None]:
+    def _make_callback(self, skill: str) -> Callable[[Any], None]:
         def start(handle: Any) -> None:
             goal, number = handle.get_goal(), handle.get_goal_id().id
             with self.lock:
@@ -76,8 +76,8 @@ class ActionServers:
         self.channel.send("cancel", id=handle.get_goal_id().id)
 
 
-def started_master(port: int | None, uri: str) -> Any:
-    """A master in this process, reached at a port of this machine."""
+def start_master(port: int | None, uri: str) -> Any:
+    """Start a master in this process at a port of this machine."""
     if port is None:
         raise SetupError(no_master(uri))
     import rosmaster.master

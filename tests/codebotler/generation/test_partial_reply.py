@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from codebotler.generation.arriving import arriving
+from codebotler.generation.partial_reply import split_partial
 
 CODE = "def task_program():\n    say('hello')\n"
 
@@ -31,12 +31,12 @@ CODE = "def task_program():\n    say('hello')\n"
     ],
 )
 def test_text_and_code_of_what_has_arrived(reply: str, text: str, code: str) -> None:
-    found = arriving(reply)
+    found = split_partial(reply)
     assert (found.text, found.code) == (text, code)
 
 
 def test_a_long_reply_is_read_in_no_time() -> None:
     began = time.process_time()
-    arriving(("Let me think about it. " * 20 + "\n") * 1_000)
-    arriving(" " * 200_000)
+    split_partial(("Let me think about it. " * 20 + "\n") * 1_000)
+    split_partial(" " * 200_000)
     assert time.process_time() - began < 0.1
