@@ -69,6 +69,7 @@ def test_what_cannot_be_judged_does_not_match() -> None:
     assert len(found(Question(formula, negated=True), [asks])) == 1
 
 
+@pytest.mark.slow
 def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "BATCH", 3)
     monkeypatch.setattr(searching, "SMALL", 2)
