@@ -1,9 +1,10 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
 # installed (this folder, or a wheel), VENV where, EXTRAS with which extras.
 #
-#   make test       what to run before each commit, with the tutorial of own skills; TESTS names what to run instead
+#   make test       what to run before each commit, with the tutorial of own skills; TESTS names what to run instead. At
+#                   its end it lists the ten tests that took the most processor time; one above 0.1 s is marked slow
 #   make test-all   that, and everything below
-#     test-slow            tests that take seconds of a processor each
+#     test-slow            tests that are marked slow, since they take more than 0.1 s of a processor
 #     test-suites          the tasks of both suites as data: linted, and judged on programs with known verdicts
 #     test-guide           README, guides and examples: every command on them runs, and prints what they say
 #     test-ros1            robots on ROS 1, for which the system's Python must have rospy and the messages named in .ci/run
@@ -20,9 +21,9 @@
 # `make faults` tries 60 deliberate faults, which the tests must notice. `make messages` writes every sentence that
 # an error says in a test into build/messages.md, once, and which ones no test has seen. `make fuzz` runs
 # FUZZ_EXAMPLES random programs, drawn with FUZZ_SEED (by default another one each night, which is printed), and 1 %
-# of the real ones, where CODEBOTLER_CORPUS names them; `make test` runs 200, always the same. `make pictures` makes
-# the screenshots of the guide anew, with figures of a report. `make docs` makes the documentation as a site, in
-# build/site.
+# of the real ones, where CODEBOTLER_CORPUS names them, and each property test on 500 examples; `make test` runs 20 of
+# each. `make pictures` makes the screenshots of the guide anew, with figures of a report. `make docs` makes the
+# documentation as a site, in build/site.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -121,13 +122,17 @@ test-ray: $(EXTRAS_VENV)/tested
 test-environments: $(VENV)/tested $(addprefix test-environment-,$(ENVIRONMENTS))
 	$(BIN)/python environments/equal.py $(foreach name,$(ENVIRONMENTS),$(name)=$(call environment,$(name)))
 
-test-environment-%: $(SOURCES)
+$(addprefix test-environment-,$(ENVIRONMENTS)): test-environment-%: $(ENVIRONMENTS_IN)/.venv-%/tested
+	cd environments/$* && $(call environment,$*) -m mypy && $(call environment,$*) -m pytest
+
+TRAINERS = $(shell find environments -type f -not -name '*.pyc' -not -path '*/.*')
+$(ENVIRONMENTS:%=$(ENVIRONMENTS_IN)/.venv-%/tested): $(ENVIRONMENTS_IN)/.venv-%/tested: $(SOURCES) $(TRAINERS) constraints-extras.txt
 	@echo "making an environment with $* in $(ENVIRONMENTS_IN)/.venv-$*, which takes a minute"
 	@$(PYTHON) -m venv --clear $(ENVIRONMENTS_IN)/.venv-$*
 	@$(call environment,$*) -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 	@$(call environment,$*) -m pip --disable-pip-version-check install --no-compile --constraint constraints-extras.txt \
 		"$(PACKAGE)" ./environments/$* --group environments/$*/pyproject.toml:test | { $(DOTS); }
-	cd environments/$* && $(call environment,$*) -m mypy && $(call environment,$*) -m pytest
+	@touch $@
 
 test-faulty-server: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m
@@ -144,7 +149,9 @@ fuzz: $(VENV)/tested
 	@seed=$${FUZZ_SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')}; \
 	echo "random programs; to repeat: make fuzz FUZZ_SEED=$$seed FUZZ_EXAMPLES=$(FUZZ_EXAMPLES)"; \
 	FUZZ_SEED=$$seed FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest --hypothesis-seed=$$seed \
-		tests/codebotler/simulator/test_fuzz.py
+		tests/codebotler/simulator/test_fuzz.py && \
+	$(BIN)/python -m pytest --hypothesis-seed=$$seed --hypothesis-profile=thorough -m "hypothesis and not slow" \
+		$(addprefix --ignore ,$(APART))
 
 lint: $(VENV)/linted
 	$(BIN)/ruff check .

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import ssl
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,23 +11,27 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import messages
+import processor_time
 import shared_workers
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite, load_suite
 
-# A busy machine is no fault of what is tested; and CI tries the same examples each time.
+# Without a deadline, since a busy machine is no fault of the code. CI tries the same examples each time.
 settings.register_profile(
-    "unhurried",
+    "quick",
+    max_examples=20,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     derandomize="CI" in os.environ,
 )
-settings.load_profile("unhurried")
+settings.register_profile("thorough", settings.get_profile("quick"), max_examples=500, derandomize=False)
+settings.load_profile("quick")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="A test that is skipped has failed.")
     parser.addoption("--messages", help="The file that gets every sentence that an error has said.")
+    parser.addoption("--processor-time", help="The file that gets the processor seconds of each test.")
     parser.addoption("--shots", help="The folder that gets the screenshots of tests in a browser.")
 
 
@@ -39,6 +44,7 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.getoption("--messages"):
         messages.collect(SAID)
+    config.pluginmanager.register(processor_time.ProcessorTime(config.getoption("--processor-time")))
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -94,6 +100,20 @@ def runtime(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
         yield folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_authorities() -> Iterator[None]:
+    """Load no public certificate authorities: that takes 30 ms a client, and tests stay on this machine."""
+    load = ssl.SSLContext.load_verify_locations
+
+    def load_others(context: ssl.SSLContext, cafile: Any = None, *more: Any, **named: Any) -> None:  # noqa: ANN401
+        if not str(cafile).endswith("certifi/cacert.pem"):
+            load(context, cafile, *more, **named)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ssl.SSLContext, "load_verify_locations", load_others)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

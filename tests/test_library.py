@@ -317,6 +317,7 @@ def typed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("typed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong", "found"),
     [

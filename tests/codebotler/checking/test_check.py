@@ -209,6 +209,7 @@ def test_a_robot_that_waits_is_not_wrong(checks: Checks) -> None:
         assert {sample.outcome.status for sample in ended} == {Status.FINISHED}
 
 
+@pytest.mark.slow
 def test_waiting_in_many_places_ends_in_some_world(checks: Checks) -> None:
     lines = (
         "for room in ('kitchen', 'alice', 'bob', 'start'):",
@@ -229,6 +230,7 @@ def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None
     assert "25 imagined worlds" in problem.message
 
 
+@pytest.mark.slow
 def test_who_computes_for_ever_does_not_wait(checks: Checks) -> None:
     found = checks("for room in get_all_rooms():", "    is_in_room(room)", "sum(range(10**12))", samples=2)
     assert [problem.kind for problem in found.problems] == ["TimeoutError"]

@@ -51,6 +51,7 @@ def written(server: Server, *more: str, cwd: Path) -> Ended:
     return codebotler("generate", "Go to the kitchen.", *model, *more, cwd=cwd)
 
 
+@pytest.mark.slow
 def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, paper: Suite) -> None:
     world = tmp_path / "world.yaml"
     world.write_text(paper.tasks["StaplerDelivery"].scenarios[0].world.to_yaml())
@@ -201,6 +202,7 @@ def test_a_full_disk_under_the_record_is_told_and_costs_no_program(tmp_path: Pat
     assert full.startswith("codebotler: /dev/full: No space left on device; ")
 
 
+@pytest.mark.slow
 def test_a_record_that_does_not_fit_keeps_only_whole_lines(tmp_path: Path, paper: Suite) -> None:
     record = tmp_path / "attempts.jsonl"
     record.write_text("{" + " " * (LIMIT - 102) + "\n")

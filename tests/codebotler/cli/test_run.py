@@ -214,6 +214,7 @@ def test_a_typed_program_is_listed_by_its_first_skills(folder: Path) -> None:
     assert 'typed: go_to("kitchen"), is_in_room("mug"), …' in ended(folder, "missions")[1]
 
 
+@pytest.mark.slow
 def test_feedback_comes_while_the_robot_drives(folder: Path) -> None:
     process = started(folder, "run", "good.py", "--yes", "--world", "world.yaml", "--speed", "5")
     with stopping(process):
@@ -260,7 +261,12 @@ def driving(folder: Path, *wrapper: str) -> Process:
 
 @pytest.mark.parametrize(
     ("signals", "status"),
-    [([signal.SIGINT], 130), ([signal.SIGINT] * 3, 130), ([signal.SIGTERM], 143), ([signal.SIGHUP], 129)],
+    [
+        ([signal.SIGINT] * 3, 130),
+        pytest.param([signal.SIGINT], 130, marks=pytest.mark.slow),
+        pytest.param([signal.SIGTERM], 143, marks=pytest.mark.slow),
+        pytest.param([signal.SIGHUP], 129, marks=pytest.mark.slow),
+    ],
 )
 def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: int) -> None:
     process = driving(folder)
@@ -279,6 +285,7 @@ def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: in
     assert states(folder) == ["stopped"]
 
 
+@pytest.mark.slow
 def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
     process = driving(folder, "nohup")
     with stopping(process):
@@ -289,6 +296,7 @@ def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
     assert process.returncode == 130
 
 
+@pytest.mark.slow
 def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
     process = started(folder, "run", "good.py", "--world", "world.yaml")
     with stopping(process):
@@ -302,6 +310,7 @@ def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
     assert states(folder) == ["stopped"]
 
 
+@pytest.mark.slow
 def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path) -> None:
     process = driving(folder)
     with stopping(process):
@@ -356,6 +365,7 @@ def test_home_that_cannot_be_made_is_said(folder: Path) -> None:
     assert re.fullmatch(r"codebotler: /sys/home/robots: .*CODEBOTLER_HOME\n", err)
 
 
+@pytest.mark.slow
 def test_two_tools_on_one_robot(folder: Path) -> None:
     process = driving(folder)
     with stopping(process):
@@ -369,6 +379,7 @@ def test_two_tools_on_one_robot(folder: Path) -> None:
     assert states(folder) == ["stopped", "done"]
 
 
+@pytest.mark.slow
 def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
     process = driving(folder)
     with stopping(process):
@@ -379,6 +390,7 @@ def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
     assert states(folder) == ["failed"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("closed", "status"), [("0<&-", 1), ("1>&-", 0), ("2>&-", 0), ("0<&- 1>&- 2>&-", 1)])
 def test_closed_stream_leads_nowhere(folder: Path, closed: str, status: int) -> None:
     arguments = ("run", "good.py", "--world", "world.yaml", "--speed", "0")

@@ -161,7 +161,13 @@ DEEP = {
 }
 
 
-@pytest.mark.parametrize("text", DEEP.values(), ids=DEEP)
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(text, id=name, marks=[pytest.mark.slow] * (len(text) > 50_000))
+        for name, text in DEEP.items()
+    ],
+)
 def test_hostile_source_is_a_problem(text: str) -> None:
     assert flaws(text)
     assert flaws(in_task(text) if "\n" not in text else text)

@@ -94,6 +94,7 @@ def test_a_way_that_touches_a_corner_enters_nothing() -> None:
 # --- in simulation
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("program", "line"), [(THROUGH, 3), (AROUND, None)])
 def test_the_check_finds_a_drive_through_a_room(program: str, line: int | None) -> None:
     found = check(program, room_map=MAP, house_rules=[NEVER])
@@ -315,6 +316,7 @@ def with_face(robot: Robot) -> Robot:
     return RobotWithFace(robot, Face())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("around", [spelling, with_face])
 def test_a_pose_is_judged_also_while_no_skill_is_performed(
     tmp_path: Path, around: Callable[[Robot], Robot]

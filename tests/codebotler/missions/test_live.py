@@ -53,6 +53,7 @@ def worker() -> Iterator[Worker]:
 # --- the same as in the simulator
 
 
+@pytest.mark.slow
 def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
     as_written = replace(PAPER, literals="as-written")
     model = open_recorded("recorded:careful")

@@ -344,6 +344,7 @@ def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Pat
     assert 0 <= stop["seconds_to_cancel"] < 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("result", [None, RobotError("SayMute", "cancelled"), RobotLostError("gone")])
 def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result: Exception | None) -> None:
     asked, may_answer = threading.Event(), threading.Event()

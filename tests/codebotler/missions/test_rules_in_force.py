@@ -137,6 +137,7 @@ def test_a_rule_of_the_end_is_reported_and_changes_nothing(tmp_path: Path, said:
     assert [line["rule"] for line in lines if line["event"] == "rule"] == ["report"] * (said != "done")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("request_", ["vault", "THE VAULT", "kitchen, not the vault"])
 def test_every_room_that_a_request_may_mean_counts(tmp_path: Path, request_: str) -> None:
     robot = answering()
@@ -167,6 +168,7 @@ def told_room(room: str | None) -> str:
     return room
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("where", "state"), [(None, State.STOPPED), ("lab", State.DONE), ("lab 2", State.STOPPED)]
 )
@@ -179,6 +181,7 @@ def test_where_a_drive_may_have_led_counts_unless_the_robot_tells(
     assert mission.state is state
 
 
+@pytest.mark.slow
 def test_a_robot_that_tells_of_a_room_which_nobody_meant_is_there(tmp_path: Path) -> None:
     for request_, where in (("the lab, by the hall", "Lab 2 "), ("where the computers are", "lab 2")):
         robot = answering(lambda skill, _: where if skill == "get_current_location" else None)  # noqa: B023 - at once
@@ -228,6 +231,7 @@ def wander(sim: Simulation) -> None:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("call", "formula", "done"),
     [
@@ -297,6 +301,7 @@ def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: 
     assert robot.done[0] == "acme inc"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "formula",
     [
@@ -324,6 +329,7 @@ def test_an_answer_is_judged_as_the_option_that_it_means(tmp_path: Path) -> None
     assert robot.done == ["ann"]
 
 
+@pytest.mark.slow
 def test_rules_hold_in_a_building_of_more_rooms_than_a_check_takes(tmp_path: Path) -> None:
     rooms = RoomMap(("hall", *(f"room {number}" for number in range(1_500)), "vault"), "hall", plain=True)
     rule = Rule("vault", VAULT.says, parse('not tr.Exists(goto("^vault$"))'))

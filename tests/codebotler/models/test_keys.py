@@ -58,6 +58,7 @@ def server() -> Iterator[Server]:
         yield served
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", [KEY, ODD])
 def test_key_of_a_run_is_in_nothing_that_is_printed_logged_or_written(
     tmp_path: Path, server: Server, key: str

@@ -339,6 +339,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 @both
 def test_control_c_stops_all_requests_at_once_and_without_a_word(name: str, server: Server) -> None:
     server.faults.extend([Fault.SLOW, Fault.STALLED] * 10)
@@ -358,6 +359,7 @@ def test_control_c_stops_all_requests_at_once_and_without_a_word(name: str, serv
     assert len(server.requests) == 4
 
 
+@pytest.mark.slow
 @both
 def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -> None:
     dice = random.Random(1)

@@ -248,6 +248,7 @@ def test_reply_without_text_or_code_is_a_reply(name: str, server: Server) -> Non
     assert reply.text == "I am afraid that I cannot help with that."
 
 
+@pytest.mark.slow
 @both
 def test_huge_reply_is_a_reply(name: str, server: Server) -> None:
     server.faults.append(Fault.HUGE)

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
@@ -177,7 +177,6 @@ def judged(formula: Formula, trace: Trace) -> bool:
         return False
 
 
-@settings(max_examples=150)
 @given(st.data())
 def test_explanations_are_true(
     formulas: SearchStrategy[Formula], odd_traces: SearchStrategy[Trace], data: DataObject

@@ -4,7 +4,7 @@ import pickle
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
@@ -17,7 +17,6 @@ KNOCK = parse(
 )
 
 
-@settings(max_examples=300)
 @given(st.data())
 def test_it_says_of_every_prefix_what_the_formula_does(
     formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
@@ -59,7 +58,6 @@ def test_what_is_final_is_so_whatever_follows(text: str) -> None:
             assert monitor.is_final is same, (word[:end], text)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_what_is_final_stays_so_for_any_formula(
     formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject

@@ -5,7 +5,7 @@ from itertools import product
 from typing import get_args
 
 import pytest
-from hypothesis import given, reject, settings
+from hypothesis import given, reject
 from hypothesis import strategies as st
 
 from codebotler.core.trace import Event, Option, Trace
@@ -219,7 +219,6 @@ def test_automata_judge_all_short_traces_as_formulas_do(test: str, scope: str) -
     assert automaton.accepts[0] == holds(formula, ())
 
 
-@settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_found_traces_and_conflicts_are_right(data: st.DataObject) -> None:
     formulas = data.draw(st.lists(FORMULAS, min_size=1, max_size=3, unique=True))

@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from typing import SupportsIndex, TypeAlias, overload
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
@@ -209,7 +209,6 @@ def verdict(judge: Callable[[Formula, Trace], bool], formula: Formula, trace: Tr
         return error.event, error.number, error.option
 
 
-@settings(max_examples=180)
 @given(st.data())
 def test_tests_mean_their_definitions(
     single_tests: SearchStrategy[Test], odd_traces: SearchStrategy[Trace], data: DataObject
@@ -218,7 +217,6 @@ def test_tests_mean_their_definitions(
     assert verdict(holds, test, trace) == verdict(defined, test, trace)
 
 
-@settings(max_examples=70)
 @given(st.data())
 def test_formulas_mean_their_definitions(
     formulas: SearchStrategy[Formula], odd_traces: SearchStrategy[Trace], data: DataObject
@@ -377,6 +375,13 @@ def test_counting_stops_at_the_event_that_settles_it() -> None:
     assert not holds(parse('tr.Count(ask(".*", "yes"), 1)'), (good, good, bad))
     with pytest.raises(Inconclusive):
         holds(parse('tr.Count(ask(".*", "yes"), 1)'), (good, bad))
+
+
+@pytest.mark.parametrize("scope", ["AfterFirst", "AfterLast", "BeforeFirst", "BeforeLast"])
+@pytest.mark.parametrize("times", [1, 2])
+def test_no_part_holds_the_event_that_bounds_it(scope: str, times: int) -> None:
+    formula = parse(f'tr.{scope}(say("a")).Exists(say("a"))')
+    assert holds(formula, (say("a"),) * times) is (times == 2 and scope in {"AfterFirst", "BeforeLast"})
 
 
 def test_only_elements_that_ask_look_at_options() -> None:

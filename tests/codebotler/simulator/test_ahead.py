@@ -59,6 +59,7 @@ def test_all_worlds_of_a_check_are_run_by_the_child_that_was_there(
     assert are_gone({ready.pid})
 
 
+@pytest.mark.slow
 def test_no_child_of_a_dead_server_is_signalled_since_its_number_may_be_anothers(
     own_worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:

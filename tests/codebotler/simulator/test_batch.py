@@ -246,6 +246,7 @@ def test_what_computes_too_long_in_a_batch_costs_those_after_it_nothing(worker: 
     assert worker.run_tame(jobs).keys() == {(0, 0), (2, 0)}
 
 
+@pytest.mark.slow
 def test_programs_of_a_batch_end_as_if_each_were_alone(worker: Worker, other_worker: Worker) -> None:
     programs = [*DECIDED, *UNDECIDED, "class A: pass\ntask_program = A", "def task_program(:"]
     for jobs in ([job(program) for program in programs], [job(program) for program in reversed(programs)]):
@@ -819,6 +820,7 @@ def test_one_process_per_run_shares_no_process(other_worker: Worker) -> None:
     assert FORK_SERVER in other_worker._fork_servers
 
 
+@pytest.mark.slow
 def test_a_pool_hands_on_that_each_run_has_a_process() -> None:
     for alone, role in ((False, BATCH_SERVER), (True, FORK_SERVER)):
         with WorkerPool(1, one_process_per_run=alone) as pool:

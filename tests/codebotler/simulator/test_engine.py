@@ -82,6 +82,7 @@ def nothing_is_left() -> Iterator[None]:
 # --- order
 
 
+@pytest.mark.slow
 def test_outcomes_come_in_the_order_of_the_pairs() -> None:
     texts = [str(number) for number in range(40)]
     slow = "def task_program():\n    for i in range(150_000): pass\n    say('{}')\n"
@@ -143,6 +144,7 @@ def test_the_pool_of_the_process_is_tried_again_where_it_could_not_start(
         shared.end()
 
 
+@pytest.mark.slow
 def test_a_pool_that_nobody_enters_ends_with_the_process() -> None:
     script = "from codebotler.simulator.pool import WorkerPool; WorkerPool(1)"
     began = fork_servers()
@@ -219,6 +221,7 @@ def task_program():
 """
 
 
+@pytest.mark.slow
 def test_identities_do_not_depend_on_what_the_engine_holds() -> None:
     hall, kitchen = str(b"hall", "ascii"), str(b"kitchen", "ascii")
     worlds = [World((Room("hall"), Room("kitchen")), "hall"), World((Room(hall), Room(kitchen)), hall)]
@@ -289,6 +292,7 @@ def task_program():  # NUMBER
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("imports", ["", "import json\n"])
 def test_addresses_are_the_same_in_the_first_run_and_long_after(imports: str) -> None:
     programs = [(imports + ADDRESSES.replace("NUMBER", str(number)), WORLD) for number in range(150)]
@@ -381,6 +385,7 @@ def script_with_the_engine() -> tuple[subprocess.Popen[str], set[int]]:
     return script, children_of(script.pid)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_script_that_is_stopped_leaves_no_process_behind(number: signal.Signals) -> None:
     script, below = script_with_the_engine()
@@ -393,6 +398,7 @@ def test_script_that_is_stopped_leaves_no_process_behind(number: signal.Signals)
 # --- what the engine survives
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_engine_survives_a_fork_server_that_was_killed_between_runs() -> None:
     outcomes = run(((saying(str(number)), WORLD) for number in range(60)), workers=1)
@@ -402,6 +408,7 @@ def test_engine_survives_a_fork_server_that_was_killed_between_runs() -> None:
     assert [said(outcome) for outcome in outcomes] == [[str(number)] for number in range(1, 60)]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_fork_server_that_was_killed_while_idle_is_replaced_and_no_socket_is_lost() -> None:
     def pairs() -> Iterator[tuple[str, World]]:
@@ -439,6 +446,7 @@ def test_run_whose_fork_server_is_killed_is_run_again() -> None:
     assert [said(outcome) for outcome in outcomes] == [["a", "b"], ["c"]]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
     with pytest.raises(EngineError, match="lost twice"):
@@ -492,6 +500,7 @@ def task_program():  # NUMBER
 """.replace("LIBRARY", LIBRARY)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in FUTEX, reason="the number of futex is not known here")
 def test_program_that_waits_a_little_at_a_time_ends_the_same_way_in_each_of_many_runs() -> None:
     source = WAITING_A_LITTLE.replace("FUTEX", str(FUTEX[platform.machine()]))
@@ -562,6 +571,7 @@ def test_isolation_can_be_required() -> None:
     assert len(list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))) == 1
 
 
+@pytest.mark.slow
 def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureFixture) -> None:
     programs = [saying("a"), "def task_program(): go_to('x')", "import os\nos._exit(3)"]
     pairs = [(program, WORLD) for program in programs]
@@ -617,6 +627,7 @@ resource.setrlimit = with_fewer
 """
 
 
+@pytest.mark.slow
 def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -652,6 +663,7 @@ def test_large_programs_say_the_same_addresses_every_time() -> None:
     assert len({tuple(said(outcome)) for outcome in outcomes}) == 1
 
 
+@pytest.mark.slow
 def test_few_characters_of_much_code_are_refused() -> None:
     methods = "".join(f" def f{j}(): 0\n" for j in range(1500))
     worker = Worker()
@@ -732,6 +744,7 @@ print(sha256(compiled_modules(compiled, {FORK_SERVER!r})).hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_what_a_fork_server_is_handed_does_not_depend_on_how_python_was_started() -> None:
     def told(*flags: str, **variables: str) -> str:
         command = [sys.executable, *flags, "-c", HANDED_OVER]

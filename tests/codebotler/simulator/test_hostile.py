@@ -43,8 +43,10 @@ from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import judge
 from roboeval.suites.load import Requirement, Scenario
 
-BURN = {  # all the processor time that there is; another one does so in `make test`
-    *("cpu_counter_replaced", "cpu_power", "cpu_recursion_by_except", "cpu_regex", "cpu_uncounted_code"),
+ONE_A_LAYER = {  # the others are slow
+    *("backdoors_callers", "backdoors_swallows_in_except", "files_read_secret", "judge_forged_record"),
+    *("leaves_patched_builtins", "memory_at_once", "network_tcp", "processes_fork", "processes_kill_engine"),
+    *("protocol_forged_finish", "protocol_half_a_frame_then_silence", "time_thread"),
 }
 PROGRAMS = sorted((Path(__file__).parents[2] / "hostile").glob("*.py"))
 AS_WRITTEN = SimulationSettings(literals="as-written")
@@ -352,7 +354,7 @@ def honest(reach: Reach) -> Outcome:
 
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in BURN)) for path in PROGRAMS],
+    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem not in ONE_A_LAYER)) for path in PROGRAMS],
     ids=lambda path: path.stem,
 )
 def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome) -> None:

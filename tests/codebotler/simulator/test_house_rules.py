@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.errors import RobotError
@@ -299,7 +299,6 @@ WITHIN = (
 
 
 @pytest.mark.parametrize("tried", [False, True])
-@settings(max_examples=20, deadline=None)
 @given(
     steps=st.lists(st.sampled_from(STEPS), max_size=7),
     formula=st.sampled_from(WITHIN),
@@ -511,7 +510,6 @@ SKILLS = {
 }
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     calls=st.lists(st.one_of(*SKILLS.values()), max_size=8),
     formula=st.sampled_from(FORMULAS),

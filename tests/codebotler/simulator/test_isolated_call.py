@@ -41,6 +41,7 @@ def test_function_reaches_no_file_no_socket_and_no_key(monkeypatch: pytest.Monke
     assert closed.reach(__file__) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("call", "kind"),
     [
@@ -131,6 +132,7 @@ def no_compiler_(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(programs, "_pyflakes", refuse)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_compiler")
 def test_programs_of_others_are_never_compiled_in_this_process() -> None:
     assert not check(TASK).problems

@@ -122,6 +122,7 @@ def as_user(user: int, command: list[str]) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("user", [0, NOBODY] if ROOT else [os.geteuid()])
 def test_programs_are_kept_in_whoever_runs_the_engine(
     folder: Path, open_to_all: list[str], user: int
@@ -196,6 +197,7 @@ def test_kernel_that_refuses_a_filter_is_told_of_in_one_line_and_the_verdicts_ar
     assert below.stdout == bare.stdout != ""
 
 
+@pytest.mark.slow
 def test_isolation_that_is_required_is_refused_where_the_kernel_refuses_a_filter() -> None:
     refused = evaluated("--require-isolation", before=BELOW_A_FILTER)
     assert (refused.returncode, refused.stdout) == (1, "")
@@ -203,6 +205,7 @@ def test_isolation_that_is_required_is_refused_where_the_kernel_refuses_a_filter
     assert evaluated("--require-isolation").returncode == 0
 
 
+@pytest.mark.slow
 def test_all_other_isolation_holds_where_the_kernel_refuses_a_filter(folder: Path) -> None:
     attacks = {f"open('{folder}/secret')": "OSError", "os.fork()": "BlockingIOError", "say('a')": None}
     check = BELOW_A_FILTER + CHECK.replace("require_isolation=True", "require_isolation=False")

@@ -113,6 +113,7 @@ def test_fuel_is_counted_anew_after_each_skill_and_sleep(worker: Worker) -> None
     assert (happened, outcome.status) == (["a"], Status.TIMEOUT)
 
 
+@pytest.mark.slow
 def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
     program = "def task_program():\n    for i in range(1500): say(str(i)); time.sleep(60)\n"
     happened, outcome = done(worker, program)
@@ -120,6 +121,7 @@ def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
     assert len(happened) == 3000
 
 
+@pytest.mark.slow
 def test_program_may_compute_for_long_if_it_acts_in_between(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,6 +135,7 @@ def test_program_may_compute_for_long_if_it_acts_in_between(
     assert done(worker, program)[0] == [str(number) for number in range(20)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", ["-1.0", "NaN", "Infinity", "true", '"1"', "[]"])
 def test_request_to_sleep_that_no_child_makes_ends_the_run(worker: Worker, seconds: str) -> None:
     frame = f'["sleep",[{seconds}],0.0]'.encode()
@@ -146,6 +149,7 @@ def test_request_to_sleep_that_no_child_makes_ends_the_run(worker: Worker, secon
     assert machine.done == []
 
 
+@pytest.mark.slow
 def test_programs_that_import_run_once_only(worker: Worker) -> None:
     happened, outcome = done(
         worker, "def task_program():\n    say('a')\n    exec('import random')\n    say('b')\n"
@@ -192,6 +196,7 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: 
     assert done(worker, "def task_program(): say('next')")[0] == ["next"]
 
 
+@pytest.mark.slow
 def test_run_whose_process_is_lost_is_not_run_again(worker: Worker) -> None:
     def does(_: str) -> Result:
         family = engine_processes()

@@ -603,16 +603,30 @@ BEYOND: dict[str, tuple[str, object]] = {
     f"beyond {name}": (task(f"{inside}\n{outside}"), None) for name, (inside, outside, _) in LIMITS.items()
 }
 SLOW = ("hangs in C", "deadlock")
+HONEST = task("say('honest')")
 
 
 @pytest.fixture(scope="module")
 def outcomes() -> Outcomes:
-    """Every program's outcome, with an honest program after each that fails."""
+    """Every quick program's outcome, with an honest program after each that fails."""
     programs = all_of(LINES, WITHIN, BEYOND, WORKS)
     for number, name in enumerate(FAILS):
-        programs |= {name: FAILS[name][0], f"after {name}": task(f"say('honest {number}')")}
-    ordered = [*SLOW, *(name for name in programs if name not in SLOW)]
-    return run_all({name: programs[name] for name in ordered}, SimulationSettings())
+        if name not in SLOW:
+            programs |= {name: FAILS[name][0], f"after {name}": task(f"say('honest {number}')")}
+    return run_all(programs, SimulationSettings())
+
+
+@pytest.fixture(scope="module")
+def slow_outcomes() -> Outcomes:
+    """The outcomes of programs that the engine must end, with an honest program after each."""
+    return run_all(
+        {
+            name: source
+            for slow in SLOW
+            for name, source in ((slow, FAILS[slow][0]), (f"after {slow}", HONEST))
+        },
+        SimulationSettings(),
+    )
 
 
 @pytest.mark.parametrize("name", WORKS)
@@ -620,10 +634,24 @@ def test_program_works(outcomes: Outcomes, name: str) -> None:
     assert said(outcomes[name]) == WORKS[name][1]
 
 
-@pytest.mark.parametrize("name", FAILS)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLOW)
+def test_program_that_hangs_is_ended_and_leaves_the_next_one_alone(
+    slow_outcomes: Outcomes, name: str
+) -> None:
+    check_failure(slow_outcomes, name)
+    assert said(slow_outcomes[f"after {name}"]) == ["honest"]
+
+
+@pytest.mark.parametrize("name", [name for name in FAILS if name not in SLOW])
 def test_program_fails_with_the_right_status_and_leaves_the_next_one_alone(
     outcomes: Outcomes, name: str
 ) -> None:
+    check_failure(outcomes, name)
+    assert said(outcomes[f"after {name}"]) == [f"honest {list(FAILS).index(name)}"]
+
+
+def check_failure(outcomes: Outcomes, name: str) -> None:
     expected = FAILS[name][1]
     assert isinstance(expected, tuple)
     status, kind, message = expected
@@ -634,7 +662,6 @@ def test_program_fails_with_the_right_status_and_leaves_the_next_one_alone(
     assert outcome.error.message.startswith(message or "")
     if kind not in ("RecursionError", "GoToInvalidLocation"):
         assert outcome.trace == ()
-    assert said(outcomes[f"after {name}"]) == [f"honest {list(FAILS).index(name)}"]
 
 
 def one(program: str, rules: SimulationSettings | None = None, world: World = HOUSE) -> Outcome:

@@ -550,6 +550,7 @@ def test_programs_that_are_prepared_together_are_as_if_each_were_alone() -> None
         preparer.close()
 
 
+@pytest.mark.slow
 def test_a_program_that_exhausts_the_preparer_costs_those_beside_it_nothing() -> None:
     greedy = f"import {'.'.join(['a'] * 40_000)}\n"
     preparer = Preparer()
@@ -601,6 +602,7 @@ def test_tame_programs_find_each_name_that_is_allowed() -> None:
 # --- real programs
 
 
+@pytest.mark.slow
 def test_all_real_programs_that_parse_are_tame(corpus: Path) -> None:
     wild = []
     parsed = 0

@@ -39,6 +39,7 @@ from codebotler.simulator.worker import NewRobot, Worker
 FOLDER = Path(__file__).parents[2] / "hostile_tame"
 PROGRAMS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.py"))}
 TAME = [name for name, source in PROGRAMS.items() if "\n# tame: yes\n" in source]
+ONE_A_KIND = {name.partition("_")[0]: name for name in reversed(TAME)}.values()
 WILD = [name for name, source in PROGRAMS.items() if "\n# tame: no\n" in source]
 AS_WRITTEN = SimulationSettings(literals="as-written")
 AMY = Person("amy", ("yes", "no", ".*"))
@@ -381,7 +382,9 @@ def test_wild_program_is_left_alone(name: str, batches: Worker) -> None:
     assert before == after
 
 
-@pytest.mark.parametrize("name", TAME)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in ONE_A_KIND)) for name in TAME]
+)
 def test_tame_program_is_felt_by_no_other_run(
     name: str, batches: Worker, alone: Worker, honest: Mapping[str, list[str]]
 ) -> None:

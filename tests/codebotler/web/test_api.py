@@ -66,6 +66,7 @@ def stream(server: PageServer, mission: str, last: int = 0) -> list[tuple[int, d
     return found
 
 
+@pytest.mark.slow
 def test_where_a_program_failed_is_told(server: PageServer) -> None:
     fails = "def task_program():\n    go_to('kitchen')\n    raise ValueError('odd')\n"
     view = begun(server, fails)
@@ -108,6 +109,7 @@ def test_problems_need_a_word_and_the_program_that_was_seen(server: PageServer) 
     assert (mended["problems"], mended["program"]) == ([], HELLO)
 
 
+@pytest.mark.slow
 def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None:
     with (
         Server(answer=lambda asked: HELLO if "cellar" in json.dumps(asked.body) else BAD) as model,
@@ -133,6 +135,7 @@ def test_without_a_world_the_robot_works_in_the_office_of_the_examples(tmp_path:
         assert view["check"]["problems"] == []
 
 
+@pytest.mark.slow
 def test_who_does_not_read_holds_nothing_up(tmp_path: Path) -> None:
     """Twenty clients follow a mission that tells more than a connection holds, and read none of it."""
     many = "def task_program():\n    for n in range(115):\n        say(str(n) + 'x' * 8000)\n"
@@ -234,23 +237,21 @@ def test_another_method_is_told_which_are_taken(
     assert answer.data["detail"] == f"this address accepts only {allowed.replace(', ', ' and ')}"
 
 
-@pytest.mark.parametrize(
-    ("method", "path"),
-    [
-        ("GET", "/events"),
-        ("GET", "/events.jsonl"),
-        ("GET", "/events.mcap"),
-        ("POST", "/stop"),
-        ("POST", "/again"),
-    ],
-)
-def test_before_there_is_a_mission_that_is_said(tmp_path: Path, method: str, path: str) -> None:
+def test_before_there_is_a_mission_that_is_said(tmp_path: Path) -> None:
     with PageServer(tmp_path) as server:
-        answer = server.call(method, f"/api/missions/current{path}", {} if path == "/again" else None)
-        assert answer.status == 404
-        assert "POST /api/missions" in answer.data["detail"]
+        for method, path in (
+            ("GET", "/events"),
+            ("GET", "/events.jsonl"),
+            ("GET", "/events.mcap"),
+            ("POST", "/stop"),
+            ("POST", "/again"),
+        ):
+            answer = server.call(method, f"/api/missions/current{path}", {} if path == "/again" else None)
+            assert answer.status == 404, path
+            assert "POST /api/missions" in answer.data["detail"]
 
 
+@pytest.mark.slow
 def test_missions_that_cannot_be_kept_are_said_before_the_page_is_there(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(WORLD)
     ended = subprocess.run(
@@ -291,6 +292,7 @@ def test_the_api_is_described(server: PageServer) -> None:
     assert {"/api/missions", "/api/missions/{mission}/stop", "/api/check"} <= described.keys()
 
 
+@pytest.mark.slow
 def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(tmp_path: Path) -> None:
     with PageServer(tmp_path) as server:
         view = begun(server, FAR)

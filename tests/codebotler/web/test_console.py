@@ -129,6 +129,7 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> None:
     world, model = read_world(OFFICE), open_recorded("recorded")
     robot = Simulated(world, speed=None)

@@ -55,6 +55,7 @@ def test_a_package_adds_pages_and_a_broken_one_is_left_out(
     assert '"wrong_pages"' in server.said
 
 
+@pytest.mark.slow
 def test_codebotler_needs_no_benchmark() -> None:
     """The pages of the benchmark come by the entry point alone."""
     code = "import codebotler.web.server, sys; print(any(m.startswith('roboeval') for m in sys.modules))"

@@ -111,6 +111,7 @@ def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
     assert until(server, lambda now: now["screens"] == 0)
 
 
+@pytest.mark.slow
 def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> None:
     with watching(server) as one, watching(server) as other:
         server.run(TEA)
@@ -124,6 +125,7 @@ def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> Non
         assert (late.status, "withdrawn" in late.data["detail"]) == (409, True)
 
 
+@pytest.mark.slow
 def test_nobody_answers_in_time(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--face", "--speed", "0", "--face-timeout", "1") as server:
         server.run(TEA)
@@ -135,6 +137,7 @@ def test_nobody_answers_in_time(tmp_path: Path) -> None:
         assert any("no face" in line.get("text", "") for line in events)
 
 
+@pytest.mark.slow
 def test_the_face_tells_what_the_robot_does_and_nothing_of_its_program(server: PageServer) -> None:
     assert server.face("GET", "/api/face").data["doing"] == "idle"
     server.run(SECRET, despite_problems=True)
@@ -175,6 +178,7 @@ def test_an_answer_that_is_none_is_refused(server: PageServer, answer: object) -
     assert server.face("POST", "/api/face/answer", answer).status == 422
 
 
+@pytest.mark.slow
 def test_a_face_that_reads_nothing_holds_nothing_up(tmp_path: Path) -> None:
     """Its messages would fill all buffers many times over."""
     talks = "def task_program():\n    for n in range(400):\n        say(str(n) + chr(8987) * 5000)\n"
@@ -255,6 +259,7 @@ def test_the_page_of_the_face_has_a_stricter_policy(server: PageServer) -> None:
     assert "script-src 'self';" in own
 
 
+@pytest.mark.slow
 def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--speed", "0") as server:
         assert "face" not in server.said

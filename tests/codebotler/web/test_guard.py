@@ -194,10 +194,10 @@ def test_a_token_is_made_for_each_start() -> None:
     ("arguments", "told"),
     [
         (["--no-token", "--host", "0.0.0.0"], "this machine only"),
-        (["--no-token", "--host", "::"], "this machine only"),
-        (["--no-token", "--host", "0"], "this machine only"),
-        (["--no-token", "--host", "127.example"], "this machine only"),
-        (["--no-token", "--host", ""], "this machine only"),
+        *(
+            pytest.param(["--no-token", "--host", host], "this machine only", marks=pytest.mark.slow)
+            for host in ("::", "0", "127.example", "")
+        ),
         (["--no-token", "--token", "x" * 20], "this machine only"),
         (["--no-token", "--behind-proxy", "https://robot.example"], "this machine only"),
         (["--behind-proxy", "https://robot.example/missions"], "the page itself uses /missions"),
@@ -216,6 +216,7 @@ def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told
     assert told in err
 
 
+@pytest.mark.slow
 def test_other_machines_need_the_token_and_that_is_said(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--host", "0.0.0.0") as server:
         assert server.token

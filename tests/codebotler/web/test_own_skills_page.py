@@ -25,6 +25,7 @@ OPENS = """def task_program():
 """
 
 
+@pytest.mark.slow
 def test_a_program_with_own_skills_is_checked_and_run(tmp_path: Path) -> None:
     world = (QUADRUPED / "world.yaml").read_text()
     more = (
@@ -52,6 +53,7 @@ def test_a_program_with_own_skills_is_checked_and_run(tmp_path: Path) -> None:
         assert "TypeError" in [problem["kind"] for problem in refused["problems"]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({path.name for path in SETS.iterdir()} - {QUADRUPED.name}))
 def test_the_other_sets_are_served_as_well(tmp_path: Path, name: str) -> None:
     own = SETS / name

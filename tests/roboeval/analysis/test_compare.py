@@ -190,6 +190,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_command(runs: Path) -> None:
     made = roboeval("compare", "hasty", "careful", cwd=runs)
     assert made.status == 0, made

@@ -137,6 +137,7 @@ def test_interval_holds_the_mean(values: list[float]) -> None:
     assert 0 <= found.low <= found.mean <= found.high <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("alpha", "beta"), [(2, 3), (0.5, 0.5), (6, 2)])
 def test_interval_covers_as_often_as_it_says(alpha: float, beta: float) -> None:
     chance, prompts, completions, times = random.Random(7), 80, 10, 1500

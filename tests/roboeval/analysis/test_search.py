@@ -66,6 +66,7 @@ def test_what_cannot_be_judged_does_not_match() -> None:
     assert len(found(TraceQuery(formula, negated=True), [asks])) == 1
 
 
+@pytest.mark.slow
 def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "ROWS_FOR_PROCESSES", 50)
     rows = [{**ROWS[n % 4], "index": n} for n in range(50)]

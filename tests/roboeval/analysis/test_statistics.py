@@ -69,6 +69,7 @@ METHODS: dict[str, Callable[[Clusters, int], Estimate]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("tasks", [6, 16])
 def test_intervals_hold_the_truth_about_as_often_as_they_say(method: str, tasks: int) -> None:

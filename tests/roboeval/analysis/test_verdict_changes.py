@@ -178,6 +178,7 @@ def judged_twice(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_command(judged_twice: Path) -> None:
     made = roboeval("compare", "hasty", "careful", "--suites", "paper,plus", cwd=judged_twice)
     assert made.status == 0, made
@@ -211,6 +212,7 @@ def test_the_other_way_round(judged_twice: Path) -> None:
     assert one["difference"] == pytest.approx(-other["difference"])
 
 
+@pytest.mark.slow
 def test_other_worlds_than_the_suites_own(judged_twice: Path, tmp_path: Path) -> None:
     shutil.copytree(judged_twice / "hasty", tmp_path / "hasty")
     few = ("--suite", "plus", "--tasks", "GetDrink,GrilledCheese", "--worlds", "12", "--seed", "5", "--redo")
@@ -221,6 +223,7 @@ def test_other_worlds_than_the_suites_own(judged_twice: Path, tmp_path: Path) ->
     assert (made.status, "has changed" in made.err) == (0, False)
 
 
+@pytest.mark.slow
 def test_the_report(judged_twice: Path, tmp_path: Path) -> None:
     out = tmp_path / "report"
     options = ("--beside", "plus", "--no-check")

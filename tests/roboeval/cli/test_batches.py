@@ -87,6 +87,7 @@ def take(folder: Path, *names: str) -> Ended:
 # --- requests
 
 
+@pytest.mark.slow
 def test_requests_hold_what_is_set_and_need_no_key(tmp_path: Path) -> None:
     rows = begin(tmp_path, "--seed", "3", "--max-tokens", "99", "--no-top-p", url=None)
     assert len(rows) == len({row["custom_id"] for row in rows}) == COUNT
@@ -309,6 +310,7 @@ def test_a_file_that_breaks_off_adds_nothing(tmp_path: Path) -> None:
     assert (tmp_path / "run" / "completions.jsonl").read_bytes() == b""
 
 
+@pytest.mark.slow
 def test_answers_need_their_run_and_its_suite(tmp_path: Path) -> None:
     first, *_ = begin(tmp_path)
     written(tmp_path / "answers.jsonl", [answer(first, content="a")])

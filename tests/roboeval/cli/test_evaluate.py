@@ -298,6 +298,7 @@ def test_a_question_ends_as_one() -> None:
     assert refusal.commands == ["roboeval --help"]
 
 
+@pytest.mark.slow
 def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     drawn = ("--suite", "plus", "--worlds", "33", "--seed", "9")
@@ -335,6 +336,7 @@ SMALL_DISK = "ulimit -f 600;"  # in KiB: no file may grow beyond it
 LONG = 'def task_program(): say("good day " * 1000)\n'
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_an_evaluation_in_one_sentence_and_it_goes_on(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(index, f"{LONG}# {index}") for index in range(20)))
     assert roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
@@ -348,6 +350,7 @@ def test_a_full_disk_ends_an_evaluation_in_one_sentence_and_it_goes_on(tmp_path:
     assert (tmp_path / "run" / "evaluations" / "paper.jsonl").read_bytes().startswith(rows)
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_no_half_run(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(index, "#" * 100_000) for index in range(8)))
     ended = roboeval("import", "a.jsonl", "--out", "new/run", cwd=tmp_path, before=SMALL_DISK)
@@ -356,6 +359,7 @@ def test_a_full_disk_leaves_no_half_run(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["a.jsonl"]
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_an_exported_table_as_it_was(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(map(row, range(12))))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
@@ -402,6 +406,7 @@ def test_a_terminal_of_no_columns_is_one_of_unknown_width(columns: str) -> None:
     assert "LunchTime" in told
 
 
+@pytest.mark.slow
 def test_an_output_that_is_full_or_closed() -> None:
     ended = roboeval("tasks", "--json", after="> /dev/full")
     assert ended.status == 1
@@ -424,6 +429,7 @@ def test_progress_counts_what_has_been_passed_on(
 SLOW = "def task_program():\n    for i in range(150000): pass\n# {}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "options", "kept"),
     [
@@ -776,6 +782,7 @@ def test_ctrl_c_in_the_middle_of_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path
     assert ended.err.splitlines()[-1].startswith("roboeval: stopped; ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -35,6 +35,7 @@ def served(url: str, *more: str, model: str = "completions:tiny", tasks: str = T
 # --- with a recorded model
 
 
+@pytest.mark.slow
 def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
     words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--tasks", TASKS]
     ended = roboeval(*words, cwd=tmp_path)
@@ -55,6 +56,7 @@ def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
     assert not (run / "report").exists()
 
 
+@pytest.mark.slow
 def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
     words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--out", "run", "--workers", "1"]
     process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
@@ -207,6 +209,7 @@ def test_a_suite_that_nobody_recorded(tmp_path: Path) -> None:
 # --- with a served model
 
 
+@pytest.mark.slow
 def test_a_wrong_key_is_one_sentence_and_stands_nowhere(tmp_path: Path) -> None:
     with Server(fault=lambda _: Fault.UNAUTHORIZED) as server:
         for model in ("completions:tiny", "openai:tiny"):
@@ -271,6 +274,7 @@ def test_a_budget_stops_with_a_sentence_and_goes_on_later(tmp_path: Path) -> Non
     assert len(server.requests) == len(set(keys(tmp_path / "run"))) == 20
 
 
+@pytest.mark.slow
 def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_path: Path) -> None:
     times, lost = 3, 0
     with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
@@ -295,6 +299,7 @@ def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_pat
     assert lost <= twice <= lost + times  # a request that was noted need not have arrived
 
 
+@pytest.mark.slow
 def test_control_c_says_what_is_kept(tmp_path: Path) -> None:
     with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
         words = served(server.url, "--concurrency", "4")
@@ -309,6 +314,7 @@ def test_control_c_says_what_is_kept(tmp_path: Path) -> None:
     assert len(keys(tmp_path / "run")) == int(said[1])
 
 
+@pytest.mark.slow
 def test_one_in_ten_requests_fails_over_both_protocols(tmp_path: Path) -> None:
     faults = [
         Fault.SERVER_ERROR,
@@ -334,6 +340,7 @@ def test_one_in_ten_requests_fails_over_both_protocols(tmp_path: Path) -> None:
 # --- resampling
 
 
+@pytest.mark.slow
 def test_resampling_checks_once_and_prints_both_figures(tmp_path: Path) -> None:
     words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--tasks", TASKS, "--out", "run"]
     assert roboeval(*words, cwd=tmp_path).status == 0
@@ -371,6 +378,7 @@ def test_resampling_needs_a_judged_run(tmp_path: Path) -> None:
     assert "completions.jsonl" in refusal.sentence
 
 
+@pytest.mark.slow
 def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> None:
     words = ["generate", "--model", "recorded:hasty", "--num-completions", "2", "--tasks", TASKS]
     assert roboeval(*words, "--out", "run", cwd=tmp_path).status == 0

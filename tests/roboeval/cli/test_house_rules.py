@@ -56,6 +56,7 @@ def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
     assert told["house_rules"]["cost"]["mean"] < 0
 
 
+@pytest.mark.slow
 def test_where_rules_are_not_named_their_verdicts_are_told_of(folder: Path) -> None:
     evaluated = roboeval(
         "evaluate", "recorded:careful", "--out", "run", "--rules", "house.yaml", *TASKS, cwd=folder
@@ -81,6 +82,7 @@ def accepted(folder: Path, *arguments: str) -> int:
     return sum(prompt["accepted"] for prompt in told["prompts"])
 
 
+@pytest.mark.slow
 def test_rejection_sampling_rejects_what_breaks_a_rule(folder: Path) -> None:
     of_suite = ("--suite", "rules", "--tasks", "FetchMugConflict")
     assert roboeval("evaluate", "recorded:hasty", *of_suite, "--out", "own", cwd=folder).status == 0
@@ -105,6 +107,7 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
     assert "the interval of the share that breaks a rule is unknown: no variation between tasks." in page
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_with_any_number_of_workers_and_on_both_roads(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:hasty", "--out", "run", *TASKS, cwd=folder).status == 0
     one = judged(folder, "--workers", "1")
@@ -113,6 +116,7 @@ def test_rows_are_the_same_with_any_number_of_workers_and_on_both_roads(folder: 
     assert judged(folder, "--redo", "--one-process-per-run") == one
 
 
+@pytest.mark.slow
 def test_other_rules_do_not_go_on_with_an_evaluation(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     judged(folder)

@@ -27,6 +27,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_report_of_two_runs(runs: Path) -> None:
     label = ("--label", "hasty=Base model")
     made = roboeval("report", "hasty", "careful", "--out", "report", *label, cwd=runs)
@@ -64,6 +65,7 @@ finally:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", ["report run --out report --beside plus", "compare run --suites paper,plus", "show run"]
 )
@@ -76,6 +78,7 @@ def test_completions_are_read_once_for_all_evaluations(command: str, runs: Path,
     assert ended.stderr.splitlines()[-1] == "[1, 1]"
 
 
+@pytest.mark.slow
 def test_an_unfinished_run_is_reported_as_far_as_it_goes(runs: Path) -> None:
     shutil.copytree(runs / "careful", runs / "part", ignore=shutil.ignore_patterns("checks"))
     rows = runs / "part" / "evaluations" / "paper.jsonl"

@@ -34,6 +34,7 @@ def test_rates_on_real_programs(
     assert found.hold
 
 
+@pytest.mark.slow
 def test_right_ones_of_the_careful_programs_are_accepted_and_wrong_ones_for_their_error(
     paper: Suite, pool: WorkerPool
 ) -> None:

@@ -87,6 +87,13 @@ def pairs(programs: list[Row], evaluations: list[Row]) -> list[tuple[str, Row, R
     ]
 
 
+def test_a_sample_of_programs_is_judged_as_it_should_be(programs: list[Row], paper: Suite) -> None:
+    sample = programs[::20]
+    for key, verdict, true in pairs(sample, judged(sample, paper)):
+        assert (verdict["satisfied"], status_of(verdict)) == (true["satisfied"], true["status"]), key
+
+
+@pytest.mark.slow
 def test_all_programs_are_satisfied_where_they_should_be(programs: list[Row], evaluations: list[Row]) -> None:
     assert len(programs) == 954
     wrong = [
@@ -97,6 +104,7 @@ def test_all_programs_are_satisfied_where_they_should_be(programs: list[Row], ev
     assert wrong == []
 
 
+@pytest.mark.slow
 def test_all_programs_end_as_they_should(programs: list[Row], evaluations: list[Row]) -> None:
     wrong = [
         (key, verdict["status"], true["status"])
@@ -106,6 +114,7 @@ def test_all_programs_end_as_they_should(programs: list[Row], evaluations: list[
     assert wrong == []
 
 
+@pytest.mark.slow
 def test_all_errors_are_of_the_right_kind(programs: list[Row], evaluations: list[Row]) -> None:
     counts: Counter[str] = Counter()
     for key, verdict, true in pairs(programs, evaluations):
@@ -117,6 +126,7 @@ def test_all_errors_are_of_the_right_kind(programs: list[Row], evaluations: list
     assert sum(counts.values()) == 446
 
 
+@pytest.mark.slow
 def test_all_traces_are_right(programs: list[Row], evaluations: list[Row]) -> None:
     compared = 0
     for key, verdict, true in pairs(programs, evaluations):
@@ -126,6 +136,7 @@ def test_all_traces_are_right(programs: list[Row], evaluations: list[Row]) -> No
     assert compared > 2000
 
 
+@pytest.mark.slow
 def test_a_question_nobody_can_answer_is_told_apart_from_one_nobody_hears(
     programs: list[Row], evaluations: list[Row]
 ) -> None:
@@ -137,6 +148,7 @@ def test_a_question_nobody_can_answer_is_told_apart_from_one_nobody_hears(
     assert set(kinds) == {"AskNoPerson", "AskInvalidOptions"}
 
 
+@pytest.mark.slow
 def test_programs_written_by_hand(corpus: Path, paper: Suite) -> None:
     rows = read(corpus / "tasks" / "synthetic.jsonl")
     compared = 0
@@ -155,6 +167,7 @@ def test_programs_written_by_hand(corpus: Path, paper: Suite) -> None:
     assert compared == 1056
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("file", "model"), [("gpt-4", "GPT-4"), ("palm-2", "PaLM2")])
 def test_published_results(corpus: Path, paper: Suite, file: str, model: str) -> None:
     published = json.loads((corpus / "reference" / "published_results.json").read_text())
@@ -171,6 +184,7 @@ def test_published_results(corpus: Path, paper: Suite, file: str, model: str) ->
     assert ours == pytest.approx(theirs)
 
 
+@pytest.mark.slow
 def test_the_table_in_the_readme(corpus: Path) -> None:
     published = json.loads((corpus / "reference" / "published_results.json").read_text())
     read_me = (Path(__file__).parents[3] / "README.md").read_text()
@@ -203,6 +217,7 @@ def test_the_table_in_the_readme(corpus: Path) -> None:
         }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["gpt-4", "palm-2"])
 def test_published_ablation(corpus: Path, paper: Suite, file: str) -> None:
     completions = list(read_completions(corpus / "corpus" / "completions" / f"{file}.jsonl"))

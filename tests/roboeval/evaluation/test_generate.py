@@ -370,6 +370,7 @@ def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
     ]
 
 
+@pytest.mark.slow
 def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, paper: Suite) -> None:
     chance = random.Random(3)
     run = Run(tmp_path / "run")
@@ -440,6 +441,7 @@ def asked_of(log: Path, pid: int, suite: Suite) -> set[tuple[str, int, int]]:
     return {(*prompts[told], index) for what, told, index, by in notes if what == "asked" and by == pid}
 
 
+@pytest.mark.slow
 def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
     run, log = Run(tmp_path / "run"), tmp_path / "log"
     chance = random.Random(5)
@@ -468,6 +470,7 @@ def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Su
     assert sum(n - 1 for n in asked.values()) <= about(run)["possibly_paid_twice"]
 
 
+@pytest.mark.slow
 def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
     run, log = Run(tmp_path / "run"), tmp_path / "log"
     process = started(run, log, count=60, seconds=0.05)
@@ -508,6 +511,7 @@ def test_an_interruption_counts_what_waits_for_the_disk(
     assert progress.under_way > 0
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper: Suite) -> None:
     run, log = Run(tmp_path / "run"), tmp_path / "log"
     limit = (

@@ -28,6 +28,7 @@ from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import load_suite
 
 
+@pytest.mark.slow
 def test_the_rows_are_those_of_threads() -> None:
     suite = load_suite()
     completions = list(recorded_completions("recorded:hasty", suite))
@@ -83,6 +84,7 @@ def has_ended(pid: int) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_processes_end_with_the_results() -> None:
     found = set(Processes(2).map_distinct(pids, numbered(100), abs))
     assert found
@@ -90,6 +92,7 @@ def test_processes_end_with_the_results() -> None:
     assert all(map(has_ended, found))
 
 
+@pytest.mark.slow
 def test_nobody_waits_for_what_is_no_longer_wanted() -> None:
     results = Processes(2).map_distinct(sleeps, numbered(100), abs)
     pid = next(results)
@@ -110,6 +113,7 @@ def ends_at_the_last(worker: Worker, works: Sequence[Work]) -> list[int]:
     return pids(worker, works)
 
 
+@pytest.mark.slow
 def test_what_was_done_before_a_process_was_lost_has_results() -> None:
     results = Processes(1).map_distinct(ends_at_the_last, numbered(100), abs)
     assert next(results)
@@ -117,6 +121,7 @@ def test_what_was_done_before_a_process_was_lost_has_results() -> None:
         list(results)
 
 
+@pytest.mark.slow
 def test_each_run_can_have_a_process_of_its_own() -> None:
     for alone in (False, True):
         engine = Processes(1, one_process_per_run=alone)
@@ -132,6 +137,7 @@ def refuses(worker: Worker, works: Sequence[Work]) -> list[int]:
     return [str(refused.value) == NO_SECCOMP] * len(works) if worker.has_seccomp else []
 
 
+@pytest.mark.slow
 def test_missing_isolation_is_refused() -> None:
     assert list(Processes(1, require_isolation=True).map_distinct(refuses, numbered(1), int)) == [1]
 
@@ -140,11 +146,13 @@ def handled(_: Worker, works: Sequence[Work]) -> list[bool]:
     return [signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())] * len(works)
 
 
+@pytest.mark.slow
 def test_ctrl_c_is_left_to_the_command() -> None:
     assert list(Processes(1).map_distinct(handled, numbered(1), bool)) == [True]
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
+@pytest.mark.slow
 def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
     (tmp_path / "killed.py").write_text(
         dedent("""
@@ -171,6 +179,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
     assert has_ended(pid)
 
 
+@pytest.mark.slow
 def test_many_programs_are_judged_in_processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("codebotler.simulator.pool.cores", lambda: 3)
     monkeypatch.setattr(engine_choice, "PROGRAMS_FOR_PROCESSES", 80)

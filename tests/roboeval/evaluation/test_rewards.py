@@ -45,6 +45,7 @@ def distinct(count: int, mark: str) -> list[str]:
     return [f"{RIGHT}# {mark} {number}\n" for number in range(count)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["recorded:careful", "recorded:hasty"])
 def test_the_reward_is_1_exactly_for_what_passes(model: str, paper: Suite) -> None:
     completions = list(recorded_completions(model, paper))
@@ -227,6 +228,7 @@ def told_by_child(programs: list[str], queue: "multiprocessing.SimpleQueue[objec
     queue.put((reward("SayGoodDay", 0, programs), children_of(os.getpid())))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
 def test_a_forked_process_has_an_engine_of_its_own() -> None:
     programs = distinct(5, "before")
@@ -266,6 +268,7 @@ def test_a_forked_process_has_an_engine_of_its_own() -> None:
     assert reward("SayGoodDay", 0, distinct(5, "after")) == [1.0] * 5
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
 def test_a_process_that_is_started_anew_is_given_the_suite_itself() -> None:
     asked = partial(reward, "SayGoodDay", 0, [RIGHT, *NOTHING])
@@ -353,6 +356,7 @@ print("parent", *parents, flush=True)
 """
 
 
+@pytest.mark.slow
 def test_all_processes_end_with_the_one_that_asked_for_them() -> None:
     command = [sys.executable, "-W", "error", "-W", "ignore:.*use of fork:DeprecationWarning", "-c", SCRIPT]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

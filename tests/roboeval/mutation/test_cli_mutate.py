@@ -33,6 +33,7 @@ def rows_of(folder: Path, task: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (folder / "mutants" / f"{task}.jsonl").read_text().splitlines()]
 
 
+@pytest.mark.slow
 def test_two_tasks_from_end_to_end(tmp_path: Path) -> None:
     ended = mutate("SayGoodDay", "GetDrink", "--out", "found", cwd=tmp_path)
     assert ended.status == 0, ended
@@ -76,6 +77,7 @@ def small(tmp_path: Path) -> Path:
     return own
 
 
+@pytest.mark.slow
 def test_the_same_bytes_whatever_the_number_of_workers(tmp_path: Path) -> None:
     first, second = (
         mutate("SayGoodDay", "--out", f"out{workers}", cwd=tmp_path, workers=workers) for workers in (1, 3)
@@ -104,6 +106,7 @@ def test_brief_is_without_survivors(small: Path) -> None:
     assert "-    say('hello')" in whole.out
 
 
+@pytest.mark.slow
 def test_programs_that_a_user_names(tmp_path: Path) -> None:
     programs = [
         GREETS,

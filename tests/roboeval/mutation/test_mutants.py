@@ -80,6 +80,7 @@ def test_originals_are_right_solutions_and_what_a_user_names(paper: Suite) -> No
         assert found[-1].name == "mine"
 
 
+@pytest.mark.slow
 def test_every_operator_finds_something_to_do_in_the_right_programs(paper: Suite) -> None:
     idle = {operator.name: operator for operator in OPERATORS}
     for task in paper.tasks.values():

@@ -6,6 +6,8 @@ import re
 import shlex
 from pathlib import Path
 
+import pytest
+
 from command_line import ENVIRONMENT, roboeval
 from roboeval.mutation.mutants import OPERATORS
 
@@ -19,6 +21,7 @@ def test_operators_are_documented() -> None:
     assert rows == [(operator.name, operator.about) for operator in OPERATORS]
 
 
+@pytest.mark.slow
 def test_the_command_runs_and_prints_what_the_page_says(tmp_path: Path) -> None:
     (command,) = re.findall(r"^\.venv/bin/roboeval (mutate .+ --out .+)$", PAGE, re.MULTILINE)
     ended = roboeval(*shlex.split(command), cwd=tmp_path, environment=WIDE)

@@ -59,7 +59,7 @@ DRAWINGS: dict[str, Callable[[list[JudgedRun]], Figure]] = {
     "accepted": lambda runs: accepted({run.name: accepted_after(run.trials, LIMITS[-1]) for run in runs}),
 }
 KEPT: list[Any] = [*(("usual", name) for name in DRAWINGS)]
-KEPT += [pytest.param("40 models", name, marks=pytest.mark.slow) for name in DRAWINGS]
+KEPT += [("40 models", name) for name in DRAWINGS]
 KEPT += [("one prompt", "tasks"), ("one prompt", "overall"), ("without programs", "causes")]
 KEPT += [("all failures", "causes"), ("no failures", "causes")]
 SIZE = (480, 480)
@@ -82,7 +82,7 @@ def drawn_anew(case: str, name: str) -> Image.Image:
 @pytest.mark.parametrize(
     ("case", "name"),
     [
-        pytest.param(case, name, marks=[pytest.mark.slow] * (case == "40 models"))
+        pytest.param(case, name, marks=[pytest.mark.slow] * (case != "usual"))
         for case, runs in cases().items()
         for name in DRAWINGS
         if runs[0].trials or name not in {"accepted", "rejection-sampling"}
@@ -96,6 +96,7 @@ def test_nothing_breaks_a_figure(case: str, name: str) -> None:
     assert edge.mean() < 0.02, "something is cut off"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "name"), KEPT)
 def test_figures_look_as_they_did(case: str, name: str) -> None:
     drawn = picture(case, name)
@@ -108,6 +109,7 @@ def test_figures_look_as_they_did(case: str, name: str) -> None:
     assert difference < TOLERANCE
 
 
+@pytest.mark.slow
 def test_other_numbers_look_different() -> None:
     kept = picture("usual", "causes")
     other = picture("no failures", "causes")
@@ -171,6 +173,7 @@ def test_overall_figure_has_the_interval_over_tasks() -> None:
     assert np.allclose([bar.get_width() for bar in axes.patches], [one.mean for one in passed])  # type: ignore[attr-defined]  # bars are rectangles
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tasks", "thresholds", "accepted", "rejection-sampling"])
 def test_long_names_fit_into_legends(name: str) -> None:
     with use_style():
@@ -226,6 +229,7 @@ def test_each_colour_has_one_meaning() -> None:
     assert in_the_dark(COLOURS[0]) == COLOURS[0].lower()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_nothing_of_a_dark_figure_is_left_light(name: str) -> None:
     with use_style():
@@ -242,6 +246,7 @@ def light(colour: tuple[float, float, float]) -> float:
     return float(np.dot(parts, [0.2126, 0.7152, 0.0722]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
 def test_the_same_numbers_give_the_same_bytes(kind: str) -> None:
     def drawn() -> bytes:
@@ -254,6 +259,7 @@ def test_the_same_numbers_give_the_same_bytes(kind: str) -> None:
     assert b"<dc:date>" not in first
 
 
+@pytest.mark.slow
 def test_a_readers_own_style_plays_no_part(monkeypatch: pytest.MonkeyPatch) -> None:
     before = drawn_anew("one prompt", "tasks")
     monkeypatch.setitem(mpl.rcParams, "axes.facecolor", "red")

@@ -198,6 +198,7 @@ def test_every_number_of_the_page_is_in_a_csv(usual: Path) -> None:
     assert drawn == set(re.findall(r"figures/([\w-]+)\.pdf", text))
 
 
+@pytest.mark.slow
 def test_the_same_runs_give_the_same_bytes(usual: Path, tmp_path: Path) -> None:
     again = written(tmp_path)
     files = [path.relative_to(usual) for path in usual.rglob("*") if path.is_file()]

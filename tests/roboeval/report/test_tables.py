@@ -201,6 +201,7 @@ def judged_in(folder: Path, completions: Path, suite: Suite) -> JudgedRun:
     return named
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("file", "model"), [("gpt-4", "GPT-4"), ("palm-2", "PaLM2")])
 def test_reports_of_published_completions_equal_the_published_cells(
     corpus: Path, paper_suite: Suite, tmp_path: Path, file: str, model: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,9 @@ def test_there_are_families_enough() -> None:
 
 
 @pytest.mark.parametrize("family", family_names())
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "seed", [SEEDS[0], *(pytest.param(seed, marks=pytest.mark.slow) for seed in SEEDS[1:])]
+)
 def test_right_programs_earn_1_idle_ones_0_and_wrong_ones_something_between(family: str, seed: int) -> None:
     task = trained_task(family, seed)
     programs = (task.solution, *IDLE, *(one.program for one in task.wrong))
@@ -142,9 +145,19 @@ def shape(program: str) -> str:
     return ast.dump(tree)
 
 
+@cache
+def measured_shingles() -> set[tuple[str, ...]]:
+    return {words for _, task in MEASURED for prompt in task.prompts for words in shingles(prompt)}
+
+
+@cache
+def measured_shapes() -> set[str]:
+    return {shape(one.program) for _, task in MEASURED for one in solutions(task) if one.fails is None}
+
+
 @pytest.mark.parametrize("family", family_names())
 def test_no_instruction_is_one_that_is_measured_with(family: str) -> None:
-    asked = {words for _, task in MEASURED for prompt in task.prompts for words in shingles(prompt)}
+    asked = measured_shingles()
     for seed in SEEDS:
         for prompt in trained_task(family, seed).prompts:
             assert not shingles(prompt) & asked
@@ -152,7 +165,7 @@ def test_no_instruction_is_one_that_is_measured_with(family: str) -> None:
 
 @pytest.mark.parametrize("family", family_names())
 def test_no_solution_is_one_of_a_task_that_is_measured_with(family: str) -> None:
-    known = {shape(one.program) for _, task in MEASURED for one in solutions(task) if one.fails is None}
+    known = measured_shapes()
     assert known
     assert shape(trained_task(family, 0).solution) not in known
 
@@ -160,6 +173,7 @@ def test_no_solution_is_one_of_a_task_that_is_measured_with(family: str) -> None
 # --- what cannot be gained
 
 
+@pytest.mark.slow
 def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step() -> None:
     programs = hacks()
     assert len(programs) >= 30

@@ -73,6 +73,7 @@ def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
     assert [c.program for c in read_completions(run.completions)] == [program]
 
 
+@pytest.mark.slow
 def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
     tmp_path: Path, paper: Suite
 ) -> None:

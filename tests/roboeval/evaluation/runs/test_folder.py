@@ -93,6 +93,7 @@ def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, pape
     }
 
 
+@pytest.mark.slow
 def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path: Path) -> None:
     programs = [
         ADDRESS,
@@ -361,6 +362,7 @@ def test_only_tasks_with_an_ablation_are_ablated(paper: Suite) -> None:
         tasks_to_judge(paper, "Nonsense", ablated=False)
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
     script = (

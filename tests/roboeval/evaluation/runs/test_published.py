@@ -111,6 +111,7 @@ def test_an_encrypted_member(tmp_path: Path) -> None:
     assert "is encrypted" in error.sentence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_a_member_that_cannot_be_unpacked_in_small_pieces(tmp_path: Path, how: int) -> None:
     path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE + "#" * 100_000_000}, how)
@@ -133,6 +134,7 @@ def test_a_member_that_lies_about_its_size_is_read_whole_or_refused(tmp_path: Pa
         assert [c.program for c in published_completions(path)] == ["x = 1"]
 
 
+@pytest.mark.slow
 def test_a_bomb_that_hides_its_size_is_not_unpacked(tmp_path: Path) -> None:
     path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE + "#" * 300_000_000})
     data = bytearray(path.read_bytes())
@@ -148,6 +150,7 @@ def test_a_bomb_that_hides_its_size_is_not_unpacked(tmp_path: Path) -> None:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_one_member_at_a_time_is_held(tmp_path: Path) -> None:
     members = {f"T_0_{index}.py": f"completion = '{'#' * 1_000_000}'\n" for index in range(60)}
     path = zipped(tmp_path / "a.zip", members)

@@ -37,6 +37,7 @@ def row(traces: list[Trace], message: str = "no", completion: Completion = WORDY
     return row_of(completion, judgement(verdicts))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("worlds", "most"), [(1, ROW_BYTES), (50, ROW_BYTES), (80, 80 * WORLD_BYTES)])
 def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
     one = row([LOUD[:20]] * worlds, "\x00" * 1_000)

@@ -179,6 +179,7 @@ def test_a_table_is_written_where_a_link_leads_and_replaces_nothing_but_files(tm
     os.close(reader)
 
 
+@pytest.mark.slow
 def test_a_long_table_keeps_its_order() -> None:
     rows = [{**row(verdict("in")), "index": index} for index in range(25_000)]
     assert table(iter(rows), [])["index"].to_list() == list(range(25_000))

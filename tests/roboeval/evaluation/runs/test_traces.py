@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.trace import Event, Trace, trace_data
@@ -27,7 +27,6 @@ def written(trace: Trace) -> dict[str, Any]:
     return {"trace": [*trace_data(trace)], **circumstances(trace)}
 
 
-@settings(max_examples=30)
 @given(traces, st.integers(0, 6))
 def test_they_come_back_also_where_a_row_ends_early(trace: Trace, count: int) -> None:
     verdict = json.loads(json.dumps(written(trace)))

@@ -1,0 +1,53 @@
+"""Processor time is that of a test and of the processes it starts, and the dearest tests are listed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from typing import Literal
+
+import pytest
+
+from processor_time import ProcessorTime, used
+
+BURN = "import time\nwhile time.process_time() < {}: pass\n"
+
+
+def test_time_of_this_process_is_used() -> None:
+    before = used()
+    until = time.process_time() + 0.01
+    while time.process_time() < until:
+        pass
+    assert used() - before >= 0.01
+
+
+def test_time_of_a_child_is_used_while_it_lives_and_when_it_has_ended() -> None:
+    before = used()
+    script = BURN.format(0.03) + "print(flush=True)\ninput()\n"
+    with subprocess.Popen([sys.executable, "-S", "-c", script], stdin=-1, stdout=-1) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        assert used() - before >= 0.02
+        child.communicate(b"\n")
+    assert used() - before >= 0.02
+
+
+def report(name: str, seconds: float, *markers: str) -> pytest.TestReport:
+    keywords: dict[str, Literal[1]] = dict.fromkeys(markers, 1)
+    made = pytest.TestReport(name, ("", 0, ""), keywords, "passed", None, "call")
+    made.processor_time = seconds  # type: ignore[attr-defined]  # as makereport does
+    return made
+
+
+def test_the_dearest_are_listed_and_those_that_should_be_slow_counted() -> None:
+    measured = ProcessorTime()
+    for number in range(20):
+        measured.pytest_runtest_logreport(report(f"t{number:02}", number / 100))
+    measured.pytest_runtest_logreport(report("setup and call", 0.06))
+    measured.pytest_runtest_logreport(report("setup and call", 0.06))
+    measured.pytest_runtest_logreport(report("marked", 5, "slow"))
+    first, *others = measured.lines()
+    assert first.split() == ["5.00", "s", "marked"]
+    assert len(others) == 10
+    assert "10 tests" in others[-1]
