@@ -22,7 +22,7 @@ from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.rtl.wording import done_with
 from codebotler.rtl.wording import verb as verb_of
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 MADE_UP = ("", "x")  # texts in examples that stand for any other
 ASPECTS = {"always": "at any time", "finally": "at the end"}

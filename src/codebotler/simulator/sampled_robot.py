@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
@@ -18,11 +18,8 @@ from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World, laid_out
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.robot import SimulatedRobot, Thing, no_room, own_skills
+from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing, no_room, own_skills
 from codebotler.simulator.rules import Rules, finds
-
-if TYPE_CHECKING:
-    from codebotler.simulator.rule_guard import RuleGuard
 
 AS_WRITTEN = Rules(literals="as-written")  # for a program that a robot is to run: nothing in it is changed
 
@@ -185,7 +182,7 @@ class SampledRobot(SimulatedRobot):
         rules: Rules = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         *,
-        guard: RuleGuard | None = None,
+        guard: SkillGuard | None = None,
     ) -> None:
         world = World(tuple(map(Room, room_map.rooms)), room_map.start)
         super().__init__(world, rules, skills, guard=guard)

@@ -22,9 +22,10 @@ from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
 from codebotler.rtl.syntax import AROUND, LOOKS, QUESTIONS, TEXTS
 from codebotler.rtl.wording import done_to
+from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.rules import PAPER
 
 HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"

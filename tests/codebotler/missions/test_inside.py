@@ -31,8 +31,9 @@ from codebotler.robots.ros.keepout import RESOLUTION, keepout
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.robots.spelling import SpellingRobot
 from codebotler.rtl import parse
+from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker

@@ -27,7 +27,7 @@ from codebotler.robots.ros.connection import SkillCall
 from codebotler.robots.ros.keepout import keepout
 from codebotler.robots.ros.motion import Pose
 from codebotler.robots.ros.robot import RosRobot, Waits
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 BEAT = 0.05  # seconds between two looks at what it reports
 CLOSES = 1.0  # seconds for detectors to close; one that looks closes later

@@ -9,7 +9,7 @@ from typing import Any
 from codebotler.core.skills.declaration import INSIDE
 from codebotler.core.world import Room, crossings
 from codebotler.rtl import And, EventPattern, Exists, Formula, Not
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 RESOLUTION = 0.05  # metres
 NOWHERE = ((0.0, 0.0), (RESOLUTION, RESOLUTION))  # what an empty mask covers, which replaces an earlier one
