@@ -29,7 +29,7 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.simulator.isolated_call.IsolatedCallError": (("MemoryError", "it is too large"), {}),
     "codebotler.simulator.house_rule.RuleViolationError": (
         (Rule("quiet", "Be quiet.", parse('not tr.Exists(say(".*"))')), Event("say", "hello")),
-        {"verdict": "is broken by"},
+        {"objection": "is broken by"},
     ),
     "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
 }

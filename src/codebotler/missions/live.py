@@ -163,11 +163,12 @@ class LiveRobot:
         guard = self._guard
         if guard is None:
             return event.place
-        if self._room is None and (rules := guard.rules_by_room(event.kind)):
+        rules = [rule for rule in guard.rules if self._room is None and event.kind in rule.kinds_in_rooms]
+        if rules:
             self._room = self._ask_room()
-            if self._room is None:
-                with self._enforcing():
-                    guard.give_up(rules, event, "cannot judge", NO_ROOM)
+        if rules and self._room is None:
+            with self._enforcing():
+                guard.give_up(rules, event, "cannot judge", NO_ROOM)
         room = self._room or ""
         texts = dict.fromkeys([event.text, *(self._goals(event.text) if is_drive else ())])
         with self._enforcing():
@@ -191,7 +192,7 @@ class LiveRobot:
         possible = [replace(event, text=goal) for goal in goals or [event.text]]
         is_known = not failed and (len(goals) == 1 or self._room_map is None)
         self._room, self._has_asked = (possible[0].text if is_known else None), False
-        rules = guard.rules_telling_apart(possible)
+        rules = [rule for rule in guard.rules if rule.tells_apart(possible)]
         if not rules:
             return possible[0]
         if not failed:  # where it remains does not tell where it has tried to go

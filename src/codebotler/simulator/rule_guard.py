@@ -10,7 +10,6 @@ from codebotler.core.errors import RobotError
 from codebotler.core.labels import PLAIN
 from codebotler.core.skills.declaration import INSIDE
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, attempted
 from codebotler.core.world import Point, Room, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
@@ -120,27 +119,6 @@ class _History:
         return None
 
 
-@dataclass
-class _Call:
-    """A call of a skill that a simulated robot executes.
-
-    Args:
-        skill: the skill.
-        attempt: its event, if it has one.
-        thing: what the robot held before.
-        start: how many events came before.
-        trial: what has happened within a skill of the user's own so far; None for other skills.
-        seen: how many events the trial has.
-    """
-
-    skill: Skill
-    attempt: Event | None
-    thing: Thing | None
-    start: int
-    trial: _History | None
-    seen: int
-
-
 class RuleGuard:
     """Judges by rules all that one robot is to do, before it does it.
 
@@ -153,8 +131,10 @@ class RuleGuard:
         self.rules, self._rooms = tuple(rules), rooms
         self._stops = {room.name: room.stand_at for room in rooms}
         self._history = _History([(rule, Monitor(rule.formula)) for rule in rules])
-        self._call: _Call | None = None
-        self._prevented: list[RuleViolationError] = []  # within that call
+        self._trial: _History | None = None  # during a call of a user's own skill
+        self._start = self._seen = 0  # events before the call, and before what the trial has not seen
+        self._held: Thing | None = None  # before the call
+        self._prevented: list[RuleViolationError] = []  # within the call
         self.may_refuse = any(rule.refuse and rule.when == "always" for rule in rules)
         self.judges_poses = any(rule.inside for rule in rules)
 
@@ -166,19 +146,22 @@ class RuleGuard:
         attempt = attempted(row, arguments, place=place, time=robot.now, holding=holding)
         if attempt is not None:
             self.judge(*_attempts(robot, attempt, arguments, is_drive=row.is_drive))
-        trial = None if SKILLS.get(skill) is row else history.copy()
-        self._call = call = _Call(row, attempt, robot.taken, start, trial, start)
+        is_own = SKILLS.get(skill) is not row
+        self._trial = history.copy() if is_own else None
+        self._start = self._seen = start
+        self._held = robot.taken
         self._prevented.clear()
+        request = None if is_own or attempt is None else attempt.text
         try:
             result = robot.execute(skill, arguments)
         except RobotError:
             is_tried = row.recording is not None and row.recording.when_tried
             tried = [attempt] if attempt is not None and is_tried else []
-            self._take(robot, call, robot.events[start:] or tried, history)
+            self._take(robot, robot.events[start:] or tried, history, request)
             if self._prevented:
                 raise self._prevented[0] from None
             raise
-        self._take(robot, call, robot.events[start:], history)
+        self._take(robot, robot.events[start:], history, request)
         if self._prevented:  # the function of the skill has caught it
             raise self._prevented[0]
         return result
@@ -189,28 +172,32 @@ class RuleGuard:
         What happens inside counts on trial: the result of the skill itself, which may come first, is not
         known before the call ends.
         """
-        call = self._call
-        if call is None or call.trial is None:
+        trial = self._trial
+        if trial is None:
             return
-        earlier, call.seen = robot.events[call.seen :], len(robot.events)
+        earlier, self._seen = robot.events[self._seen :], len(robot.events)
         try:
-            self._take(robot, call, earlier, call.trial)
-            named = call.trial.named(event, event.text)
-            call.trial.judge(_attempts(robot, named, (), is_drive=named.kind == DRIVE))
+            self._take(robot, earlier, trial)
+            named = trial.named(event, event.text)
+            trial.judge(_attempts(robot, named, (), is_drive=named.kind == DRIVE))
         except RuleViolationError as broken:
             self._prevented.append(broken)
             raise
 
-    def _take(self, robot: SimulatedRobot, call: _Call, events: Sequence[Event], history: _History) -> None:
-        """Add events of a call to a history."""
-        in_call = robot.events[call.start :]
-        moves, drives = (sum(each.kind in kinds for each in in_call) for kinds in (MOVES, {DRIVE}))
-        thing = call.thing or robot.taken if moves == 1 else None
-        is_own = call.trial is not None
+    def _take(
+        self,
+        robot: SimulatedRobot,
+        events: Sequence[Event],
+        history: _History,
+        request: str | None = None,
+    ) -> None:
+        """Add events of a call to a history; `request` is where it drives, if events may not tell."""
+        kinds = [event.kind for event in robot.events[self._start :]]
+        thing = self._held or robot.taken if sum(kind in MOVES for kind in kinds) == 1 else None
         for event in events:
-            request = event.text if is_own or call.attempt is None else call.attempt.text
-            named = history.named(event, request, thing)
-            if event.destination is not None and self.judges_poses and (event.kind == DRIVE or not drives):
+            named = history.named(event, event.text if request is None else request, thing)
+            is_leg = event.kind == DRIVE or DRIVE not in kinds
+            if event.destination is not None and is_leg and self.judges_poses:
                 history.enter(self._way(event.place, event.destination), named.holding)
             history.feed(named)
 
@@ -231,14 +218,6 @@ class RuleGuard:
     def happened(self, event: Event) -> None:
         """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
         self._history.feed(event)
-
-    def rules_by_room(self, kind: str) -> list[Rule]:
-        """Return the rules that compare the room in which events of a kind happen."""
-        return [rule for rule in self.rules if kind in rule.kinds_in_rooms]
-
-    def rules_telling_apart(self, events: Sequence[Event]) -> list[Rule]:
-        """Return the rules to which it matters which of some events happened."""
-        return [rule for rule in self.rules if rule.tells_apart(events)]
 
     def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
         """Take that some rules cannot be judged any more; RuleViolationError if one is not of the end."""
