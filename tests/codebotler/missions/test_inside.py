@@ -173,6 +173,19 @@ def test_a_skill_of_a_user_drives_through_rooms_too(tmp_path: Path) -> None:
     SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([all_rooms], MAP.plan)).perform("tour", [])
 
 
+def test_skill_that_drives_around_a_room_has_not_been_inside(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(
+        "from codebotler import Simulation, skill\n@skill(verb='circle to {room}', names='room')\n"
+        "def circle(sim: Simulation, room: str) -> None:\n"
+        "    'Circle.'\n    sim.drive('supply room')\n    sim.drive(room)\n"
+    )
+    skills = skills_from(tmp_path / "own.py")
+    one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP.plan))
+    one.perform("go_to", ["printer room 1"])
+    one.perform("circle", ["printer room 3"])
+    assert one.room == "printer room 3"
+
+
 # --- while the robot moves
 
 

@@ -272,9 +272,15 @@ def test_room_at_the_start_is_asked_for_if_a_rule_depends_on_it(tmp_path: Path) 
 
 def test_rule_of_the_end_is_not_kept_if_nobody_knows_the_room(tmp_path: Path) -> None:
     end = Rule("end", "Speak in the hall.", parse('not tr.Exists(at("lab", say(".*")))'), "finally")
-    robot = answering(lambda skill, _: told_room(None) if skill == "get_current_location" else None)
-    mission, lines = ran(tmp_path, robot, THREE, [end], LABS)
+    calls: list[str] = []
+
+    def answer(skill: str, _: str) -> Result:
+        calls.append(skill)
+        return told_room(None) if skill == "get_current_location" else None
+
+    mission, lines = ran(tmp_path, answering(answer), THREE, [end], LABS)
     assert mission.state is State.DONE
+    assert calls.count("get_current_location") == 1
     assert [line["rule"] for line in lines if line["event"] == "rule"] == ["end"]
 
 

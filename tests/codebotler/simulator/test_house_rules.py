@@ -162,6 +162,24 @@ def test_room_counts_by_its_own_name_whatever_else_the_request_says() -> None:
         refused(one, "say", "hello")
 
 
+@pytest.mark.parametrize(
+    ("formula", "skill", "request_"),
+    [
+        ('not tr.OnlyAfterFirst(pick("^mug$")).Exists(goto(".*"))', "go_to", "office"),
+        ('not tr.OnlyAfterFirst(holding("^mug$", say(".*"))).Exists(goto(".*"))', "go_to", "office"),
+        ('not tr.Exists(holding("^mug$", goto(".*")))', "go_to", "office"),
+        ('not tr.Exists(place("^mug$"))', "place", "the mug"),
+    ],
+)
+def test_thing_counts_by_its_own_name_whatever_else_the_request_says(
+    formula: str, skill: str, request_: str
+) -> None:
+    one = robot(rule(formula))
+    one.perform("pick", ["the mug"])
+    one.perform("say", ["I have it"])
+    assert not refused(one, skill, request_).is_late
+
+
 def test_drive_that_led_nowhere_counts_by_the_words_of_the_request() -> None:
     one = robot(rule('not tr.OnlyAfterFirst(goto("^the attic$")).Exists(say(".*"))'))
     with pytest.raises(RobotError, match="attic"):
