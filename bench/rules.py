@@ -35,8 +35,9 @@ from codebotler.rtl.formulas import And, Or, Test
 from codebotler.rtl.semantics import is_match
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.settings import finds, resolve_room
 from codebotler.simulator.worker import NewRobot, Worker

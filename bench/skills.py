@@ -19,9 +19,10 @@ from codebotler.core.trace import Status
 from codebotler.core.world import World
 from codebotler.core.world_file import read_world
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import Rule, RuleGuard
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
 from roboeval.mutation.mutants import Mutant, mutants, originals
 from roboeval.mutation.operator import Context, Operator, operators_in

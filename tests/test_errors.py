@@ -10,7 +10,7 @@ import pytest
 
 from codebotler.core.trace import Event, Option
 from codebotler.rtl import parse
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 SOURCES = Path(__file__).parent.parent / "src"
 ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError", "RobotError"}
@@ -27,9 +27,9 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),
     "codebotler.simulator.isolated_call.IsolatedCallError": (("MemoryError", "it is too large"), {}),
-    "codebotler.simulator.rule_guard.RuleViolationError": (
+    "codebotler.simulator.house_rule.RuleViolationError": (
         (Rule("quiet", "Be quiet.", parse('not tr.Exists(say(".*"))')), Event("say", "hello")),
-        {"verdict": "is broken by"},
+        {"objection": "is broken by"},
     ),
     "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
 }

@@ -25,8 +25,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
-from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
 

@@ -13,11 +13,11 @@ from codebotler.core.labels import PLAIN_LABEL
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.trace import Names
 from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.rule_guard import name_of
 from codebotler.simulator.settings import resolve_room
 
 ACTS = {"drive": GOTO, "take": PICK, "put": PLACE, "look": CHECK, "ask": ASK}
@@ -79,7 +79,8 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
     """A sentence for each rule that names a room by some of the names which its regex gives it.
 
     Raises:
-        UserError: a rule names such a room with `^` or `$`, so that any further word of a request evades it.
+        UserError: a rule names such a room with `^` or `$`, so that any further word of a request evades it,
+            or names a part of the regex and not all of its words.
     """
     regexes = [room for room in rooms if not PLAIN_LABEL.fullmatch(room)]
 
@@ -91,14 +92,19 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
             for room in regexes:
                 text = Regex(pattern)
                 requests = [one for one in (*samples(room), *samples(pattern)) if leads_to(room, one)]
-                matching = [one for one in requests if text.matches(Names(one, room))]
+                matching = [one for one in requests if text.matches(name_of(room, one))]
                 longer = [f"x {one} x" for one in matching if leads_to(room, f"x {one} x")]
-                if not all(text.matches(Names(one, room)) for one in longer):
+                if not all(text.matches(name_of(room, one)) for one in longer):
                     raise UserError(
                         f'the rule "{rule.name}" names a room with ^ or $, '
                         f'which other words for "{room}" evade; write the name alone'
                     )
                 missed = next((one for one in requests if one not in matching), None)
+                if missed is not None and text.matches(room):  # the author may believe that it has all names
+                    raise UserError(
+                        f'the rule "{rule.name}" does not name "{missed}", which "{room}" is as well; '
+                        "write all names of the room"
+                    )
                 if matching and missed is not None:
                     yield (
                         f'the rule "{rule.name}" names the room "{room}" by some of its names only; '

@@ -10,13 +10,14 @@ from codebotler.checking.rule_rooms import may_mean
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.trace import Names, Option, Trace
+from codebotler.core.trace import Option, Trace
 from codebotler.core.world import World
 from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError, names_of
+from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.rule_guard import RuleGuard, name_of
 from codebotler.simulator.sampled_robot import PEOPLE
 from codebotler.simulator.settings import finds
 
@@ -132,9 +133,9 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
         yield name
         for word in distinct_strings((Regex(name), *dict.fromkeys(named_texts))):
             found = [one for one in names if finds(word, one, "label-in-request")]
-            names_it = isinstance(names_of(name, word), Names) and found == [name]
+            names_it = name_of(name, word) != name and found == [name]
             if names_it and any(text.matches(word) != text.matches(name) for text in named_texts):
-                yield Names(word, name)
+                yield word
 
 
 def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:

@@ -11,7 +11,7 @@ from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.settings import found_in
 
 

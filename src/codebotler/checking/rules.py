@@ -20,7 +20,7 @@ from codebotler.rtl import And, EventPattern, Formula, RtlSyntaxError, holds, pa
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 EACH_TAG = "{each}"  # in a formula, what the names of `for_each` replace
 MOST_QUOTED_FORMULA = 30  # characters of a formula, from where it is wrong

@@ -15,8 +15,9 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.words import listed
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.process.exit_status import PROCESSOR_TIME
-from codebotler.simulator.rule_guard import Rule, RuleGuard
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import NOTHING, Job, Meanwhile, Worker

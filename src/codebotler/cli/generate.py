@@ -19,7 +19,7 @@ from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import RECORDED_NOTICE, UnknownInstructionError, is_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 MAX_REPLY_SHOWN = 300  # characters of a reply without a program

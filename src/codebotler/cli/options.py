@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from codebotler.core.world import World
     from codebotler.robots.base import Options
     from codebotler.robots.ros.connection import Connection
-    from codebotler.simulator.rule_guard import Rule
+    from codebotler.simulator.house_rule import Rule
 
 
 def robot_names(incomplete: str) -> list[str]:

@@ -21,7 +21,7 @@ from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
 from codebotler.core.words import listed
 from codebotler.core.world import World
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 ANY_TEXT = ("", "x")  # in examples, these mean any text
 WHEN_WORDS = {"always": "at any time", "finally": "at the end"}

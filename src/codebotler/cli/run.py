@@ -26,7 +26,7 @@ from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 SIGNALS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, NamedTuple, Self, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
@@ -30,19 +30,6 @@ def options_of(values: Iterable[object]) -> tuple[Option, ...]:
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
     )
-
-
-class Names(str):
-    """The names of one room or thing, which formulas compare with each; as a text, the first of them."""
-
-    __slots__ = ("each",)
-    each: tuple[str, ...]
-
-    def __new__(cls, *names: str) -> Self:
-        """The names of one."""
-        self = super().__new__(cls, names[0])
-        self.each = names
-        return self
 
 
 @dataclass(frozen=True, init=False)

@@ -19,8 +19,8 @@ from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]

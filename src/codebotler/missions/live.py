@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Protocol
@@ -20,8 +20,9 @@ from codebotler.missions.progress import AT
 from codebotler.missions.stop import StopButton
 from codebotler.robots import base
 from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
+from codebotler.simulator.house_rule import NO_GOAL, NO_ROOM, RuleViolationError
 from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.rule_guard import RuleGuard, RuleViolationError, names_of
+from codebotler.simulator.rule_guard import RuleGuard, name_of
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
@@ -65,7 +66,8 @@ class LiveRobot:
         self.rules = SimulationSettings(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # of the program, which calls a skill there
         self._place, self._held = place, ""
-        self._here = [place]  # where the robot may be, as rules name it
+        self._room = place or None  # where the robot is, as rules name it; None until it is asked
+        self._has_asked = False
         self._at: Point | None = None  # where the robot said it is
         self._guarding = threading.RLock()  # poses come from a thread of the robot
         self._events: list[Event] = []
@@ -101,16 +103,11 @@ class LiveRobot:
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill, or raise RobotError, StoppedError, RobotLostError, or OSError for its log."""
         self._check_end()
-        row = self.skills[skill]
-        if skill in SKILLS:
-            return self._performed(row, arguments)
         try:
-            result = self._performed(row, arguments)
-        except RobotError:
-            self._find_out()
-            raise
-        self._find_out()  # nobody knows what a user's skill does inside
-        return result
+            return self._performed(self.skills[skill], arguments)
+        finally:
+            if skill not in SKILLS:  # nobody knows what a user's skill does inside
+                self._room, self._has_asked = None, False
 
     def _performed(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         """Execute one skill, and return its result."""
@@ -118,15 +115,14 @@ class LiveRobot:
         if is_drive:  # what is judged is what the robot is told
             arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
         event = attempted(row, arguments, place=self._place, time=self.now, holding=self._held)
-        if event is not None and self._guard is not None:
-            self._judge(self._guard, event, is_drive=is_drive)
+        room = "" if event is None else self._judge(event, is_drive=is_drive)
         if event and row.recording and row.recording.when_tried:
             self._events.append(event)
         try:
             result = self._logged(row, [_text(argument) for argument in arguments], event)
         except RobotError:
             if event and row.recording and row.recording.when_tried:
-                self._happened(event, is_drive=is_drive, failed=True)
+                self._happened(event, room, is_drive=is_drive, failed=True)
             raise
         if event is None or row.recording is None:
             return result
@@ -139,7 +135,7 @@ class LiveRobot:
         if is_drive:
             self._place = event.text
         self._hold(event)
-        self._happened(self._events[-1], is_drive=is_drive)
+        self._happened(self._events[-1], room, is_drive=is_drive)
         return result if chosen is None else chosen
 
     def _hold(self, event: Event) -> None:
@@ -151,34 +147,50 @@ class LiveRobot:
 
     # --- rules
 
-    def _judge(self, guard: RuleGuard, event: Event, *, is_drive: bool) -> None:
-        """Refuse an event that a rule forbids in a room where it may happen, before it reaches the robot."""
-        rooms = self._meant(event.text) if is_drive else []
-        texts = [event.text, *(names_of(room, event.text) for room in rooms if room != event.text)]
-        try:
-            with self._guarding:
-                guard.judge(
-                    *(replace(event, text=text, place=place) for text in texts for place in self._here)
-                )
-        except RuleViolationError as broken:
-            self._end_by(broken)
-            raise
+    def _judge(self, event: Event, *, is_drive: bool) -> str:
+        """Refuse an event that a rule forbids, before it reaches the robot; return the room where it is."""
+        guard = self._guard
+        if guard is None:
+            return event.place
+        rules = [rule for rule in guard.rules if self._room is None and event.kind in rule.kinds_in_rooms]
+        if rules:
+            self._room = self._ask_room()
+        if rules and self._room is None:
+            with self._enforcing():
+                guard.give_up(rules, event, "cannot judge", NO_ROOM)
+        room = self._room or ""
+        texts = dict.fromkeys([event.text, *(self._goals(event.text) if is_drive else ())])
+        with self._enforcing():
+            guard.judge(*(replace(event, text=text, place=room) for text in texts))
+        return room
 
-    def _happened(self, event: Event, *, is_drive: bool, failed: bool = False) -> None:
-        """Tell the guard what has happened, which may break a rule that depends on an answer."""
-        if self._guard is None:
+    def _happened(self, event: Event, room: str, *, is_drive: bool, failed: bool = False) -> None:
+        """Tell the guard what has happened in a room, which may break a rule that depends on an answer."""
+        guard = self._guard
+        if guard is None:
             return
-        places, texts = self._here, [event.text]
+        seen = replace(event, place=room)
         if is_drive:
-            texts = self._driven(event.text, failed=failed)
-        try:
-            with self._guarding:
-                self._guard.happened(
-                    *(replace(event, text=text, place=place) for text in texts for place in places)
-                )
-        except RuleViolationError as broken:
-            self._end_by(broken)
-            raise
+            seen = self._driven(guard, seen, failed=failed)
+        with self._enforcing():
+            guard.happened(seen)
+
+    def _driven(self, guard: RuleGuard, event: Event, *, failed: bool) -> Event:
+        """Return a drive by the name of the room to which it led; if a rule depends on it, ask the robot."""
+        goals = self._goals(event.text)
+        possible = [replace(event, text=goal) for goal in goals or [event.text]]
+        is_known = not failed and (len(goals) == 1 or self._room_map is None)
+        self._room, self._has_asked = (possible[0].text if is_known else None), False
+        rules = [rule for rule in guard.rules if rule.tells_apart(possible)]
+        if not rules:
+            return possible[0]
+        if not failed:  # where it remains does not tell where it has tried to go
+            self._room = self._ask_room()
+        if self._room is not None:
+            return replace(event, text=self._room)
+        with self._enforcing():
+            guard.give_up(rules, event, "could not judge", NO_GOAL)
+        return possible[0]
 
     def _moved(self, at: Point | None) -> None:
         """Tell the guard which rooms the robot has entered, as if it drove straight between its reports.
@@ -192,12 +204,18 @@ class LiveRobot:
             self.stop()
             return
         before, self._at = self._at or at, at
+        with suppress(StoppedError, RuleViolationError), self._enforcing():  # maybe a thread of the robot
+            self._guard.moved(before, at, self._held)
+
+    @contextmanager
+    def _enforcing(self) -> Iterator[None]:
+        """Let one thread at a time ask the guard; end the mission by a rule that is broken."""
         try:
             with self._guarding:
-                self._guard.moved(before, at, self._held)
+                yield
         except RuleViolationError as broken:
-            with suppress(StoppedError):  # this may be a thread of the robot
-                self._end_by(broken)
+            self._end_by(broken)
+            raise
 
     def _end_by(self, broken: RuleViolationError) -> None:
         """Stop the mission, or log which call a rule has prevented where the program may go on."""
@@ -218,37 +236,24 @@ class LiveRobot:
         self._note("rule", **_rule_entry(broken))
         return str(broken)
 
-    def _meant(self, request: str) -> list[str]:
-        return [] if self._room_map is None else self._room_map.rooms_meant(request)
+    def _goals(self, request: str) -> list[str]:
+        """Return the rooms that a request may mean, as rules name them."""
+        rooms = [] if self._room_map is None else self._room_map.rooms_meant(request)
+        return [*dict.fromkeys(name_of(room, request) for room in rooms)]
 
-    def _driven(self, request: str, *, failed: bool) -> list[str]:
-        """The rooms to which a drive may have led, as rules name them."""
-        meant = self._meant(request)
-        goals = [names_of(room, request) for room in meant] or [request]
-        if failed:
-            self._here = [*self._here, *(goals if meant or self._room_map is None else ())]
-            self._find_out()
-            return goals  # that it has not reached one of them does not tell which it tried
-        self._here = [*goals]
-        if len(meant) != 1:
-            self._find_out()
-        return self._here if self._here[0] in goals else goals
-
-    def _find_out(self) -> None:
-        """Ask the robot where it is; if it does not tell, it may be in any of the rooms known by now."""
-        if self._guard is not None and (room := self._room_now()) is not None:
-            self._here = [next((one for one in self._here if one == room), room)]
-
-    def _room_now(self) -> str | None:
-        """The room in which the robot says it is, if that is one of those that it knows."""
-        if ROOM_SKILL not in self.skills or ROOM_SKILL in self.robot.missing or self._room_map is None:
+    def _ask_room(self) -> str | None:
+        """Ask the robot once in which of its rooms it is; None if it cannot say."""
+        if self._has_asked or ROOM_SKILL not in self.skills or ROOM_SKILL in self.robot.missing:
             return None
+        self._has_asked = True
         try:
-            there = answered(self.skills[ROOM_SKILL], self.robot.perform(ROOM_SKILL, ()))
+            here = str(answered(self.skills[ROOM_SKILL], self.robot.perform(ROOM_SKILL, ()))).strip()
         except (RobotError, CancelledError):
             return None
-        name = str(there).strip().casefold()
-        return next((room for room in self._room_map.rooms if room.strip().casefold() == name), None)
+        listed = (here,) if self._room_map is None else self._room_map.rooms
+        room = next((room for room in listed if room.strip().casefold() == here.casefold()), "")
+        words = name_of(room, self._place)
+        return (words if words in self._goals(self._place) else room) or None
 
     def _logged(self, skill: Skill, given: list[base.RobotArgument], event: Event | None) -> base.RobotResult:
         """The robot's answer or its error, logged."""
@@ -320,7 +325,8 @@ def _rule_entry(broken: RuleViolationError) -> dict[str, object]:
     """The log entry of a rule that was broken, or would have been."""
     rule, event = broken.rule, broken.event
     what = {} if event is None else {"what": trace_data((event,))[0], "prevented": not broken.is_late}
-    return {"rule": rule.name, "says": rule.says, "formula": str(rule.formula), **what}
+    why = {"why": broken.why} if broken.why else {}
+    return {"rule": rule.name, "says": rule.says, "formula": str(rule.formula), **what, **why}
 
 
 def _text(argument: Argument) -> base.RobotArgument:

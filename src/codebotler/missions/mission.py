@@ -23,7 +23,8 @@ from codebotler.missions.stop import StopButton
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.rule_guard import Rule, RuleGuard
+from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 

@@ -15,7 +15,7 @@ from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import answered
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 MOST_ROOMS = 1_000

@@ -37,7 +37,7 @@ from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.robots.base import CancelledError, NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError
 

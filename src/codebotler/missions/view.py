@@ -12,7 +12,7 @@ from codebotler.generation.partial_reply import PartialReply, split_partial
 from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 UNREADABLE = frozenset({"SyntaxError", "IndentationError", "TabError"})

@@ -103,6 +103,8 @@ def _rule(line: Line) -> str:
     if "what" not in line:
         return f"not kept: {rule}: {says}"
     what = visible(phrase(trace_from([line["what"]])[0], "ing"))
+    if line.get("why"):
+        return f"{rule} cannot judge {what}, {visible(str(line['why']))}: {says}"
     return f"{rule} prevented {what}: {says}" if line.get("prevented") else f"{what} broke {rule}: {says}"
 
 

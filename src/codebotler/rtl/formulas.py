@@ -9,7 +9,6 @@ from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.skills.kinds import CHECK, GOTO
-from codebotler.core.trace import Names
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
 from codebotler.rtl.text.matcher import Matcher
@@ -66,9 +65,6 @@ class Without(Matcher):
     def _matches(self, text: str) -> bool:
         return self.compiled.search(text) is None
 
-    def _matches_names(self, names: Names) -> bool:
-        return all(map(self.matches, names.each))
-
     def __str__(self) -> str:
         return f"without({quote(self.pattern)})"
 
@@ -85,9 +81,6 @@ class Words(Matcher):
 
     def _matches(self, text: str) -> bool:
         return all(part.matches(text) for part in self.parts)
-
-    def _matches_names(self, names: Names) -> bool:
-        return self._matches(names)
 
     def __str__(self) -> str:
         return f"words({', '.join(map(str, self.parts))})"

@@ -6,12 +6,11 @@ stops at the event that settles it.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from itertools import islice
 from typing import assert_never
 
-from codebotler.core.trace import Event, Names, Option, Trace
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import formulas
 
 
@@ -93,7 +92,7 @@ def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
     """Whether an element matches an event, which is at a position of its trace."""
     if event.kind != element.kind:
         return False
-    if element.place_regex is not None and not _is_at(element.place_regex, event.place):
+    if element.place_regex is not None and element.place_regex.search(event.place) is None:
         return False
     if element.is_about_more and not _fits(element, event):
         return False
@@ -102,11 +101,6 @@ def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
     if element.options is not None and not _offers(element, event, at):
         return False
     return element.text.matches(event.text)
-
-
-def _is_at(regex: re.Pattern[str], place: str) -> bool:
-    names = place.each if isinstance(place, Names) else (place,)
-    return any(regex.search(name) for name in names)
 
 
 def _fits(element: formulas.EventPattern, event: Event) -> bool:

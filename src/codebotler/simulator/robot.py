@@ -6,7 +6,7 @@ import json
 from _blake2 import blake2b  # of `hashlib`, which would bring OpenSSL into every child
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import Any, NoReturn, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
@@ -28,12 +28,24 @@ from codebotler.simulator.settings import (
     resolve_room,
 )
 
-if TYPE_CHECKING:
-    from codebotler.simulator.rule_guard import RuleGuard
-
 Argument: TypeAlias = Scalar | tuple[Option, ...] | tuple[Scalar, ...]
 Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
 Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # of a copy: `simulated` or `sampled`, and the arguments
+
+
+class SkillGuard(Protocol):
+    """Judges each skill before a robot executes it."""
+
+    may_refuse: bool
+
+    def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Let a robot execute one skill, or raise RobotError."""
+
+    def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
+        """Judge what a skill of the user's own is about to do inside, or raise RobotError."""
+
+    def at_end(self) -> RobotError | None:
+        """Return what is wrong if the run ends now."""
 
 
 @dataclass
@@ -88,7 +100,7 @@ class SimulatedRobot:
         rules: SimulationSettings = PAPER,
         skills: SkillTable = SKILLS,
         *,
-        guard: RuleGuard | None = None,
+        guard: SkillGuard | None = None,
     ) -> None:
         self.guard = guard
         self.world, self.rules, self.skills = world, rules, skills

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO
@@ -19,11 +19,8 @@ from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World, laid_out
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.robot import SimulatedRobot, Thing, no_room, own_skills
+from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing, no_room, own_skills
 from codebotler.simulator.settings import SimulationSettings, finds
-
-if TYPE_CHECKING:
-    from codebotler.simulator.rule_guard import RuleGuard
 
 AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves a program unchanged, as a robot will run it
 
@@ -186,7 +183,7 @@ class SampledRobot(SimulatedRobot):
         rules: SimulationSettings = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         *,
-        guard: RuleGuard | None = None,
+        guard: SkillGuard | None = None,
     ) -> None:
         world = World(tuple(map(Room, room_map.rooms)), room_map.start)
         super().__init__(world, rules, skills, guard=guard)

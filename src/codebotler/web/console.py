@@ -23,8 +23,8 @@ from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.rule_guard import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 MOST_PROGRAM = 200_000

@@ -12,7 +12,7 @@ from codebotler.checking.rules import read_rules
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 
 @dataclass(frozen=True)

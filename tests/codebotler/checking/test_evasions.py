@@ -11,7 +11,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.rtl import parse
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 BOTH = "bob's office|accounting"
 
@@ -46,12 +46,11 @@ def test_an_anchor_that_other_words_evade_is_refused(formula: str, room: str) ->
 @pytest.mark.parametrize(
     ("formula", "room"),
     [
-        ('not tr.Exists(goto("bob\'s office"))', BOTH),
         ('not tr.Exists(goto("^hall$"))', BOTH),
         ('not tr.Exists(goto("^bob\'s office$"))', "bob's office"),
-        ('not tr.Exists(goto("^acme inc[.]$"))', "acme inc."),
         ('not tr.Exists(goto("^lab$"))', "^lab$"),
-        ('not tr.Exists(goto(r"\\bbob\'s office\\b"))', BOTH),
+        ('not tr.Exists(goto(r"\\b(bob\'s office|accounting)\\b"))', BOTH),
+        ('not tr.Exists(goto("acme inc."))', "acme inc."),
         ('not tr.Exists(goto("^.*$"))', BOTH),
         ('not tr.Exists(goto(".*"))', "lab [0-9]"),
         ('not tr.Exists(say("^accounting$"))', BOTH),
@@ -72,6 +71,22 @@ def test_a_room_that_is_named_by_some_of_its_names_is_told(formula: str, room: s
     (told,) = evasions([rule(formula)], ["hall", room], SKILLS)
     assert room in told
     assert f'"{missed}"' in told
+
+
+@pytest.mark.parametrize(
+    ("formula", "room"),
+    [
+        ('not tr.Exists(goto("bob\'s office"))', BOTH),
+        ('not tr.Exists(at(r"\\bbob\'s office\\b", say(".*")))', BOTH),
+        ('not tr.Exists(goto("acme inc[.]"))', "acme inc."),
+        ('not tr.Exists(goto("0-9"))', "lab [0-9]"),
+    ],
+)
+def test_rule_that_names_a_part_of_the_regex_is_refused(formula: str, room: str) -> None:
+    """Events carry the words of the request there, so the rest of the regex would not count."""
+    with pytest.raises(UserError) as caught:
+        list(evasions([rule(formula)], ["hall", room], SKILLS))
+    assert room in caught.value.sentence
 
 
 # --- skills

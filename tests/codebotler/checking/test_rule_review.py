@@ -16,7 +16,7 @@ from codebotler.cli.rules import step_sentence, steps_view
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Monitor, holds, parse
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 WORLD = World(
     (Room("hall"), Room("kitchen", ("glass",)), Room("office", (), (Person("carol"),))),

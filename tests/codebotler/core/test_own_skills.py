@@ -24,9 +24,10 @@ from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
 from codebotler.rtl.syntax import AROUND_WORDS, LOOK_RESULTS, QUESTIONS, TEXT_WORDS
+from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.settings import PAPER
 
 HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"

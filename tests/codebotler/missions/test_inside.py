@@ -32,8 +32,9 @@ from codebotler.robots.ros.keepout import MASK_RESOLUTION, keepout_messages
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.robots.spelling import SpellingRobot
 from codebotler.rtl import parse
+from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import Rule, RuleGuard, RuleViolationError
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
@@ -172,6 +173,19 @@ def test_a_skill_of_a_user_drives_through_rooms_too(tmp_path: Path) -> None:
         one.perform("tour", [])
     all_rooms = rule('not tr.Exists(check("mug")) or tr.Count(inside(".*"), 6)')  # judged before and after
     SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([all_rooms], MAP.plan)).perform("tour", [])
+
+
+def test_skill_that_drives_around_a_room_has_not_been_inside(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(
+        "from codebotler import Simulation, skill\n@skill(verb='circle to {room}', names='room')\n"
+        "def circle(sim: Simulation, room: str) -> None:\n"
+        "    'Circle.'\n    sim.drive('supply room')\n    sim.drive(room)\n"
+    )
+    skills = skills_from(tmp_path / "own.py")
+    one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP.plan))
+    one.perform("go_to", ["printer room 1"])
+    one.perform("circle", ["printer room 3"])
+    assert one.room == "printer room 3"
 
 
 # --- while the robot moves

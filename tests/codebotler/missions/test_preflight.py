@@ -30,7 +30,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from doubles import Answering, raising
 
 

@@ -17,12 +17,13 @@ from codebotler.missions.log import EVENTS, Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import Order
+from codebotler.missions.wording import event_text
 from codebotler.models.recorded import open_recorded as recorded
 from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import NO_GOAL, NO_ROOM, Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from doubles import Answering
 
@@ -179,6 +180,122 @@ def test_where_a_drive_may_have_led_counts_unless_the_robot_tells(
     program = "def task_program():\n    go_to('the lab 2, at the window')\n    say('hello')\n"
     mission, _ = ran(tmp_path, robot, program, [IN_LAB_2], LABS)
     assert mission.state is state
+
+
+AFTER_LAB = Rule(
+    "after", "Be silent after lab 2.", parse('not tr.OnlyAfterFirst(goto("^lab 2$")).Exists(say("."))')
+)
+THREE = "def task_program():\n    go_to('the lab 2, at the window')\n    say('one')\n    say('two')\n"
+
+
+@pytest.mark.parametrize(
+    ("rule", "asked"),
+    [
+        (IN_LAB_2, 1),
+        (AFTER_LAB, 1),
+        (VAULT, 0),
+        (Rule("drives", "Drive little.", parse('not tr.AtLeast(goto("lab"), 3)')), 0),
+    ],
+    ids=["room", "goal", "other", "count"],
+)
+def test_robot_is_asked_once_and_only_if_a_rule_depends_on_it(tmp_path: Path, rule: Rule, asked: int) -> None:
+    calls: list[str] = []
+
+    def answer(skill: str, _: str) -> RobotResult:
+        calls.append(skill)
+        return "lab" if skill == "get_current_location" else None
+
+    mission, _ = ran(tmp_path, answering(answer), THREE, [rule], LABS)
+    assert mission.state is State.DONE
+    assert calls.count("get_current_location") == asked
+
+
+@pytest.mark.parametrize("refuse", [False, True])
+def test_mission_stops_and_says_why_if_nobody_knows_the_room(tmp_path: Path, *, refuse: bool) -> None:
+    calls: list[str] = []
+
+    def answer(skill: str, _: str) -> RobotResult:
+        calls.append(skill)
+        return told_room(None) if skill == "get_current_location" else None
+
+    robot = answering(answer)
+    rule = Rule("quiet", IN_LAB_2.says, IN_LAB_2.formula, refuse=refuse)
+    mission, lines = ran(tmp_path, robot, THREE.replace("say('one')", CAUGHT), [rule], LABS)
+    assert mission.state is State.STOPPED
+    assert calls == ["go_to", "get_current_location"]
+    assert robot.cancels
+    (line,) = [line for line in lines if line["event"] == "rule"]
+    assert (line["rule"], line["what"], line["prevented"], line["why"]) == (
+        "quiet",
+        ["say", "one"],
+        True,
+        NO_ROOM,
+    )
+    assert line["why"] in event_text(line)
+
+
+CAUGHT = "try: say('one')\n    except BaseException: pass"
+
+
+@pytest.mark.parametrize("fails", [False, True], ids=["arrives", "fails"])
+def test_mission_stops_after_a_drive_if_nobody_knows_which_room_was_meant(
+    tmp_path: Path, *, fails: bool
+) -> None:
+    def answer(skill: str, _: str) -> RobotResult:
+        if fails and skill == "go_to":
+            raise RobotError("GoToInvalidLocation", "the door is shut")
+        return told_room("hall" if fails else None) if skill == "get_current_location" else None
+
+    robot = answering(answer)
+    mission, lines = ran(tmp_path, robot, THREE, [AFTER_LAB], LABS)
+    assert mission.state is State.STOPPED
+    assert robot.cancels
+    assert [line["event"] for line in lines].count("skill") == 1
+    (line,) = [line for line in lines if line["event"] == "rule"]
+    assert (line["rule"], line["prevented"], line["why"]) == ("after", False, NO_GOAL)
+
+
+def test_failed_drive_to_one_room_needs_no_question(tmp_path: Path) -> None:
+    def answer(skill: str, _: str) -> RobotResult:
+        raise RobotError("GoToInvalidLocation", f"{skill}: the door is shut")
+
+    program = "def task_program():\n    try: go_to('lab')\n    except Exception: pass\n"
+    mission, _ = ran(tmp_path, answering(answer), program, [AFTER_LAB], LABS)
+    assert mission.state is State.DONE
+
+
+def test_room_at_the_start_is_asked_for_if_a_rule_depends_on_it(tmp_path: Path) -> None:
+    program = "def task_program():\n    say('hello')\n"
+    for where, state in ((None, State.STOPPED), ("lab 2", State.STOPPED), ("lab", State.DONE)):
+        robot = answering(lambda skill, _: told_room(where) if skill == "get_current_location" else None)  # noqa: B023 - at once
+        mission, _ = ran(tmp_path / str(where), robot, program, [IN_LAB_2], LABS, place="")
+        assert mission.state is state, where
+
+
+def test_rule_of_the_end_is_not_kept_if_nobody_knows_the_room(tmp_path: Path) -> None:
+    end = Rule("end", "Speak in the hall.", parse('not tr.Exists(at("lab", say(".*")))'), "finally")
+    calls: list[str] = []
+
+    def answer(skill: str, _: str) -> RobotResult:
+        calls.append(skill)
+        return told_room(None) if skill == "get_current_location" else None
+
+    mission, lines = ran(tmp_path, answering(answer), THREE, [end], LABS)
+    assert mission.state is State.DONE
+    assert calls.count("get_current_location") == 1
+    assert [line["rule"] for line in lines if line["event"] == "rule"] == ["end"]
+
+
+def test_robot_that_lists_no_rooms_is_judged_by_the_words_of_drives(tmp_path: Path) -> None:
+    for room, state in (("lab 2", State.STOPPED), ("lab", State.DONE)):
+        mission = Mission(tmp_path / room, "robot")
+        mission.draft(f"def task_program():\n    go_to('{room}')\n    say('hello')\n")
+        mission.check([])
+        mission.approve()
+        robot = answering()
+        with Reservation(robot, tmp_path / room) as reserved, mission:
+            mission.run(reserved, "", rules=[IN_LAB_2])
+        assert mission.state is state, room
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATED_RULES
 from codebotler.rtl import parse
 from codebotler.simulator.engine import run
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
 

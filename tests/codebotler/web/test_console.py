@@ -29,7 +29,7 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.panes.instruction import examples

@@ -20,7 +20,7 @@ from codebotler.core.trace import Outcome
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
 from codebotler.rtl.semantics import visible
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from made_results import results_of

@@ -27,7 +27,7 @@ from codebotler.robots.ros.connection import SkillCall
 from codebotler.robots.ros.keepout import keepout_messages
 from codebotler.robots.ros.motion import Pose
 from codebotler.robots.ros.robot import RosRobot
-from codebotler.simulator.rule_guard import Rule
+from codebotler.simulator.house_rule import Rule
 
 POLL_SECONDS = 0.05
 CLOSE_SECONDS = 1.0  # for detectors; a busy one closes later
