@@ -16,8 +16,8 @@ from roboeval.mutation.program_tree import ProgramTree, apply_edit, read
 from roboeval.suites.load import Task
 from roboeval.suites.solutions import bare_diff, solutions
 
-MODULES = navigation, speech, manipulation, counting, control_flow, misuse
-OPERATORS = tuple(chain.from_iterable(map(operators_in, MODULES)))
+OPERATOR_MODULES = navigation, speech, manipulation, counting, control_flow, misuse
+MUTATION_OPERATORS = tuple(chain.from_iterable(map(operators_in, OPERATOR_MODULES)))
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
 
 
 def mutants(
-    right: Sequence[Original], context: Context, operators: Iterable[Operator] = OPERATORS
+    right: Sequence[Original], context: Context, operators: Iterable[Operator] = MUTATION_OPERATORS
 ) -> Iterator[Mutant]:
     """All distinct mutants of right programs that are not themselves right programs."""
     seen = {original.text for original in right}

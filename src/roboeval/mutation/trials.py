@@ -18,9 +18,9 @@ from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, T
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import equivalent_mutants
 
-WORLDS = 200  # sampled by default
-AT_ONCE = 16  # worlds per batch; a killed mutant skips further batches
-CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})
+DEFAULT_MUTANT_WORLDS = 200  # sampled by default
+WORLDS_PER_BATCH = 16  # worlds per batch; a killed mutant skips further batches
+CRASH_STATUSES = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
 ProgressBar: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # items, label and count
 
@@ -45,8 +45,8 @@ def mutation_score(
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
 
     def run(program: str) -> Iterator[Outcome]:
-        for start in range(0, len(robots), AT_ONCE):
-            yield from pool.here().run_all([(program, robots[start : start + AT_ONCE])])[0]
+        for start in range(0, len(robots), WORLDS_PER_BATCH):
+            yield from pool.here().run_all([(program, robots[start : start + WORLDS_PER_BATCH])])[0]
 
     def outcomes(some: Sequence[Original]) -> list[tuple[Outcome, ...]]:
         return [tuple(run(original.program)) for original in some]
@@ -90,7 +90,11 @@ def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | No
 def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
     """The worlds for mutants; sampled ones use another seed than the suite."""
     if suite.worlds is not None:
-        return suite.with_worlds(count or WORLDS, seed + 1 + (suite.seed or 0)).tasks[task.name].scenarios
+        return (
+            suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
+            .tasks[task.name]
+            .scenarios
+        )
     if count is not None:
         raise UserError(f'the worlds of the suite "{suite.name}" are written by hand; omit --worlds')
     return task.scenarios
@@ -113,7 +117,7 @@ def result_of(
     changed = False
     for now, outcome, scenario in zip(outcomes, before, scenarios, strict=True):
         verdict = judge(now, scenario)
-        if verdict.outcome.status in CRASHED:
+        if verdict.outcome.status in CRASH_STATUSES:
             crashes.append(verdict)
         elif not verdict.satisfied:
             return _killed(verdict)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboeval.analysis.cluster import Cluster, describe_groups, group_failures
 from roboeval.analysis.counts import tally_of
+from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_failures
 from roboeval.analysis.summary import ALL, Causes, causes, cut_off_replies
 from roboeval.analysis.summary import failures as count_failures
 from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences, verdict_changes
@@ -16,8 +16,12 @@ from roboeval.report.runs import JudgedRun, coverage_of
 from roboeval.report.sheets import Cell, Groups, Prose, ReportFigure, Section, Sheet, note, section, sheet
 from roboeval.suites.task import check_label
 
-MOST, FEWEST, ALTOGETHER = 100, 4, 200  # groups on the page: at most and at least per run, and in all
-MOST_REVERSALS = 100  # groups in the table, per run
+MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN, MAX_GROUPS_SHOWN = (
+    100,
+    4,
+    200,
+)  # groups on the page: at most and at least per run, and in all
+MAX_REVERSALS_PER_RUN = 100  # groups in the table, per run
 
 
 # --- causes
@@ -83,9 +87,9 @@ def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
 
 def similar_failures(runs: Sequence[JudgedRun]) -> Section:
     """Groups of similar failures; the page shows the programs of the largest groups of each run."""
-    most = max(FEWEST, min(MOST, ALTOGETHER // len(runs)))
-    every: list[tuple[str, Cluster]] = []
-    shown: list[tuple[str, Cluster]] = []
+    most = max(MIN_GROUPS_PER_RUN, min(MAX_GROUPS_PER_RUN, MAX_GROUPS_SHOWN // len(runs)))
+    every: list[tuple[str, FailureGroup]] = []
+    shown: list[tuple[str, FailureGroup]] = []
     notes: list[str] = []
     for run in runs:
         groups = group_failures(map(run.results.failed_row, run.results.failed), run.results.programs)
@@ -98,7 +102,7 @@ def similar_failures(runs: Sequence[JudgedRun]) -> Section:
     return section("failures", about, Groups(shown), groups_sheet(every))
 
 
-def groups_sheet(every: Sequence[tuple[str, Cluster]]) -> Sheet:
+def groups_sheet(every: Sequence[tuple[str, FailureGroup]]) -> Sheet:
     """All groups as a table."""
     rows = [
         [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
@@ -107,7 +111,7 @@ def groups_sheet(every: Sequence[tuple[str, Cluster]]) -> Sheet:
     return sheet("failures", rows)
 
 
-def _cells(one: Cluster) -> list[Cell]:
+def _cells(one: FailureGroup) -> list[Cell]:
     check = one.failure["check"]
     ground = [one.failure["class"], one.failure["kind"], check and check_label(check)]
     return [one.task, *ground, one.why, name_of(one.representative)]
@@ -155,9 +159,9 @@ def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
         sides = zip(one.suites, (one.first_only, one.second_only), strict=True)
         those = [(suite, group) for suite, groups in sides for group in groups]
         those.sort(key=lambda pair: -len(pair[1].members))
-        for suite, group in those[:MOST_REVERSALS]:
+        for suite, group in those[:MAX_REVERSALS_PER_RUN]:
             rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
-        if (left := len(those) - MOST_REVERSALS) > 0:
+        if (left := len(those) - MAX_REVERSALS_PER_RUN) > 0:
             more = f"{left:,} more groups are not shown; list them with `roboeval compare --suites`."
             notes.append(f"{one.name}: {more}")
     return sheet("reversals", rows, notes=notes)

@@ -20,7 +20,7 @@ from roboeval.evaluation.runs.scope import Coverage
 from roboeval.report.drawing import short_name
 from roboeval.suites.load import Suite
 
-LONGEST_NAME = 100
+MAX_RUN_NAME = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +141,9 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
     """Name each run by its label or its model; make names unique with the folder or a number."""
-    given = {at: short_name(label, LONGEST_NAME) for at, label in labels.items()}
+    given = {at: short_name(label, MAX_RUN_NAME) for at, label in labels.items()}
     plain = [
-        given.get(at) or short_name(run.model or run.folder, LONGEST_NAME) for at, run in enumerate(runs)
+        given.get(at) or short_name(run.model or run.folder, MAX_RUN_NAME) for at, run in enumerate(runs)
     ]
     names = _extend_duplicates(
         plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.compare import MOST_PAIRS, compare_scores, other_differences, pairs_to_compare, verdict
+from roboeval.analysis.compare import MAX_PAIRS, compare_scores, other_differences, pairs_to_compare, verdict
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
@@ -16,7 +16,7 @@ from roboeval.analysis.metrics import (
     share_at_least,
     threshold_curve,
 )
-from roboeval.analysis.statistics import FEW, by_bootstrap
+from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
@@ -54,11 +54,11 @@ def _unknown(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
-    few = [run.name for run in runs if len(run.scores) < FEW]
+    few = [run.name for run in runs if len(run.scores) < MIN_CLUSTERS]
     if not few:
         return []
     of_which = "" if len(few) == len(runs) else f" of {', '.join(few)}"
-    few_tasks = f"The bootstrap interval{of_which} is too narrow with fewer than {FEW} tasks"
+    few_tasks = f"The bootstrap interval{of_which} is too narrow with fewer than {MIN_CLUSTERS} tasks"
     return [f"{few_tasks}; quote the interval over tasks."]
 
 
@@ -118,7 +118,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
             found = compare_scores(first.by_prompt, second.by_prompt)
         except UserError:  # no prompt in common
             continue
-        if len(sentences) < MOST_PAIRS:
+        if len(sentences) < MAX_PAIRS:
             sentences.append(verdict(found, (first.name, second.name)))
             pair, over_prompts = f"{first.name} and {second.name}", found.over_prompts
             if not over_prompts.is_known:

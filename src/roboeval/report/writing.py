@@ -32,10 +32,10 @@ from roboeval.report.sheets import (
     write_csv,
 )
 
-FORMATS = ("png", "pdf")
-PAGE = "index.html"
+FIGURE_FORMATS = ("png", "pdf")
+PAGE_FILE = "index.html"
 UNFINISHED = ("This report is not finished. Run its command again.",)
-HEAD = 4_000  # characters; the start of a page contains its generator
+GENERATOR_WITHIN = 4_000  # characters; the start of a page contains its generator
 
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
@@ -143,8 +143,8 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
     """Write a report into a folder and yield the name of each piece; the page comes last."""
     parts = [part for section in sections for part in section.parts]
     (out / "tables").mkdir(parents=True, exist_ok=True)
-    if not (out / PAGE).exists():
-        write_whole(out / PAGE, page(title, UNFINISHED, [], {}).encode())
+    if not (out / PAGE_FILE).exists():
+        write_whole(out / PAGE_FILE, page(title, UNFINISHED, [], {}).encode())
     drawn: dict[str, DrawnFigure] = {}
     for part in parts:
         if isinstance(part, Sheet):
@@ -153,7 +153,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
         elif isinstance(part, ReportFigure):
             drawn[part.name] = _draw(part, out / "figures")
             yield part.name
-    write_whole(out / PAGE, page(title, lead, sections, drawn).encode())
+    write_whole(out / PAGE_FILE, page(title, lead, sections, drawn).encode())
     _remove_others(out, {part.name for part in parts if isinstance(part, Sheet | ReportFigure)})
     yield "page"
 
@@ -163,7 +163,7 @@ def expect_no_others(out: Path) -> None:
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
-    if others and not _is_report(out / PAGE):
+    if others and not _is_report(out / PAGE_FILE):
         raise UserError(
             f'is not a report but contains other files such as "{others[0]}"; name a new folder', file=out
         )
@@ -173,13 +173,13 @@ def _is_report(page_file: Path) -> bool:
     if not page_file.is_file():
         return False
     with page_file.open(errors="replace") as file:
-        return GENERATOR in file.read(HEAD)
+        return GENERATOR in file.read(GENERATOR_WITHIN)
 
 
 def _remove_others(out: Path, names: AbstractSet[str]) -> None:
     """Remove files of an earlier report that this one lacks, such as rejection sampling."""
     for name in {*page_words()["figures"], *page_words()["tables"]} - names:
-        for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
+        for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FIGURE_FORMATS)):
             (out / file).unlink(missing_ok=True)
 
 
@@ -192,6 +192,6 @@ def _draw(figure: ReportFigure, folder: Path) -> DrawnFigure:
     """Draw a figure, write its files, and return it for the page."""
     with use_style():
         files = render(figure.draw())
-    for kind in FORMATS:
+    for kind in FIGURE_FORMATS:
         write_whole(folder / f"{figure.name}.{kind}", files[kind])
     return files["svg"], darken(files["svg"])

@@ -13,7 +13,7 @@ from typing import Any
 
 from codebotler.core.program import parse_expression
 
-MOST = 10_000  # characters, digits or entries of a value
+MAX_VALUE_SIZE = 10_000  # characters, digits or entries of a value
 Names = Mapping[str, Any]  # strings, numbers, lists, and namespaces for people and things
 
 
@@ -75,9 +75,9 @@ def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, nu
 
 def _checked_value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - as `evaluate`
     found = _compute(node, names)
-    if _size(found) > MOST:
+    if _size(found) > MAX_VALUE_SIZE:
         raise ExpressionError(
-            f'"{ast.unparse(node)}" exceeds {MOST:,} characters, digits or entries; simplify it'
+            f'"{ast.unparse(node)}" exceeds {MAX_VALUE_SIZE:,} characters, digits or entries; simplify it'
         )
     return found
 
@@ -91,7 +91,7 @@ def _size(found: object) -> int:
     size = 0
     for one in found:
         size += 1 + _size(one)
-        if size > MOST:
+        if size > MAX_VALUE_SIZE:
             break
     return size
 

@@ -11,7 +11,7 @@ from codebotler.core.labels import check_regex
 from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
 from codebotler.simulator.settings import WORDS_FOR_PEOPLE, Limits, SimulationSettings
 
-MOST_WORLDS = 10_000  # per task; a suite then takes a gigabyte of memory, and minutes to sample
+MAX_WORLDS = 10_000  # per task; a suite then takes a gigabyte of memory, and minutes to sample
 
 Category = Literal[
     "SayAtLocation",
@@ -105,7 +105,7 @@ class ScenarioFile(WorldFile):
 
 
 Levels = Annotated[list[YamlText], Field(min_length=1)] | YamlText
-NOWHERE = "nowhere"
+IN_NO_ROOM = "nowhere"
 Answers = AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]
 Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
@@ -222,7 +222,7 @@ class SuiteFile(_Form):
     version: Annotated[int, Field(strict=True, ge=0)]
     about: YamlText = ""
     instructions: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")] | None = None
-    worlds: Annotated[int, Field(strict=True, ge=1, le=MOST_WORLDS)] = 30
+    worlds: Annotated[int, Field(strict=True, ge=1, le=MAX_WORLDS)] = 30
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     rules: SimulationFile = SimulationFile()
     house_rules: Name | None = None  # a file of the suite with rules that stop programs

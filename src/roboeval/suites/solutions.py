@@ -12,7 +12,7 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.models.recorded import RECORDED_NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task
 
-LENDER = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
+LENDING_SUITE = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
 
 
 class EquivalentMutantFile(BaseModel):
@@ -37,7 +37,7 @@ class SolutionsFile(BaseModel):
 
 def solutions(task: Task) -> tuple[Solution, ...]:
     """The distinct solutions of a task, including those of the suite whose instruction it borrows."""
-    folders = [task.path.parents[1], *([LENDER] if task.borrows else [])]
+    folders = [task.path.parents[1], *([LENDING_SUITE] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
         recorded = (

@@ -20,7 +20,7 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.house import HouseRules
 from roboeval.suites.installed import installed_folder, installed_suites
-from roboeval.suites.schema import MOST_WORLDS, SuiteFile
+from roboeval.suites.schema import MAX_WORLDS, SuiteFile
 from roboeval.suites.task import Task
 from roboeval.suites.taskfile import read_task
 
@@ -85,8 +85,8 @@ class Suite:
         if self.worlds is None or self.folder is None:
             why = "are written by hand" if self.families is None else "follow from its name"
             raise UserError(f'the worlds of the suite "{self.name}" {why}; omit --worlds and --seed')
-        if count is not None and not 1 <= count <= MOST_WORLDS:
-            raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MOST_WORLDS:,}")
+        if count is not None and not 1 <= count <= MAX_WORLDS:
+            raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MAX_WORLDS:,}")
         return read_suite(self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed)
 
     def with_own_worlds(self) -> Suite:

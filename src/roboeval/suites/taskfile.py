@@ -22,8 +22,8 @@ from roboeval.suites.schema import RequirementFile, SampledTaskFile, ScenarioFil
 from roboeval.suites.task import Requirement, Scenario, Task, TaskCheck
 from roboeval.suites.worlds import WorldSampler
 
-BORROWED = ("summary", "abilities", "prompts")
-PEOPLE = "people"  # in checks for sampled worlds: any name of a person or word for people
+BORROWED_FIELDS = ("summary", "abilities", "prompts")
+PEOPLE_PLACEHOLDER = "people"  # in checks for sampled worlds: any name of a person or word for people
 START = "start"  # in checks: the room in which the robot starts
 
 _PARAMETER = r" *[^\W\d]\w* *"
@@ -92,7 +92,7 @@ def _with_borrowed(file: YamlFile, lender: YamlFile | None) -> object:
     """Add the instruction and facts of the lender to the content of a task file."""
     if lender is None or not isinstance(file.data, dict) or not isinstance(lender.data, dict):
         return file.data
-    borrowed = {name: lender.data[name] for name in BORROWED if name in lender.data}
+    borrowed = {name: lender.data[name] for name in BORROWED_FIELDS if name in lender.data}
     facts = [*lender.data.get("facts", []), *file.data.get("facts", [])]
     return {**borrowed, **file.data, "facts": facts}
 
@@ -123,9 +123,9 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
 def _phrases(form: SampledTaskFile, file: YamlFile, words: Sequence[str]) -> dict[str, str]:
     """Regexes that checks may use by name: for people, and the phrases of the task."""
     names = [person.name or key for key, person in form.worlds.people.items()]
-    phrases = {PEOPLE: rf"(?:{'|'.join(map(scope_flags, [*words, *names]))})s?"}
+    phrases = {PEOPLE_PLACEHOLDER: rf"(?:{'|'.join(map(scope_flags, [*words, *names]))})s?"}
     for name, regexes in form.phrases.items():
-        if not name.isidentifier() or name in {PEOPLE, START}:
+        if not name.isidentifier() or name in {PEOPLE_PLACEHOLDER, START}:
             raise file.wrong(f'"{name}" is not a valid name for phrases; rename it', "phrases", name)
         if not any(f"{{{name}}}" in check.rtl for check in form.checks.values()):
             raise file.wrong(f'no check uses the phrases "{name}"; use {{{name}}} in one', "phrases", name)
@@ -189,7 +189,7 @@ class _Reader:
             if unknown := {*_USED.findall(meaning)} - {*parameters, START}:
                 sentence = f'"{min(unknown)}" is not a parameter of the check; replace it by words'
                 raise self.file.wrong(sentence, "checks", head, "means", kind)
-        return {**({"check": "a person"} if f"{{{PEOPLE}}}" in body.rtl else {}), **body.means}
+        return {**({"check": "a person"} if f"{{{PEOPLE_PLACEHOLDER}}}" in body.rtl else {}), **body.means}
 
     # --- worlds
 

@@ -17,11 +17,11 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import AHEAD, shared_pool
 from roboeval.evaluation.judge import are_met, may_satisfy, robot_in
 from roboeval.evaluation.rewards import Remembered, Share, asked_in, total
-from roboeval.suites.families.tasks import WORLDS, trained_task
+from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.suites.task import Scenario
 
-TOGETHER = 16  # programs per batch, all for the same task
+ROLLOUTS_PER_BATCH = 16  # programs per batch, all for the same task
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Components:
 def judge(
     rollouts: Sequence[Rollout],
     *,
-    worlds: int = WORLDS,
+    worlds: int = TRAINING_WORLDS,
     house: HouseRules | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> list[Components]:
@@ -103,8 +103,8 @@ Batch: TypeAlias = Sequence[Rollout]
 
 def _batches(groups: Iterable[Batch]) -> Iterator[Batch]:
     for group in groups:
-        for start in range(0, len(group), TOGETHER):
-            yield group[start : start + TOGETHER]
+        for start in range(0, len(group), ROLLOUTS_PER_BATCH):
+            yield group[start : start + ROLLOUTS_PER_BATCH]
 
 
 def _judge_ahead(

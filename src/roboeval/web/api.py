@@ -17,7 +17,7 @@ from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import RunList, completion_details, entry_data, run_details
 from roboeval.web.snapshot import CompletionFilter
 
-MOST = 1_000
+MAX_PAGE_SIZE = 1_000
 """Completions per response."""
 
 REPORT_POLICY = (
@@ -25,10 +25,10 @@ REPORT_POLICY = (
     "script-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-TABLE = re.compile(r"[\w-]{1,100}")  # a name of a table cannot lead to another folder
+TABLE_NAME = re.compile(r"[\w-]{1,100}")  # a name of a table cannot lead to another folder
 
-Chosen: TypeAlias = Annotated[CompletionFilter, Depends()]
-Evaluation: TypeAlias = Annotated[
+FilterQuery: TypeAlias = Annotated[CompletionFilter, Depends()]
+EvaluationQuery: TypeAlias = Annotated[
     str | None,
     Query(max_length=200, description="The evaluation; by default, the first that is not an ablation."),
 ]
@@ -45,7 +45,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
             return _json(all_runs.data())
 
     @api.get("/{run}")
-    def show_run(run: str, evaluation: Evaluation = None) -> Response:
+    def show_run(run: str, evaluation: EvaluationQuery = None) -> Response:
         """Show one run with every prompt and every kind of failure."""
         with as_http_errors():
             return _json(run_details(store.open(run, evaluation)))
@@ -55,10 +55,10 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
     @api.get("/{run}/completions")
     def list_completions(
         run: str,
-        chosen: Chosen,
-        evaluation: Evaluation = None,
+        chosen: FilterQuery,
+        evaluation: EvaluationQuery = None,
         offset: Annotated[int, Query(ge=0, description="Completions to skip.")] = 0,
-        limit: Annotated[int, Query(ge=1, le=MOST, description="Completions to return.")] = 100,
+        limit: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="Completions to return.")] = 100,
     ) -> Response:
         """List completions of a run page by page, optionally of a prompt or with a kind of failure."""
         with as_http_errors():
@@ -68,7 +68,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
 
     @api.get("/{run}/completions/{task:path}/{prompt}/{index}")
     def show_completion(
-        run: str, task: str, prompt: int, index: int, evaluation: Evaluation = None
+        run: str, task: str, prompt: int, index: int, evaluation: EvaluationQuery = None
     ) -> Response:
         """Show one completion: its program, and for each world the robot's actions and failed checks."""
         with as_http_errors():
@@ -99,7 +99,7 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
     def show_table(run: str, table: str) -> Response:
         """Show a table of a run's report, as CSV."""
         with as_http_errors():
-            text = store.report(run, f"tables/{table}.csv") if TABLE.fullmatch(table) else None
+            text = store.report(run, f"tables/{table}.csv") if TABLE_NAME.fullmatch(table) else None
         if text is None:
             raise HTTPException(404, "this run has no such table")
         return Response(text, media_type="text/csv")

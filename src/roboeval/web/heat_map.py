@@ -14,10 +14,10 @@ from roboeval.evaluation.failures import NO_PROGRAM, ending_of, plural_of
 from roboeval.evaluation.runs.completions import by_hand
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
-STEPS = 10
-NONE = "-"
-MOST_NAME, MOST_MODELS = 60, 200
-EMPTY = {"text": "", "shade": "none"}
+SHADE_STEPS = 10
+MISSING = "-"
+MAX_CELL_NAME, MAX_MODELS_TEXT = 60, 200
+EMPTY_CELL = {"text": "", "shade": "none"}
 
 
 def percent(share: float) -> str:
@@ -31,7 +31,13 @@ def shade(share: float | None, *, bad: bool) -> str:
     """The CSS class of a cell with a share from 0 to 1, or None without one."""
     if share is None:
         return "waits"
-    step = 0 if share == 0 else STEPS if share == 1 else max(1, min(STEPS - 1, round(share * STEPS)))
+    step = (
+        0
+        if share == 0
+        else SHADE_STEPS
+        if share == 1
+        else max(1, min(SHADE_STEPS - 1, round(share * SHADE_STEPS)))
+    )
     return f"{'f' if bad else 's'}{step}"
 
 
@@ -44,17 +50,17 @@ def models_of(run: Snapshot) -> str:
     """Format the models of a run."""
     if not run.models:
         return "model not recorded"
-    return shortened(", ".join(run.models), MOST_MODELS) + by_hand(run.models)
+    return shortened(", ".join(run.models), MAX_MODELS_TEXT) + by_hand(run.models)
 
 
 def failure_text(chosen: CompletionFilter) -> str | None:
     """Describe the failure that a filter selects, such as `in NameError`; None if it selects no failure."""
-    kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MOST_NAME)
+    kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MAX_CELL_NAME)
     if chosen.failure_class == NO_PROGRAM:
         return ending_of(NO_PROGRAM) + ("" if kind is None else f" ({kind})")
     if kind is not None:
         return f"in {kind}"
-    return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MOST_NAME)
+    return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MAX_CELL_NAME)
 
 
 class TaskCells:
@@ -81,13 +87,13 @@ class TaskCells:
         """The cells of a task."""
         prompts = self.tasks.get(task)
         if prompts is None:
-            return [{**EMPTY, "text": "no completions", "span": 1 + self._prompts}]
+            return [{**EMPTY_CELL, "text": "no completions", "span": 1 + self._prompts}]
         shares = [each["share"] for each in prompts.values() if each["share"] is not None]
         mean = self._mean(task, mean_of([shares]) if shares else None)
-        return [mean, *(self._cell(prompts[n]) if n in prompts else EMPTY for n in range(self._prompts))]
+        return [mean, *(self._cell(prompts[n]) if n in prompts else EMPTY_CELL for n in range(self._prompts))]
 
     def _mean(self, task: str, mean: float | None) -> dict[str, Any]:
-        text = NONE if mean is None else percent(mean)
+        text = MISSING if mean is None else percent(mean)
         title = "not judged yet" if mean is None else f"{text}% {self._verb}"
         return self._linked(task, None, text, f"mean {shade(mean, bad=self._bad)}", title)
 
@@ -101,7 +107,7 @@ class TaskCells:
 
     def _linked(self, task: str, prompt: int | None, text: str, look: str, title: str) -> dict[str, Any]:
         here = (self._filter.task, self._filter.prompt) == (task, prompt)
-        which = shortened(task, MOST_NAME) + ("" if prompt is None else f", prompt {prompt}")
+        which = shortened(task, MAX_CELL_NAME) + ("" if prompt is None else f", prompt {prompt}")
         query = replace(self._filter, task=task, prompt=prompt).query(self._evaluation)
         return {
             "text": text,
@@ -145,7 +151,7 @@ def _failure_row(
     look: str,
 ) -> dict[str, Any]:
     cells = [_failure_cell(run, chosen, one) for run, one in zip(runs, failures, strict=True)]
-    return {"name": shortened(name, MOST_NAME), "look": look, "cells": cells}
+    return {"name": shortened(name, MAX_CELL_NAME), "look": look, "cells": cells}
 
 
 def _failure_cell(run: Snapshot, chosen: CompletionFilter, kind: Failures | None) -> dict[str, Any]:
@@ -154,6 +160,6 @@ def _failure_cell(run: Snapshot, chosen: CompletionFilter, kind: Failures | None
     return {
         "text": text,
         "shade": shade(share, bad=True),
-        "title": f"{shortened(run.name, MOST_NAME)}: {text}% ended {failure_text(chosen)}, {count:,}",
+        "title": f"{shortened(run.name, MAX_CELL_NAME)}: {text}% ended {failure_text(chosen)}, {count:,}",
         "href": f"{address(run.name)}{chosen.query(None)}#completions" if count else None,
     }

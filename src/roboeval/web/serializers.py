@@ -22,7 +22,7 @@ from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
-MOST_FAULTS, MOST_NAME, MOST_REASON = 5, 120, 300
+MAX_FAULTS_SHOWN, MAX_SUITE_NAME, MAX_FAILURE_REASON = 5, 120, 300
 
 
 class RunState(StrEnum):
@@ -105,9 +105,9 @@ def notes(run: Snapshot) -> list[str]:
     """Describe problems of a run in sentences."""
     results, stale = run.results, len(run.results.stale)
     faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
-    found = [str(fault) for fault in faults[:MOST_FAULTS]]
-    if len(faults) > MOST_FAULTS:
-        found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
+    found = [str(fault) for fault in faults[:MAX_FAULTS_SHOWN]]
+    if len(faults) > MAX_FAULTS_SHOWN:
+        found.append(f"{len(faults) - MAX_FAULTS_SHOWN:,} more lines are damaged.")
     if faults:
         found.append("All other rows are shown.")
     if (warning := run.cut_off.warning) is not None:
@@ -115,7 +115,7 @@ def notes(run: Snapshot) -> list[str]:
     if stale:
         found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
-        name = shortened(str(results.head.get("suite")), MOST_NAME)
+        name = shortened(str(results.head.get("suite")), MAX_SUITE_NAME)
         found.append(
             f'The suite "{name}" was not found, so failed checks are not explained; '
             "use `roboeval serve --suite FOLDER`."
@@ -188,7 +188,7 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         **{name: row[name] for name in (*KEY, "passed")},
         "failure": None if row["failure_class"] is None else failure,
-        "why": shortened(row["why"], MOST_REASON),
+        "why": shortened(row["why"], MAX_FAILURE_REASON),
         "worlds": row["worlds"],
         "stale": row["stale"],
     }
@@ -211,7 +211,7 @@ def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     try:
         data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
-        what = f"the row of {shortened(name_of(key), MOST_NAME)} is damaged; --redo judges it again"
+        what = f"the row of {shortened(name_of(key), MAX_SUITE_NAME)} is damaged; --redo judges it again"
         raise UserError(what, file=results.run.rows(results.key or "").name) from None
     if run.suite is None:
         for world in data["worlds"]:

@@ -4,7 +4,13 @@ from collections import Counter
 
 import pytest
 
-from roboeval.analysis.cluster import LONGEST, passing_programs, shape, shortest_fix, similarity
+from roboeval.analysis.failure_groups import (
+    MAX_COMPARED_CHARACTERS,
+    passing_programs,
+    shape,
+    shortest_fix,
+    similarity,
+)
 
 ONE = """\
 def task_program():
@@ -43,7 +49,15 @@ def test_functions_and_their_arguments_have_chosen_names() -> None:
 
 
 @pytest.mark.parametrize(
-    "program", ["def task_program(:\n    go\n", "", "\0", "x" * (LONGEST + 1), "(" * 5_000, "-" * 5_000 + "1"]
+    "program",
+    [
+        "def task_program(:\n    go\n",
+        "",
+        "\0",
+        "x" * (MAX_COMPARED_CHARACTERS + 1),
+        "(" * 5_000,
+        "-" * 5_000 + "1",
+    ],
 )
 def test_any_text_has_a_shape(program: str) -> None:
     assert isinstance(shape(program), tuple)

@@ -20,7 +20,7 @@ from codebotler.core.trace import Event, Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.settings import Limits, SimulationSettings
-from roboeval.mutation.mutants import OPERATORS
+from roboeval.mutation.mutants import MUTATION_OPERATORS
 from roboeval.mutation.operator import Context, Operator
 from roboeval.mutation.program_tree import apply_edit, read
 
@@ -47,7 +47,7 @@ def pour(sim: Simulation, cup: str, size: Literal["small", "large"]) -> bool:  #
 
 
 TABLE = SKILLS.with_skill(pour)
-BY_NAME = {operator.name: operator for operator in OPERATORS}
+BY_NAME = {operator.name: operator for operator in MUTATION_OPERATORS}
 
 
 class Example(TypedDict):
@@ -97,9 +97,9 @@ def told_event(event: Event) -> str:
 
 
 def test_each_operator_has_an_example_a_name_and_a_sentence() -> None:
-    assert [operator.name for operator in OPERATORS] == NAMES
-    assert len(BY_NAME) == len(OPERATORS)
-    for operator in OPERATORS:
+    assert [operator.name for operator in MUTATION_OPERATORS] == NAMES
+    assert len(BY_NAME) == len(MUTATION_OPERATORS)
+    for operator in MUTATION_OPERATORS:
         assert re.fullmatch(r"[a-z]+(-[a-z]+)*", operator.name)
         assert re.fullmatch(r"[A-Z].+\.", operator.about)
 

@@ -22,11 +22,11 @@ from roboeval.analysis.resample import LIMITS, accepted_after
 from roboeval.evaluation.failures import CLASSES, FailureClass
 from roboeval.report.cost import curves
 from roboeval.report.drawing import (
+    BACKGROUND,
     COLOURS,
-    DARK,
-    PAPER,
+    DARK_COLOURS,
+    PAGE_WIDTH,
     WHITE,
-    WIDE,
     darken,
     new_figure,
     render,
@@ -205,7 +205,7 @@ def test_lines_end_where_the_axis_ends() -> None:
 def test_numbers_stand_out_from_their_shades() -> None:
     shares = [n / 100 for n in range(101)]
     with use_style():
-        figure = new_figure(WIDE, WIDE)
+        figure = new_figure(PAGE_WIDTH, PAGE_WIDTH)
         axes = figure.add_subplot()
         heat(axes, [[share] for share in shares], [""] * len(shares), [""])
         figure.draw_without_rendering()
@@ -224,8 +224,8 @@ def in_the_dark(colour: str) -> str:
 def test_each_colour_has_one_meaning() -> None:
     shaded = {to_hex(shades()(n)) for n in range(1, 256)}
     assert len(shaded) == 255
-    assert not shaded & {colour.lower() for colour in (*COLOURS, *DARK, WHITE)}
-    assert in_the_dark(PAPER) != in_the_dark(WHITE) == WHITE
+    assert not shaded & {colour.lower() for colour in (*COLOURS, *DARK_COLOURS, WHITE)}
+    assert in_the_dark(BACKGROUND) != in_the_dark(WHITE) == WHITE
     assert in_the_dark(COLOURS[0]) == COLOURS[0].lower()
 
 
@@ -235,8 +235,8 @@ def test_nothing_of_a_dark_figure_is_left_light(name: str) -> None:
     with use_style():
         svg = render(DRAWINGS[name](cases()["usual"]))["svg"]
     dark = darken(svg)
-    assert PAPER.encode() in svg
-    assert not re.search(b"#(%s)" % b"|".join(colour[1:].encode() for colour in DARK), dark)
+    assert BACKGROUND.encode() in svg
+    assert not re.search(b"#(%s)" % b"|".join(colour[1:].encode() for colour in DARK_COLOURS), dark)
     assert not re.search(rb"rgb\(|(?:fill|stroke): (?!none|#|url)", svg), "a colour that is not exchanged"
 
 

@@ -174,8 +174,8 @@ def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch
     assert isinstance(table, Sheet)
     rows = as_dicts(table)
     assert (rows[0]["passes"], rows[0]["lines apart"]) == ("Visit/0/0", 0)
-    monkeypatch.setattr("roboeval.report.failures.MOST", 2)
-    monkeypatch.setattr("roboeval.report.failures.FEWEST", 2)
+    monkeypatch.setattr("roboeval.report.failures.MAX_GROUPS_PER_RUN", 2)
+    monkeypatch.setattr("roboeval.report.failures.MIN_GROUPS_PER_RUN", 2)
     about, groups, table = similar_failures([run]).parts
     assert isinstance(about, Prose)
     assert re.search(r"^a: 2 of 7 groups are shown", about.paragraphs[-1])

@@ -14,7 +14,7 @@ from codebotler.core.errors import UserError
 from codebotler.simulator.pool import AHEAD, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
-from roboeval.suites.families.suite import SPLITS
+from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import TrainedTask, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.training import prompts, rollouts
@@ -106,7 +106,7 @@ def test_a_prompt_that_is_not_there_is_refused() -> None:
 def test_prompts_are_the_same_each_time_and_splits_share_no_task() -> None:
     assert load_prompts(count=20) == load_prompts(count=20)
     assert load_prompts(count=20, seed=1)[0]["seed"] == 20
-    tasks = [{(row["family"], row["seed"]) for row in load_prompts(split, count=40)} for split in SPLITS]
+    tasks = [{(row["family"], row["seed"]) for row in load_prompts(split, count=40)} for split in FIRST_SEEDS]
     assert [len(one) for one in tasks] == [40] * 3
     assert not tasks[0] & tasks[1] | tasks[1] & tasks[2] | tasks[0] & tasks[2]
 
