@@ -43,7 +43,6 @@ def cost_of(table: pl.DataFrame, price: Price | None = None) -> RunCost:
 
 
 def _counted(completions: pl.DataFrame) -> pl.DataFrame:
-    """The token counts of completions that have them."""
     return completions.select("input_tokens", "output_tokens").drop_nulls()
 
 

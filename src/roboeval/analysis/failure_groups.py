@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
-from functools import cache
+from functools import cache, partial
 from itertools import count
 from typing import Any, TypeAlias
 
@@ -86,11 +86,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[l
 def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[FailureGroup]:
     """Find for each group why it fails, and the smallest fix."""
     programs = results.programs
-    right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
-    for key in sorted(results.passed):
-        if key in programs:
-            right[key[0]].append((name_of(key), programs[key]))
-    candidates = {task: passing_programs(named) for task, named in right.items()}
+    candidates = cache(partial(_passing_of_task, results))
     for rows in groups:
         often = Counter(programs.get(key_of(row)) for row in rows)
         most = max(often.values())
@@ -104,23 +100,25 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
             representative=key_of(row),
             program=program,
             reason=reason(row, results.suite, ablated=results.is_ablated),
-            fix=None if has_none else shortest_fix(str(program), candidates.get(row["task"], [])),
+            fix=None if has_none else shortest_fix(str(program), candidates(row["task"])),
         )
 
 
 def nearest_fix(results: Results, key: Key) -> Fix | None:
     """Find the smallest fix of a completion; None if its program was removed or none passes."""
+    program = results.programs.get(key)
+    return None if program is None else shortest_fix(program, _passing_of_task(results, key[0]))
+
+
+def _passing_of_task(results: Results, task: str) -> list[PassingProgram]:
     programs = results.programs
-    if key not in programs:
-        return None
-    right = (other for other in sorted(results.passed) if other[0] == key[0] and other in programs)
-    return shortest_fix(programs[key], passing_programs((name_of(other), programs[other]) for other in right))
+    right = (key for key in sorted(results.passed) if key[0] == task and key in programs)
+    return passing_programs((name_of(key), programs[key]) for key in right)
 
 
 def _group_similar(
     rows: Sequence[Row], programs: Mapping[Key, str], shape_of: Callable[[str], ProgramLines]
 ) -> Iterator[list[Row]]:
-    """Group rows with the same cause by the similarity of their programs."""
     if failure_of(rows[0])["class"] == NO_PROGRAM:
         yield sorted(rows, key=key_of)
         return

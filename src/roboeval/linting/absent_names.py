@@ -61,7 +61,6 @@ def _names(
 
 
 def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
-    """Yield the names of the task's people that occur in the texts of an event."""
     texts = (text for text in (element.text, element.options) if text is not None)
     found = " | ".join(pattern for text in texts for pattern in patterns(text)).lower()
     plain = re.sub(r"\\(.)", lambda escape: " " if escape[1].isalnum() else escape[1], found)

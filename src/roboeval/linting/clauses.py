@@ -76,7 +76,6 @@ def _find(words: str, text: str) -> Iterator[Span]:
 
 
 def _split_clauses(text: str) -> Iterator[Span]:
-    """The spans of the clauses of a text."""
     first = 0
     for last in [*(match.end() for match in _SENTENCE.finditer(text)), len(text)]:
         spans: list[Span] = []

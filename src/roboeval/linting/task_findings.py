@@ -80,7 +80,6 @@ def _uncovered(task: Task) -> Iterator[Finding]:
 
 
 def _unworded(task: Task) -> Iterator[Finding]:
-    """Checks with a regex that explanations cannot describe."""
     unclear = {
         requirement.check
         for requirement in _required(task)
@@ -98,7 +97,6 @@ def _unworded(task: Task) -> Iterator[Finding]:
 
 
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Solutions whose verdict differs from their file."""
     if task.borrows:  # its programs were written for other requirements
         return
     for solution, judged in zip(solutions(task), verdicts, strict=False):  # verdicts on an ablation follow
@@ -116,7 +114,6 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
 
 
 def _why(failed: Failure, judged: Verdicts) -> str:
-    """The check or error by which a program fails, and the world."""
     by = failed["kind"] if failed["check"] is None else f'{failed["kind"]}, by "{failed["check"]}",'
     return f' by {by} in world {failed["world"] + 1}, "{judged[failed["world"]].world}"'
 

@@ -16,6 +16,7 @@ from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet
 
 NO_INSTRUCTION = "instruction not recorded"
 REPORTING_TASKS = "come back and report"
+UNKNOWN_COUNT = "an unknown number (judged by an earlier version)"
 MAX_DISTINCT_WORDS = 12
 MAX_REPORT_SENTENCES = 20
 
@@ -51,15 +52,12 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 def report_back_sentences(table: Sheet) -> list[str]:
     """Sentences about tasks that end with a report."""
     return [
-        f"{name}: of {failed:,} failures in tasks that end with a report, {_count_or_unknown(away)} never "
-        f"returned and {lost:,} went to a room that does not exist."
+        f"{name}: of {failed:,} failures in tasks that end with a report, "
+        f"{UNKNOWN_COUNT if away is None else format(away, ',')} never returned and {lost:,} went to a room "
+        "that does not exist."
         for name, tasks, _, _, failed, away, _, lost, _ in table.rows[:MAX_REPORT_SENTENCES]
         if tasks == REPORTING_TASKS and failed
     ]
-
-
-def _count_or_unknown(count: int | None) -> str:
-    return "an unknown number (judged by an earlier version)" if count is None else f"{count:,}"
 
 
 # --- phrasing

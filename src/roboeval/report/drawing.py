@@ -11,7 +11,6 @@ from functools import cache
 from typing import Any
 
 import matplotlib as mpl
-from fontTools import subset
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
@@ -70,20 +69,6 @@ FIGURE_STYLE: dict[Any, Any] = {
     "pdf.fonttype": 42,
     "pdf.compression": 6,
 }
-
-
-load_font = subset.load_font
-
-
-def _load_font(*args: Any, **more: Any) -> Any:  # noqa: ANN401 - the signature of fontTools
-    """Load a font without kerning tables: PDF places each letter itself, and copying the tables is slow."""
-    font = load_font(*args, **more)
-    for table in {"GDEF", "GPOS", "GSUB"}.intersection(font.keys()):
-        del font[table]
-    return font
-
-
-subset.load_font = _load_font
 
 
 @contextmanager

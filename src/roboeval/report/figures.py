@@ -160,7 +160,6 @@ WORST_AND_BEST = "worst and best prompt"
 
 
 def _mark(size: float) -> dict[str, Any]:
-    """The style of a diamond that marks a prompt."""
     edge = {"markerfacecolor": BACKGROUND, "markeredgecolor": FOREGROUND, "markeredgewidth": 0.5}
     return {"linestyle": "none", "marker": "D", "markersize": size, "clip_on": False, "zorder": 4, **edge}
 
@@ -399,25 +398,23 @@ def _looks() -> dict[str, tuple[str, str]]:
     return {PASSED: (PALE, ""), NO_PROGRAM: (MUTED, ""), **looks}
 
 
-def _with_count(name: str, count: int | None) -> str:
-    return name if count is None else f"{name} (n = {count:,})"
-
-
 def _kinds(
     axes: Axes, found: Sequence[tuple[str, Causes]], of: str, kinds: Sequence[str], *, many: bool
 ) -> None:
-    there = [
-        (_with_count(short_name(name, 18), one.counts.get((of, ALL))), one.kinds.get(of, {}))
-        for name, one in found
-        if many or one.kinds.get(of)
-    ]
+    there = [(short_name(name, 18), one) for name, one in found if many or one.kinds.get(of)]
     if not kinds:
         axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)
         axes.set_xticks([])
         axes.set_yticks([])
         return
-    cells = [[shares.get(kind, 0.0) if shares else None for kind in kinds] for _, shares in there]
-    names, labels = [name for name, _ in there], [short_name(kind, 24) for kind in kinds]
+    shares = [one.kinds.get(of) for _, one in there]
+    cells = [[each.get(kind, 0.0) if each else None for kind in kinds] for each in shares]
+    counts = [one.counts.get((of, ALL)) for _, one in there]
+    names = [
+        name if count is None else f"{name} (n = {count:,})"
+        for (name, _), count in zip(there, counts, strict=True)
+    ]
+    labels = [short_name(kind, 24) for kind in kinds]
     if many:
         heat(axes, cells, names, labels)
     else:

@@ -65,7 +65,6 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Dr
 
 
 def _files(sections: Sequence[Section]) -> str:
-    """Links to the CSV files of all tables."""
     names = [part.name for section in sections for part in section.parts if isinstance(part, Sheet)]
     links = ", ".join(f'<a href="tables/{_text(name)}.csv">{_text(name)}</a>' for name in names)
     return f'<p class="files">Tables as CSV: {links}</p>\n' if names else ""

@@ -189,7 +189,6 @@ def pieces(sections: Sequence[Section]) -> int:
 
 
 def _draw(figure: ReportFigure, folder: Path) -> DrawnFigure:
-    """Draw a figure, write its files, and return it for the page."""
     with use_style():
         files = render(figure.draw())
     for kind in FIGURE_FORMATS:

@@ -5,30 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
-
 from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.recorded import RECORDED_NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task
+from roboeval.suites.schema import StrictForm
 
 LENDING_SUITE = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
 
 
-class EquivalentMutantFile(BaseModel):
+class EquivalentMutantFile(StrictForm):
     """A mutant that behaves differently but is still right."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     operator: Name
     diff: YamlText  # printed by `roboeval mutate`
     because: Name
 
 
-class SolutionsFile(BaseModel):
+class SolutionsFile(StrictForm):
     """A file of solutions."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     recorded: tuple[InstructionSolutions, ...] = ()  # replies of the recorded models
     programs: tuple[Solution, ...] = ()

@@ -165,7 +165,7 @@ def _build_suite(
     ]
     house = None
     if head.house_rules is not None:
-        house = HouseRules.of_suite(folder / head.house_rules, skills, rooms_in(tasks))
+        house = HouseRules.read(folder / head.house_rules, skills, rooms_in(tasks), of_suite=True)
     is_sampled = any(task.is_sampled for task in tasks)
     return Suite(
         name=head.name,
@@ -213,7 +213,6 @@ def _without_meanings(data: object) -> object:
 def _digest(
     files: list[YamlFile], tasks: list[Task], house: HouseRules | None, skills: Sequence[Path]
 ) -> str:
-    """Hash the content of the files and the sampled worlds."""
     content: list[object] = [_without_meanings(file.data) for file in files]
     content += [hashlib.sha256(path.read_bytes()).hexdigest() for path in skills]
     if house is not None:

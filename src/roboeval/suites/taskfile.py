@@ -179,7 +179,6 @@ class _Reader:
         return TaskCheck(name, parameters, body.category, body.rtl, body.commonsense, line, means)
 
     def _means(self, head: str, parameters: Sequence[str]) -> dict[str, str]:
-        """The descriptions of a check's texts, by kind of event."""
         body = self.form.checks[head]
         for kind, meaning in body.means.items():
             if kind not in self.skills.recordings and kind != ANSWERED:

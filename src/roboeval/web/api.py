@@ -82,8 +82,6 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
 
 
 def _add_report(api: APIRouter, store: RunStore) -> None:
-    """Add the routes of a run's report and its tables."""
-
     @api.get("/{run}/report")
     def show_report(run: str) -> Response:
         """Show the report in the folder of a run, from `roboeval run` or `roboeval report`."""

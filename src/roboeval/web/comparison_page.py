@@ -12,14 +12,13 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
 from roboeval.web.difference import RUNS_IN_PAIR, Difference, differences_of, draw_differences
-from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
+from roboeval.web.heat_map import MAX_NAME, TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, completions_text, score_text, show_state
 
 MAX_COMPARED_RUNS = 12  # runs on the page
-MAX_COLUMN_NAME = 60
 DIFFERENT_SUITES = (
     "These runs were judged with different suites or versions of a suite. Compare them with care."
 )
@@ -93,7 +92,7 @@ class _Comparison:
         tasks = dict.fromkeys(task for of in cells for task in of.tasks)
         rows = [
             {
-                "name": shortened(task, MAX_COLUMN_NAME),
+                "name": shortened(task, MAX_NAME),
                 "cells": [cell for of in cells for cell in of.row(task)],
             }
             for task in tasks
@@ -111,13 +110,13 @@ class _Comparison:
 
 
 def _column(run: Snapshot) -> dict[str, Any]:
-    return {"name": shortened(run.name, MAX_COLUMN_NAME), "title": models_of(run), "href": address(run.name)}
+    return {"name": shortened(run.name, MAX_NAME), "title": models_of(run), "href": address(run.name)}
 
 
 def _draw_run(run: Snapshot) -> None:
     data = run_data(run)
     with ui.element("li"):
-        html.a(shortened(run.name, MAX_COLUMN_NAME), href=outside(address(run.name))).props("dir=auto")
+        html.a(shortened(run.name, MAX_NAME), href=outside(address(run.name))).props("dir=auto")
         show_state(data, PlainText("small"))
         PlainText("b", score_text(data))
         PlainText("span", f"{completions_text(data)}, {models_of(run)}", "quiet")

@@ -29,13 +29,13 @@ from roboeval.evaluation.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import Key, by_hand, name_of
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_person, world_title
-from roboeval.web.heat_map import address
+from roboeval.web.heat_map import MAX_NAME, address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import ProgramView
 
-MAX_NAME, MAX_SENTENCE, MAX_INSTRUCTION, MAX_REPLY = 80, 2_000, 5_000, 50_000
+MAX_SENTENCE, MAX_INSTRUCTION, MAX_REPLY = 2_000, 5_000, 50_000
 FAILED_STEP_NOTE = "Red marks the step at which a check failed."
 NEIGHBOUR_LINKS = ("Previous completion", "Next completion")
 PROGRAM_CHANGED = (
@@ -180,7 +180,6 @@ def _draw_world_head(data: Mapping[str, Any], number: int, of: int) -> None:
 
 
 def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
-    """Draw the error that ended a run, its failed checks, and remarks."""
     if data["error"] is not None:
         allowed = ". This world allows a program to wait forever." * data["satisfied"]
         sentence = f"{shortened(data['error']['kind'])}: {shortened(error_sentence(data))}{allowed}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from urllib.parse import urlencode
 
@@ -15,11 +15,11 @@ from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.compare import compare_scores, pairs_to_compare, verdict
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
 from roboeval.evaluation.runs.completions import KEY, Key, name_of
-from roboeval.web.heat_map import address
+from roboeval.web.heat_map import MAX_NAME, address
 from roboeval.web.snapshot import Snapshot
 from roboeval.web.widgets import interval_text
 
-MAX_PAIR_NAME, MAX_PAIR_TASKS, MAX_DIFFERING = 60, 100, 30
+MAX_PAIR_TASKS, MAX_DIFFERING = 100, 30
 RUNS_IN_PAIR = 2
 DIFFERENCE_HEADS = ("95% confidence interval", "Different verdicts")
 INTERVAL_NOTE = "The interval for all tasks is over tasks, that for a task over its prompts."
@@ -84,7 +84,7 @@ def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
 
 
 def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Difference:
-    names = shortened(first.name, MAX_PAIR_NAME), shortened(second.name, MAX_PAIR_NAME)
+    names = shortened(first.name, MAX_NAME), shortened(second.name, MAX_NAME)
     try:
         found = compare_scores(pass_at_1(first.scores), pass_at_1(second.scores))
     except UserError:
@@ -111,7 +111,7 @@ def draw_differences(found: Sequence[Difference]) -> None:
 
 def _draw_difference(difference: Difference) -> None:
     runs, rows, overall = difference.runs, difference.rows, difference.overall
-    names = [shortened(run.name, MAX_PAIR_NAME) for run in runs]
+    names = [shortened(run.name, MAX_NAME) for run in runs]
     PlainText("p", difference.sentence)
     if overall is None:
         return
@@ -130,7 +130,7 @@ def _draw_difference(difference: Difference) -> None:
 def _draw_row(row: TaskRow, runs: Sequence[Snapshot]) -> None:
     estimate = row.difference
     with html.tr():
-        PlainText("th", shortened(row.task, MAX_PAIR_NAME)).props("scope=row")
+        PlainText("th", shortened(row.task, MAX_NAME)).props("scope=row")
         for share in row.shares:
             PlainText("td", f"{share:.2f}", "number")
         PlainText("td", f"{estimate.mean:+.2f}", "number strong")
@@ -147,12 +147,9 @@ def _draw_differing(row: TaskRow, runs: Sequence[Snapshot]) -> None:
             for key, is_second in row.differing[:MAX_DIFFERING]:
                 with ui.element("li"):
                     PlainText("span", f"{name_of(key)}: ")
-                    for run, text in zip(runs, _verdicts(is_second), strict=True):
-                        link = html.a(f"{shortened(run.name, MAX_PAIR_NAME)} {text}")
+                    verdicts = ("failed", "passed") if is_second else ("passed", "failed")
+                    for run, text in zip(runs, verdicts, strict=True):
+                        link = html.a(f"{shortened(run.name, MAX_NAME)} {text}")
                         link.props["href"] = outside(f"{address(run.name)}/{name_of(key)}")
             if (left := len(row.differing) - MAX_DIFFERING) > 0:
                 PlainText("li", f"and {left:,} more")
-
-
-def _verdicts(is_second: bool) -> Iterator[str]:  # noqa: FBT001 - a private function
-    yield from ("failed", "passed") if is_second else ("passed", "failed")

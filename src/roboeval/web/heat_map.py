@@ -16,7 +16,7 @@ from roboeval.web.snapshot import CompletionFilter, Snapshot
 
 SHADE_STEPS = 10
 MISSING = "-"
-MAX_CELL_NAME, MAX_MODELS_TEXT = 60, 200
+MAX_NAME, MAX_MODELS_TEXT = 60, 200
 EMPTY_CELL = {"text": "", "shade": "none"}
 
 
@@ -55,12 +55,12 @@ def models_of(run: Snapshot) -> str:
 
 def failure_text(chosen: CompletionFilter) -> str | None:
     """Describe the failure that a filter selects, such as `in NameError`; None if it selects no failure."""
-    kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MAX_CELL_NAME)
+    kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MAX_NAME)
     if chosen.failure_class == NO_PROGRAM:
         return ending_of(NO_PROGRAM) + ("" if kind is None else f" ({kind})")
     if kind is not None:
         return f"in {kind}"
-    return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MAX_CELL_NAME)
+    return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MAX_NAME)
 
 
 class TaskCells:
@@ -107,7 +107,7 @@ class TaskCells:
 
     def _linked(self, task: str, prompt: int | None, text: str, look: str, title: str) -> dict[str, Any]:
         here = (self._filter.task, self._filter.prompt) == (task, prompt)
-        which = shortened(task, MAX_CELL_NAME) + ("" if prompt is None else f", prompt {prompt}")
+        which = shortened(task, MAX_NAME) + ("" if prompt is None else f", prompt {prompt}")
         query = replace(self._filter, task=task, prompt=prompt).query(self._evaluation)
         return {
             "text": text,
@@ -121,37 +121,25 @@ class TaskCells:
 
 def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
     """Rows of failures by run: each class with its kinds, the most frequent first."""
-    found = [{(of.name, kind.name): kind for of in run.failures for kind in of.kinds} for run in runs]
-    most: dict[tuple[str, str], float] = {}
-    for kinds in found:
-        most |= {key: max(kind.share, most.get(key, 0.0)) for key, kind in kinds.items()}
-    classes = [{of.name: of for of in run.failures} for run in runs]
-    largest: dict[str, float] = {}
-    for known in classes:
-        largest |= {name: max(of.share, largest.get(name, 0.0)) for name, of in known.items()}
+    by_run: list[dict[tuple[str, str | None], Failures]] = []
+    largest: dict[tuple[str, str | None], float] = {}
+    for run in runs:
+        by_run.append({(of.name, None): of for of in run.failures})
+        by_run[-1] |= {(of.name, kind.name): kind for of in run.failures for kind in of.kinds}
+        largest |= {key: max(one.share, largest.get(key, 0.0)) for key, one in by_run[-1].items()}
+    order = sorted(
+        largest, key=lambda key: (-largest[key[0], None], key[0], key[1] is not None, -largest[key])
+    )
     rows = []
-    for name in sorted(largest, key=lambda name: -largest[name]):
-        totals = [known.get(name) for known in classes]
-        rows.append(
-            _failure_row(plural_of(name), runs, CompletionFilter(failure_class=name), totals, "of-all")
-        )
-        for kind in sorted((k for of, k in most if of == name), key=lambda kind: -most[name, kind]):
-            chosen = CompletionFilter(failure_class=name, failure_kind=kind)
-            rows.append(
-                _failure_row(kind, runs, chosen, [kinds.get((name, kind)) for kinds in found], "of-class")
-            )
+    for name, kind in order:
+        chosen = CompletionFilter(failure_class=name, failure_kind=kind)
+        cells = [
+            _failure_cell(run, chosen, found.get((name, kind)))
+            for run, found in zip(runs, by_run, strict=True)
+        ]
+        title, look = (plural_of(name), "of-all") if kind is None else (kind, "of-class")
+        rows.append({"name": shortened(title, MAX_NAME), "look": look, "cells": cells})
     return rows
-
-
-def _failure_row(
-    name: str,
-    runs: Sequence[Snapshot],
-    chosen: CompletionFilter,
-    failures: Sequence[Failures | None],
-    look: str,
-) -> dict[str, Any]:
-    cells = [_failure_cell(run, chosen, one) for run, one in zip(runs, failures, strict=True)]
-    return {"name": shortened(name, MAX_CELL_NAME), "look": look, "cells": cells}
 
 
 def _failure_cell(run: Snapshot, chosen: CompletionFilter, kind: Failures | None) -> dict[str, Any]:
@@ -160,6 +148,6 @@ def _failure_cell(run: Snapshot, chosen: CompletionFilter, kind: Failures | None
     return {
         "text": text,
         "shade": shade(share, bad=True),
-        "title": f"{shortened(run.name, MAX_CELL_NAME)}: {text}% ended {failure_text(chosen)}, {count:,}",
+        "title": f"{shortened(run.name, MAX_NAME)}: {text}% ended {failure_text(chosen)}, {count:,}",
         "href": f"{address(run.name)}{chosen.query(None)}#completions" if count else None,
     }

@@ -12,7 +12,7 @@ from nicegui import html, ui
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.evaluation.failures import plural_of
-from roboeval.web.heat_map import MISSING, TaskCells, address, failure_text, models_of, percent
+from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, address, failure_text, models_of, percent
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -27,7 +27,6 @@ from roboeval.web.widgets import (
     tasks_text,
 )
 
-MAX_HEADING_NAME = 80
 SCROLL_TO_COMPLETIONS = "document.getElementById('completions').scrollIntoView()"
 RUN_DELETED = "This run was deleted or renamed. The page shows its last known state."
 
@@ -49,7 +48,7 @@ class _RunPage:
         self._store, self._run, self._chosen, self._evaluation = store, run, chosen, evaluation
         self._changes = 0
         self._kinds: dict[CompletionFilter, _Kind] = {}
-        PlainText("h1", shortened(run.name, MAX_HEADING_NAME))
+        PlainText("h1", shortened(run.name, MAX_NAME))
         self._error = PlainText("p", "", "trouble").props("role=alert")
         self._error.say("")
         self._head = ui.element("div").classes("run-head")
@@ -103,7 +102,7 @@ class _RunPage:
     def _show_chosen(self) -> None:
         run, chosen = self._run, self._chosen
         cells = TaskCells(run, chosen, self._evaluation)
-        rows = [{"name": shortened(task, MAX_HEADING_NAME), "cells": cells.row(task)} for task in cells.tasks]
+        rows = [{"name": shortened(task, MAX_NAME), "cells": cells.row(task)} for task in cells.tasks]
         self._heat.show(groups=[{"name": "", "columns": cells.columns}], rows=rows)
         self._title.say(f"Share that {_verb(chosen)}")
         self._which.say(_heading(chosen))
@@ -141,7 +140,7 @@ class _Kind:
         look = "kind" + " of-class" * (kind.failure_kind is not None)
         look += " bad-kind" * (kind.failure_class is not None)
         with Button("", lambda: choose(kind), look) as self._button:
-            PlainText("span", shortened(name, MAX_HEADING_NAME))
+            PlainText("span", shortened(name, MAX_NAME))
             self._count = PlainText("b")
             self._share = PlainText("small", "", "quiet")
 
@@ -157,7 +156,7 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
     data, key = run_data(run), run.results.key
     with ui.element("p").classes("facts"):
         state = PlainText("small")
-        PlainText("span", models_of(run) + (f", judged by {shortened(key, MAX_HEADING_NAME)}" if key else ""))
+        PlainText("span", models_of(run) + (f", judged by {shortened(key, MAX_NAME)}" if key else ""))
         PlainText("b", score_text(data))
         PlainText("span", f"{completions_text(data)}, {tasks_text(data)} tasks")
         if data["date"] is not None:
@@ -174,7 +173,7 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
             html.a("Report of this run", href=outside(f"/api/runs/{quote(run.name, safe='')}/report"))
         for other in run.evaluations if len(run.evaluations) > 1 else ():
             link = html.a(
-                shortened(other, MAX_HEADING_NAME),
+                shortened(other, MAX_NAME),
                 href=outside(address(run.name) + CompletionFilter().query(other)),
             )
             if other == key:
@@ -188,10 +187,9 @@ def _verb(chosen: CompletionFilter) -> str:
 
 
 def _heading(chosen: CompletionFilter) -> str:
-    """The heading of the list of completions."""
     parts = []
     if chosen.task is not None:
-        parts.append(f"of {shortened(chosen.task, MAX_HEADING_NAME)}")
+        parts.append(f"of {shortened(chosen.task, MAX_NAME)}")
     if chosen.prompt is not None:
         parts.append(f"prompt {chosen.prompt}")
     if chosen.verdict != CompletionFilter():

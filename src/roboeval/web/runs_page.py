@@ -14,7 +14,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import Estimate
-from roboeval.web.heat_map import MISSING, address
+from roboeval.web.heat_map import MAX_NAME, MISSING, address
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, interval_text, show_state, tasks_text
 
@@ -31,7 +31,6 @@ TABLE_HEADS = ("Run", "Suite", "Tasks", "State", "Completions", "pass@1", "Start
 TABLE_NOTE = "pass@1 with its 95% confidence interval over tasks; times are in UTC."
 NO_RUNS_SENTENCE = "There are no runs yet. This command creates one without an API key or a network:"
 EXAMPLE_COMMAND = "run --model recorded:hasty --num-completions 3"
-MAX_ROW_NAME = 80
 
 
 def _moment(date: str | None) -> float:
@@ -118,10 +117,10 @@ class _RunRow:
             with html.td().classes("tick"):
                 box = ui.element("input").props("type=checkbox name=run")
                 box.props["value"] = name
-                box.props["aria-label"] = f"Compare {shortened(name, MAX_ROW_NAME)} with others"
+                box.props["aria-label"] = f"Compare {shortened(name, MAX_NAME)} with others"
             with html.th().props("scope=row"):
                 with html.a(href=outside(address(name))):
-                    PlainText("b", shortened(name, MAX_ROW_NAME))
+                    PlainText("b", shortened(name, MAX_NAME))
                 self._models = PlainText("span", "", "quiet")
                 self._settings = PlainText("span", "", "quiet note")
                 self._notes = PlainText("span", "", "bad note")
@@ -149,7 +148,7 @@ class _RunRow:
         self._tasks.say(tasks_text(run))
         self._date.say(date_text(run))
         self._notes.say(" ".join(run["notes"][:1]))
-        self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or MISSING), MAX_ROW_NAME))
+        self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or MISSING), MAX_NAME))
         show_state(run, self._state, self._bar)
         self._count.say(count_text(run))
         mean = run.get("pass@1")

@@ -87,12 +87,10 @@ def settings_text(about: Mapping[str, Any]) -> str:
     settings = about.get("settings")
     named = settings.items() if isinstance(settings, dict) else ()
     return ", ".join(
-        f"{name.replace('_', '-')} {_format(value)}" for name, value in named if value is not None
+        f"{name.replace('_', '-')} {value if isinstance(value, str) else json.dumps(value)}"
+        for name, value in named
+        if value is not None
     )
-
-
-def _format(value: object) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def date_of(about: Mapping[str, Any]) -> str | None:

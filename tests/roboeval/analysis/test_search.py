@@ -102,11 +102,11 @@ def test_the_command(runs: Path) -> None:
     assert made.out.startswith("found ")
     assert "GrilledCheese" not in made.out
     of_the_task = json.loads(roboeval("find", runs, "--task", "SayGoodDay", "--json").out)
-    assert of_the_task["count_searched"] == len(of_the_task["found"]) > 0
+    assert of_the_task["searched"] == len(of_the_task["found"]) > 0
     assert f" of {of_the_task['count_searched']} completions" in made.out
     assert " passes, and differs in " in made.out
     data = json.loads(roboeval("find", runs, "--json").out)
-    assert data["count_searched"] == len(data["found"])
+    assert data["searched"] == len(data["found"])
     failed = sum(not one["passed"] for one in data["found"])
     assert sum(group["size"] for group in data["groups"]) == failed > 0
     assert all(group["why"] for group in data["groups"])
@@ -136,7 +136,7 @@ def test_rows_of_an_earlier_version_are_undecided(runs: Path) -> None:
     plain = roboeval("find", runs, 'tr.Exists(goto("lab"))', "--json")
     file.write_bytes(kept)
     key.write_bytes(sealed)
-    assert len(json.loads(made.out)["undecided"]) == json.loads(made.out)["count_searched"] == len(rows)
+    assert len(json.loads(made.out)["undecided"]) == json.loads(made.out)["searched"] == len(rows)
     assert "earlier version" in made.err
     assert "--redo" in made.err
     assert json.loads(plain.out)["undecided"] == []

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.simulator.pool import AHEAD, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
 from roboeval.suites.families.suite import FIRST_SEEDS
@@ -70,27 +68,11 @@ def test_equal_rollouts_are_judged_once_and_progress_is_told() -> None:
     assert told[-1] == 40, "nothing is judged again"
 
 
-def test_only_a_few_batches_are_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    pool, under_way, most = shared_pool(), [0], [0]
-    submit = pool.submit
-
-    def counted(*arguments: Any) -> Future[Any]:  # noqa: ANN401 - of any call
-        under_way[0] += 1
-        most[0] = max(most[0], under_way[0])
-        future: Future[Any] = submit(*arguments)
-        future.add_done_callback(lambda _: under_way.__setitem__(0, under_way[0] - 1))
-        return future
-
-    monkeypatch.setattr(pool, "submit", counted)
-    judge([saying(f"one of {number}") for number in range(400)])
-    assert 1 <= most[0] <= AHEAD * pool.workers
-
-
 def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rollouts, "_judged", broken)
+    monkeypatch.setattr(rollouts, "_judge_batch", broken)
     with pytest.raises(EngineError, match="no process"):
         judge([saying("never judged before")])
 

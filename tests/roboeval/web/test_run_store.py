@@ -105,7 +105,7 @@ def test_evaluations_are_found_by_name(runs: Path) -> None:
 
 
 def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_store, "REST", 0)
+    monkeypatch.setattr(run_store, "REST_FACTOR", 0)
     store, run = RunStore(runs), Run(runs / "hasty")
     first = store.open("hasty")
     assert store.open("hasty") is first
@@ -124,7 +124,7 @@ def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: p
 
 
 def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_store, "REST", 1e9)
+    monkeypatch.setattr(run_store, "REST_FACTOR", 1e9)
     store, run = RunStore(runs), Run(runs / "hasty")
     first = store.open("hasty")
     completions = run.completions.read_bytes().splitlines(keepends=True)

@@ -12,7 +12,7 @@ from random import Random
 from string import Template
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
@@ -23,7 +23,7 @@ from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.formulas import And
 from codebotler.rtl.syntax import parse
-from roboeval.suites.schema import MAX_WORLDS, SuiteFile
+from roboeval.suites.schema import MAX_WORLDS, StrictForm, SuiteFile
 from roboeval.suites.suite import Suite
 from roboeval.suites.task import Requirement, Task
 from roboeval.suites.taskfile import read_task
@@ -52,18 +52,14 @@ RETRACTION = (
 Choice: TypeAlias = Name | Annotated[list[Name], Field(min_length=1)]
 
 
-class _Form(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class WrongProgram(_Form):
+class WrongProgram(StrictForm):
     """A program that does not do all of what was asked."""
 
     about: Name
     program: YamlText
 
 
-class FamilyFile(_Form):
+class FamilyFile(StrictForm):
     """The template of a family; `$name` is replaced by a value chosen for each seed.
 
     Args:
@@ -211,7 +207,6 @@ def _forbid_retraction(task: Task) -> Task:
 
 
 def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[str, str]]:
-    """Choose the value of each name in a template."""
     used: set[str] = set()
 
     def sample(words: Sequence[str], count: int) -> list[str]:
@@ -265,7 +260,6 @@ def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def _fill(text: str, chosen: Mapping[str, str], path: Path) -> str:
-    """Replace the names in a template by their values."""
     for match in Template.pattern.finditer(text):
         name = match["named"] or match["braced"]
         if match["escaped"] is None and name not in chosen:
@@ -276,7 +270,6 @@ def _fill(text: str, chosen: Mapping[str, str], path: Path) -> str:
 
 
 def _expect_python(form: FamilyFile, file: YamlFile) -> None:
-    """Raise a UserError if one of the programs does not parse."""
     wrong = [(one.program, ("wrong", number, "program")) for number, one in enumerate(form.wrong)]
     for program, place in ((form.solution, ("solution",)), *wrong):
         if isinstance(flaw := parsed(program), Flaw):
@@ -284,7 +277,6 @@ def _expect_python(form: FamilyFile, file: YamlFile) -> None:
 
 
 def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -> Iterator[Any]:
-    """The prompts with all choices made."""
     for number, prompt in enumerate(template.form.task["prompts"]):
         if not isinstance(prompt, str):  # `read_task` reports the error
             yield prompt
