@@ -30,7 +30,7 @@ MAX_REVERSALS_PER_RUN = 100  # groups in the table, per run
 def why(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
     """Causes of failures (paper, section V.B)."""
     found = all_causes(runs, with_published=with_published)
-    figure = ReportFigure("causes", lambda: figures.causes(found), coverage_of(runs))
+    figure = ReportFigure("causes", lambda: figures.draw_causes(found), coverage_of(runs))
     notes = Prose(published_notes(runs) if with_published else [])
     return section("causes", figure, notes, causes_sheet(found))
 

@@ -1,9 +1,9 @@
-"""The figures of a report: pass@1 of each run, and those of sections V and VI of the paper."""
+"""Figures of pass@1 by run and by task, and of the causes of failures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import cycle
 from typing import Any, TypeAlias
 
@@ -12,20 +12,17 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.markers import TICKDOWN
 from matplotlib.patches import Patch
 
-from roboeval.analysis.metrics import Estimate, TaskScore, overall, threshold_curve
-from roboeval.analysis.resample import LIMITS
+from roboeval.analysis.metrics import Estimate, TaskScore, overall
 from roboeval.analysis.summary import ALL, PASSED, Causes, kinds_in_order
 from roboeval.evaluation.failures import CLASSES, NO_PROGRAM, plural_of, shown_classes
 from roboeval.report.drawing import (
     BACKGROUND,
     COLOURS,
-    COLUMN_WIDTH,
-    DASHES,
     FOREGROUND,
-    MARKERS,
+    MAX_COLOURED_RUNS,
+    MAX_LEGEND_NAME,
     MUTED,
     PAGE_WIDTH,
     PALE,
@@ -37,27 +34,21 @@ from roboeval.report.drawing import (
 )
 from roboeval.report.runs import JudgedRun, tasks_of
 
-MAX_COLOURED_RUNS = len(COLOURS)
-LABELLED_POWERS = (0.1, 0.01, 0.001)  # labelled on an axis of thresholds
-MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # more labels, if prompts have at most 20 completions
-MIN_LABEL_RATIO = 1.6  # smallest ratio of two labels that do not overlap
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "", "++++")  # distinguish bars without colours
 TASKS_PER_ROW = 8  # tasks per row
 MIN_TASK_SLOTS = 4  # leave room for this many tasks, so that a single bar does not fill the page
-MAX_LEGEND_NAME = 16  # letters; two names of this length fit side by side below a narrow figure
 BAR_FILL = 0.82  # share of a task's width that its bars fill
 MAX_PANELS_PER_ROW = 3  # panels side by side with labels between them
 MAX_NUMBERED_CELLS = 14  # rows or columns; cells of larger tables have no numbers
 DARK_CELL_SHARE = 0.75  # cells with larger shares need white text
 
-Points: TypeAlias = Sequence[tuple[float, float]]
 Cells: TypeAlias = Sequence[Sequence[float | None]]
 
 
 # --- pass@1 by run, and by task
 
 
-def overall_scores(runs: Sequence[JudgedRun]) -> Figure:
+def draw_overall(runs: Sequence[JudgedRun]) -> Figure:
     """Draw pass@1 of each run over all prompts, with its interval over tasks."""
     figure = new_figure(PAGE_WIDTH, 0.62 + 0.21 * len(runs))
     axes = figure.add_subplot()
@@ -83,7 +74,7 @@ def _whisker(cap: float) -> dict[str, Any]:
     return {"fmt": "none", "elinewidth": 0.7, "capsize": cap, "capthick": 0.7, "ecolor": FOREGROUND}
 
 
-def bars(runs: Sequence[JudgedRun]) -> Figure:
+def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
     """Draw pass@1 by task and model, with intervals over prompts, and next to it the ablated tasks."""
     tasks = tasks_of(runs)
     there = {score.task for run in runs for score in run.ablated_scores}
@@ -176,11 +167,11 @@ def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Seq
     widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
     names = [short_name(run.name) for run in runs]
-    heat(figure.add_subplot(grid[0, 0]), [_means(run.scores, tasks) for run in runs], names, tasks)
+    draw_heat_map(figure.add_subplot(grid[0, 0]), [_means(run.scores, tasks) for run in runs], names, tasks)
     if ablated:
         axes = figure.add_subplot(grid[0, 1])
         cells = [_means(run.ablated_scores, ablated) for run in runs]
-        heat(axes, cells, [""] * len(runs), ablated)
+        draw_heat_map(axes, cells, [""] * len(runs), ablated)
         axes.set_title("common sense only", loc="left")
     return figure
 
@@ -190,134 +181,10 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
     return [means.get(task) for task in tasks]
 
 
-# --- curves
-
-
-def thresholds(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw the share of prompts by threshold of pass@1, one line per model."""
-    most = most_completions(runs)
-    lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
-    means = [run.mean for run in runs]
-    figure = _plot_lines(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
-    _threshold_axes(figure.axes[0], most)
-    _threshold_labels(figure.axes[0], most)
-    return figure
-
-
-def most_completions(runs: Sequence[JudgedRun]) -> int:
-    """The most completions of any prompt; at least 2, since an axis needs two ends."""
-    return max(2, *(prompt.n for run in runs for score in run.scores for prompt in score.prompts))
-
-
-def accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
-    """Draw the share of accepted programs by number of retries, one line per model."""
-    lines = {name: [*enumerate(those)] for name, those in shares.items()}
-    figure = _plot_lines(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
-    axes = figure.axes[0]
-    axes.set_xscale("symlog", linthresh=1)
-    axes.set_xlim(0, LIMITS[-1])
-    axes.set_xticks([*LIMITS], [str(limit) for limit in LIMITS])
-    axes.minorticks_off()
-    share_axis(axes)
-    axes.set_xlabel("retries (at most)")
-    axes.set_ylabel("accepted programs")
-    return figure
-
-
-def _plot_lines(
-    lines: Mapping[str, Points],
-    quality: Sequence[float],
-    height: float,
-    **style: Any,  # noqa: ANN401 - options of matplotlib
-) -> Figure:
-    """Draw a line for each model; only the best have colours if there are too many models."""
-    is_narrow = len(lines) <= MAX_COLOURED_RUNS
-    columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
-    figure = new_figure(
-        COLUMN_WIDTH if is_narrow else PAGE_WIDTH, height + 0.13 * math.ceil(len(lines) / columns)
-    )
-    axes = figure.add_subplot()
-    best = sorted(range(len(lines)), key=lambda number: -quality[number])[:MAX_COLOURED_RUNS]
-    for number, (name, points) in enumerate(lines.items()):
-        if number not in best:
-            axes.plot(*zip(*points, strict=True), color=PALE, linewidth=0.7, zorder=1, **style)
-            continue
-        at = number if is_narrow else best.index(number)
-        dashes = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
-        look = {
-            "color": COLOURS[at],
-            "label": short_name(name),
-            "markersize": 3.2,
-            "clip_on": False,
-            **dashes,
-        }
-        axes.plot(*zip(*points, strict=True), **look)
-    if not is_narrow:
-        axes.plot([], [], color=PALE, linewidth=0.7, label=f"{len(lines) - MAX_COLOURED_RUNS} others")
-    figure.legend(loc="outside lower center", ncols=columns, handlelength=3.2)
-    return figure
-
-
-def _steps(points: Points, most: int) -> Points:
-    """The part of a curve down to a threshold of 1 / `most`, the end of the axis."""
-    end = 1 / most
-    shown = [(threshold, share) for threshold, share in points if threshold >= end]
-    return [*shown, (end, shown[-1][1])]
-
-
-def _threshold_axes(axes: Axes, most: int) -> None:
-    """Set the scale and labels of shared axes; setting one of them sets all."""
-    axes.set_xscale("log")
-    axes.set_xlim(1, 1 / most)
-    shown = (*(EXTRA_LABELS if most <= MAX_SHORT_AXIS else ()), *LABELLED_POWERS)
-    marked = [mark for mark in shown if mark * most >= MIN_LABEL_RATIO]
-    axes.set_xticks([1, *marked, 1 / most], ["1", *(f"{power:g}" for power in marked), f"1/{most}"])
-    share_axis(axes)
-
-
-def _threshold_labels(axes: Axes, most: int) -> None:
-    axes.minorticks_off()  # drawing them as one line is much faster
-    marks = (digit * power for power in LABELLED_POWERS for digit in range(2, 10))
-    between = [mark for mark in marks if mark > 1 / most]
-    small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
-    axes.plot(between, [0] * len(between), color=FOREGROUND, clip_on=False, linestyle="none", **small)
-    axes.grid(visible=True, axis="y")
-    axes.set_xlabel("threshold of pass@1")
-    axes.set_ylabel("prompts at or above it")
-
-
-def limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
-    """Draw the share of prompts by threshold of pass@1, for each model and limit of retries."""
-    columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MAX_COLOURED_RUNS else 5)
-    rows = math.ceil(len(curves) / columns)
-    figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)
-    all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    _threshold_axes(all_axes[0, 0], most)
-    for axes in all_axes.flat[len(curves) :]:
-        axes.set_visible(False)
-    for axes, (name, of_limits) in zip(all_axes.flat, curves.items(), strict=False):
-        for at, (limit, points) in enumerate(of_limits.items()):
-            axes.plot(
-                *zip(*_steps(points, most), strict=True),
-                color=COLOURS[at - 1] if at else FOREGROUND,
-                linestyle=DASHES[at % len(DASHES)],
-                linewidth=1.3,
-                label=f"{limit} retries" if limit else "no retry",
-                drawstyle="steps-post",
-                clip_on=False,
-            )
-        _threshold_labels(axes, most)
-        axes.set_title(short_name(name), loc="left")
-        axes.label_outer()
-    handles, labels = all_axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5 if columns > 1 else 2, handlelength=3)
-    return figure
-
-
 # --- tables of shares
 
 
-def heat(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) -> None:
+def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) -> None:
     """Draw a table of shares as a heat map, with numbers if they fit."""
     shown = np.ma.masked_invalid(np.array(cells, dtype=float))
     axes.pcolormesh(shown, cmap=shades(), vmin=0, vmax=1, edgecolors=BACKGROUND, linewidth=0.6)
@@ -342,7 +209,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f}" if share == 0 or share >= 0.01 else "<1"  # noqa: PLR2004 - one percent
 
 
-def causes(found: Sequence[tuple[str, Causes]]) -> Figure:
+def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
     """Draw the outcomes of completions by class, and the kinds of each class."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
     shown = shown_classes(happened)
@@ -416,6 +283,6 @@ def _kinds(
     ]
     labels = [short_name(kind, 24) for kind in kinds]
     if many:
-        heat(axes, cells, names, labels)
+        draw_heat_map(axes, cells, names, labels)
     else:
-        heat(axes, [*zip(*cells, strict=True)], labels, names)
+        draw_heat_map(axes, [*zip(*cells, strict=True)], labels, names)

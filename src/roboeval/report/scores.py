@@ -18,6 +18,7 @@ from roboeval.analysis.metrics import (
 )
 from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
+from roboeval.report.curves import draw_thresholds
 from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
@@ -25,8 +26,8 @@ from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, no
 def results(runs: Sequence[JudgedRun]) -> Section:
     """pass@1 of each run and task."""
     coverage = coverage_of(runs)
-    by_run = ReportFigure("overall", lambda: figures.overall_scores(runs), coverage)
-    by_task = ReportFigure("tasks", lambda: figures.bars(runs), coverage)
+    by_run = ReportFigure("overall", lambda: figures.draw_overall(runs), coverage)
+    by_task = ReportFigure("tasks", lambda: figures.draw_task_scores(runs), coverage)
     return section("results", by_run, overall_sheet(runs), by_task, task_sheet(runs))
 
 
@@ -95,9 +96,7 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
     """The share of prompts that reach each pass@1 (paper, section V.A)."""
-    return section(
-        "thresholds", ReportFigure("thresholds", lambda: figures.thresholds(runs)), curve_sheet(runs)
-    )
+    return section("thresholds", ReportFigure("thresholds", lambda: draw_thresholds(runs)), curve_sheet(runs))
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:

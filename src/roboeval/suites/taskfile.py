@@ -129,8 +129,6 @@ def _phrases(form: SampledTaskFile, file: YamlFile, words: Sequence[str]) -> dic
             raise file.wrong(f'"{name}" is not a valid name for phrases; rename it', "phrases", name)
         if not any(f"{{{name}}}" in check.rtl for check in form.checks.values()):
             raise file.wrong(f'no check uses the phrases "{name}"; use {{{name}}} in one', "phrases", name)
-        if quoted := next((regex for regex in regexes if '"' in regex), None):
-            raise file.wrong(f"the phrase {quoted} contains a quotation mark; remove it", "phrases", name)
         phrases[name] = f"(?:{'|'.join(map(scope_flags, regexes))})"
     return phrases
 
@@ -165,8 +163,6 @@ class _Reader:
         parameters = tuple(p.strip() for p in match[2].split(",")) if match[2] else ()
         if START in parameters:
             raise wrong(f'"{START}" is reserved for the starting room of the robot; rename the parameter')
-        if again := next((p for n, p in enumerate(parameters) if p in parameters[:n]), None):
-            raise wrong(f'the check "{name}" has two parameters "{again}"; rename one')
         for used in _USED.findall(body.rtl):
             if used not in parameters and used not in self.phrases and used != START:
                 known = f"its parameters are: {', '.join(parameters)}" if parameters else "it has none"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated, TypeAlias
 
 from fastapi import APIRouter, Depends, HTTPException, Query
@@ -36,19 +35,22 @@ EvaluationQuery: TypeAlias = Annotated[
 
 def router(store: RunStore, all_runs: RunList) -> APIRouter:
     """Create the routes of the API."""
-    api = APIRouter(prefix="/api/runs", tags=["runs"], default_response_class=Response)
+    api = APIRouter(
+        prefix="/api/runs",
+        tags=["runs"],
+        default_response_class=Response,
+        dependencies=[Depends(_raise_http_errors)],
+    )
 
     @api.get("")
     def list_runs() -> Response:
         """List all runs with their models, progress and pass rates."""
-        with as_http_errors():
-            return _json(all_runs.data())
+        return _json(all_runs.data())
 
     @api.get("/{run}")
     def show_run(run: str, evaluation: EvaluationQuery = None) -> Response:
         """Show one run with every prompt and every kind of failure."""
-        with as_http_errors():
-            return _json(run_details(store.open(run, evaluation)))
+        return _json(run_details(store.open(run, evaluation)))
 
     _add_report(api, store)
 
@@ -61,8 +63,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         limit: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="Completions to return.")] = 100,
     ) -> Response:
         """List completions of a run page by page, optionally of a prompt or with a kind of failure."""
-        with as_http_errors():
-            found = store.open(run, evaluation).select(chosen)
+        found = store.open(run, evaluation).select(chosen)
         part = [entry_data(row) for row in found[offset : offset + limit].iter_rows(named=True)]
         return _json({"total": found.height, "offset": offset, "completions": part})
 
@@ -71,12 +72,11 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         run: str, task: str, prompt: int, index: int, evaluation: EvaluationQuery = None
     ) -> Response:
         """Show one completion: its program, and for each world the robot's actions and failed checks."""
-        with as_http_errors():
-            snapshot = store.open(run, evaluation)
-            row = snapshot.row(name_of((task, prompt, index)))
-            if row is None:
-                raise HTTPException(404, "this run has no such completion")
-            return _json(completion_details(snapshot, row))
+        snapshot = store.open(run, evaluation)
+        row = snapshot.row(name_of((task, prompt, index)))
+        if row is None:
+            raise HTTPException(404, "this run has no such completion")
+        return _json(completion_details(snapshot, row))
 
     return api
 
@@ -85,8 +85,7 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
     @api.get("/{run}/report")
     def show_report(run: str) -> Response:
         """Show the report in the folder of a run, from `roboeval run` or `roboeval report`."""
-        with as_http_errors():
-            text = store.report(run)
+        text = store.report(run)
         if text is None:
             raise HTTPException(404, "this run has no report")
         # The folder may contain any page instead of a report, so scripts are forbidden.
@@ -96,8 +95,7 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
     @api.get("/{run}/tables/{table}.csv")
     def show_table(run: str, table: str) -> Response:
         """Show a table of a run's report, as CSV."""
-        with as_http_errors():
-            text = store.report(run, f"tables/{table}.csv") if TABLE_NAME.fullmatch(table) else None
+        text = store.report(run, f"tables/{table}.csv") if TABLE_NAME.fullmatch(table) else None
         if text is None:
             raise HTTPException(404, "this run has no such table")
         return Response(text, media_type="text/csv")
@@ -108,8 +106,7 @@ def _json(data: object) -> Response:
     return Response(json.dumps(data), media_type="application/json", headers={"cache-control": "no-store"})
 
 
-@contextmanager
-def as_http_errors() -> Iterator[None]:
+def _raise_http_errors() -> Iterator[None]:
     """Turn errors for users into HTTP errors."""
     try:
         yield
