@@ -53,10 +53,10 @@ def compare_report_back(results: Results) -> pl.DataFrame:
     counts = scores.agg("pass@1", completions=pl.col("n").sum(), failed=(pl.col("n") - pl.col("c")).sum())
     away = [(*key, never_returned(results.failed_row(key))) for key in results.failed]
     keys = {name: table.schema[name] for name in KEY}
-    gone = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
+    returns = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
     found = (
         completions_of(table)
-        .join(gone, on=KEY, how="left")
+        .join(returns, on=KEY, how="left")
         .group_by("reports")
         .agg(
             never_returned=_count_failed(pl.col("away")),

@@ -156,6 +156,13 @@ def share_at_least(values: Sequence[float], threshold: float) -> float:
     return sum(value >= threshold - ROUNDING_ERROR for value in values) / len(values)
 
 
+def percent(share: float) -> str:
+    """Format a share in whole percent; "<1" and ">99" avoid rounding to 0 and 100."""
+    if 0 < share < 0.01:  # noqa: PLR2004 - one percent
+        return "<1"
+    return ">99" if 0.99 < share < 1 else f"{100 * share:.0f}"  # noqa: PLR2004 - 99 percent
+
+
 def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
     """The share of prompts by threshold of pass@1, where it changes, from 1 down (paper, section V.A)."""
     thresholds = sorted({1.0, *(value for value in values if value > ROUNDING_ERROR)}, reverse=True)

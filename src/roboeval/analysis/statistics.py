@@ -48,8 +48,8 @@ def by_bootstrap(
     sizes = np.array([len(values) for values in clusters])
     means = []
     for start in range(0, draws, RESAMPLES_AT_ONCE):
-        drawn = generator.integers(count, size=(min(RESAMPLES_AT_ONCE, draws - start), count))
-        means.append(sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1))
+        sample = generator.integers(count, size=(min(RESAMPLES_AT_ONCE, draws - start), count))
+        means.append(sums[sample].sum(axis=1) / sizes[sample].sum(axis=1))
     wider = math.sqrt(count / (count - 1)) * t_quantile((1 + CONFIDENCE) / 2, count - 1)
     tail = NormalDist().cdf(-wider)
     low, high = np.quantile(np.concatenate(means), [tail, 1 - tail])

@@ -196,7 +196,7 @@ def _run_data(one: VerdictChanges, all_of_them: Sequence[VerdictChanges]) -> dic
         "completions": one.completions,
         "left_out": one.left_out,
         "programs": one.programs,
-        "places": [rank(one.name, of) for of in scores],
+        "places": [rank(one.name, side) for side in scores],
         **{name: comparison[name] for name in ("first", "second", "difference", "interval", "p")},
         "tasks": [asdict(task) for task in one.tasks],
         "first_only": list(map(group_data, one.first_only)),

@@ -54,8 +54,8 @@ def survivors_view(score: MutationScore) -> RenderableType:
     """The surviving mutants of a task with their operators and diffs."""
     parts: list[RenderableType] = []
     for number, mutant in enumerate(score.survivors, 1):
-        of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
-        head = Text.assemble((f"{score.task} {number}", "bold"), of)
+        origin = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
+        head = Text.assemble((f"{score.task} {number}", "bold"), origin)
         lines = (Text(visible(line), DIFF_STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
         diff = Text("\n").join(lines)
         diff.rstrip()

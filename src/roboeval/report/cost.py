@@ -103,8 +103,6 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
             price = None
         if price is None or not model:
             raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, per million tokens')
-        if model in prices:
-            raise UserError(f'--price names "{model}" twice; give one price')
         prices[model] = price
     return prices
 

@@ -50,8 +50,8 @@ def most_frequent(run: JudgedRun) -> str:
     counts = {key: count for key, count in causes(tally_of(run.table)).counts.items() if key[1] != ALL}
     if not counts:
         return ""
-    (of, kind), count = max(counts.items(), key=lambda one: one[1])
-    return f"{kind} ({plural_of(of)}), {count / run.completions.height:.0%} of all completions"
+    (name, kind), count = max(counts.items(), key=lambda one: one[1])
+    return f"{kind} ({plural_of(name)}), {count / run.completions.height:.0%} of all completions"
 
 
 def warnings(run: JudgedRun) -> list[str]:
@@ -63,10 +63,10 @@ def warnings(run: JudgedRun) -> list[str]:
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
     """Shares and counts of all causes."""
     rows = [
-        [name, of, kind, one.counts.get((of, kind)), share]
+        [name, cause, kind, one.counts.get((cause, kind)), share]
         for name, one in found
-        for of, whole in one.classes.items()
-        for kind, share in [(ALL, whole), *one.kinds.get(of, {}).items()]
+        for cause, whole in one.classes.items()
+        for kind, share in [(ALL, whole), *one.kinds.get(cause, {}).items()]
     ]
     return sheet("causes", rows)
 

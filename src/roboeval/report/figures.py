@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from roboeval.analysis.metrics import Estimate, TaskScore, overall
+from roboeval.analysis.metrics import TaskScore, overall, percent
 from roboeval.analysis.summary import ALL, PASSED, Causes, kinds_in_order
 from roboeval.evaluation.failures import CLASSES, NO_PROGRAM, plural_of, shown_classes
 from roboeval.report.drawing import (
@@ -77,8 +77,8 @@ def _whisker(cap: float) -> dict[str, Any]:
 def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
     """Draw pass@1 by task and model, with intervals over prompts, and next to it the ablated tasks."""
     tasks = tasks_of(runs)
-    there = {score.task for run in runs for score in run.ablated_scores}
-    ablated = [task for task in runs[0].suite.tasks if task in there]
+    judged = {score.task for run in runs for score in run.ablated_scores}
+    ablated = [task for task in runs[0].suite.tasks if task in judged]
     if len(runs) > MAX_COLOURED_RUNS:
         return _heat_of_tasks(runs, tasks, ablated)
     lines = math.ceil(len(tasks) / TASKS_PER_ROW)
@@ -116,27 +116,22 @@ def _in_lines(tasks: Sequence[str], lines: int) -> list[Sequence[str]]:
 def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[str], room: int) -> None:
     width = BAR_FILL / len(scores)
     for number, those in enumerate(scores):
-        there = [(tasks.index(score.task), score) for score in those if score.task in tasks]
-        places = [at + (number + 0.5) * width - BAR_FILL / 2 for at, _ in there]
-        passed = [score.pass_at(1) for _, score in there]
-        means = [one.mean for one in passed]
-        known = [one if one.is_known else Estimate(one.mean, one.mean, one.mean) for one in passed]
-        ends = [[one.mean - one.low for one in known], [one.high - one.mean for one in known]]
-        look: dict[str, Any] = {"color": COLOURS[number], "hatch": HATCHES[number], "edgecolor": BACKGROUND}
-        axes.bar(places, means, width * 0.92, linewidth=0, **look)
-        shown = [at for at, one in enumerate(passed) if one.is_known]
-        if shown:
-            whiskers = [[of[at] for at in shown] for of in ends]
-            where = [places[at] for at in shown], [means[at] for at in shown]
-            axes.errorbar(*where, yerr=whiskers, **_whisker(min(2.5, 14 * width)))
-        several = [
-            (place, one) for place, (_, one) in zip(places, there, strict=True) if len(one.prompts) > 1
+        bars = [
+            (tasks.index(score.task) + (number + 0.5) * width - BAR_FILL / 2, score, score.pass_at(1))
+            for score in those
+            if score.task in tasks
         ]
-        marks = [(place, end) for place, one in several for end in {one.lowest(1), one.highest(1)}]
-        if marks:
+        look: dict[str, Any] = {"color": COLOURS[number], "hatch": HATCHES[number], "edgecolor": BACKGROUND}
+        axes.bar([at for at, *_ in bars], [one.mean for *_, one in bars], width * 0.92, linewidth=0, **look)
+        known = [(at, one) for at, _, one in bars if one.is_known]
+        if known:
+            ends = [[one.mean - one.low for _, one in known], [one.high - one.mean for _, one in known]]
+            places, means = [at for at, _ in known], [one.mean for _, one in known]
+            axes.errorbar(places, means, yerr=ends, **_whisker(min(2.5, 14 * width)))
+        several = [(at, score) for at, score, _ in bars if len(score.prompts) > 1]
+        if marks := [(at, end) for at, score in several for end in {score.lowest(1), score.highest(1)}]:
             axes.plot(*zip(*marks, strict=True), **_mark(min(2.6, 20 * width)))
-        zeros = [place for place, mean in zip(places, means, strict=True) if mean == 0]
-        if zeros:
+        if zeros := [at for at, _, one in bars if one.mean == 0]:
             axes.plot(zeros, [0] * len(zeros), "o", color=COLOURS[number], markersize=2.2, clip_on=False)
     margin = (room - len(tasks)) / 2 if len(tasks) < MIN_TASK_SLOTS else 0
     axes.set_xlim(-0.5 - margin, room - 0.5 - margin)
@@ -162,7 +157,7 @@ def _two_lines(task: str) -> str:
 
 
 def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
-    """Draw pass@1 by task as a heat map with a row per model, if there are more models than colours."""
+    """Draw pass@1 by task as a heat map with a row per model, if shown_runs are more models than colours."""
     figure = new_figure(PAGE_WIDTH, 1.3 + 0.16 * len(runs))
     widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -201,12 +196,8 @@ def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequen
         for x, share in zip(middles, shares, strict=False):
             if share is not None:
                 colour = MUTED if share == 0 else FOREGROUND if share < DARK_CELL_SHARE else WHITE
-                cell = axes.text(x, y, _percent(share), ha="center", va="center", color=colour, fontsize=6)
+                cell = axes.text(x, y, percent(share), ha="center", va="center", color=colour, fontsize=6)
                 cell.set_in_layout(False)  # text inside the axes only slows the layout down
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f}" if share == 0 or share >= 0.01 else "<1"  # noqa: PLR2004 - one percent
 
 
 def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
@@ -266,20 +257,20 @@ def _looks() -> dict[str, tuple[str, str]]:
 
 
 def _kinds(
-    axes: Axes, found: Sequence[tuple[str, Causes]], of: str, kinds: Sequence[str], *, many: bool
+    axes: Axes, found: Sequence[tuple[str, Causes]], cause: str, kinds: Sequence[str], *, many: bool
 ) -> None:
-    there = [(short_name(name, 18), one) for name, one in found if many or one.kinds.get(of)]
+    shown_runs = [(short_name(name, 18), one) for name, one in found if many or one.kinds.get(cause)]
     if not kinds:
         axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)
         axes.set_xticks([])
         axes.set_yticks([])
         return
-    shares = [one.kinds.get(of) for _, one in there]
+    shares = [one.kinds.get(cause) for _, one in shown_runs]
     cells = [[each.get(kind, 0.0) if each else None for kind in kinds] for each in shares]
-    counts = [one.counts.get((of, ALL)) for _, one in there]
+    counts = [one.counts.get((cause, ALL)) for _, one in shown_runs]
     names = [
         name if count is None else f"{name} (n = {count:,})"
-        for (name, _), count in zip(there, counts, strict=True)
+        for (name, _), count in zip(shown_runs, counts, strict=True)
     ]
     labels = [short_name(kind, 24) for kind in kinds]
     if many:

@@ -41,14 +41,14 @@ DrawnFigure = tuple[bytes, bytes]  # SVG for light pages, and for dark ones
 DrawnFigures = Mapping[str, DrawnFigure]
 
 
-def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: DrawnFigures) -> str:
+def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings: DrawnFigures) -> str:
     """Return the page as HTML; all text is escaped, so nothing that a model wrote has an effect."""
     script = PAGE_SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
     titles = {_text(section.name): _text(page_text("sections", section.name)) for section in sections}
     links = "".join(f'<li><a href="#{name}">{title}</a></li>' for name, title in titles.items())
-    body = "".join(_section(section, drawn) for section in sections)
+    body = "".join(_section(section, drawings) for section in sections)
     paragraphs = "".join(f"<p>{_text(words)}</p>" for words in lead)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -59,15 +59,9 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Dr
         f"<title>{_text(title)}</title>\n<style>\n{PAGE_STYLE.read_text()}</style>\n</head>\n<body>\n"
         f'<a class="skip" href="#main">To the results</a>\n'
         f"<header><h1>{_text(title)}</h1>{paragraphs}</header>\n"
-        f'<nav aria-label="Sections"><ol>{links}</ol></nav>\n{_files(sections)}'
+        f'<nav aria-label="Sections"><ol>{links}</ol></nav>\n'
         f'<main id="main">\n{body}</main>\n<script>{script}</script>\n</body>\n</html>\n'
     )
-
-
-def _files(sections: Sequence[Section]) -> str:
-    names = [part.name for section in sections for part in section.parts if isinstance(part, Sheet)]
-    links = ", ".join(f'<a href="tables/{_text(name)}.csv">{_text(name)}</a>' for name in names)
-    return f'<p class="files">Tables as CSV: {links}</p>\n' if names else ""
 
 
 def _text(words: str) -> str:
@@ -83,19 +77,19 @@ def _prose(words: str) -> str:
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", _text(words))
 
 
-def _section(section: Section, drawn: DrawnFigures) -> str:
-    parts = "".join(_part(part, drawn) for part in section.parts)
+def _section(section: Section, drawings: DrawnFigures) -> str:
+    parts = "".join(_part(part, drawings) for part in section.parts)
     name = _text(section.name)
     head = f'<h2 id="{name}-h">{_text(page_text("sections", section.name))}</h2>'
     return f'<section id="{name}" aria-labelledby="{name}-h">{head}\n{parts}</section>\n'
 
 
-def _part(part: Part, drawn: DrawnFigures) -> str:
+def _part(part: Part, drawings: DrawnFigures) -> str:
     match part:
         case Sheet():
             return _table(part)
         case ReportFigure():
-            return _figure(part, drawn)
+            return _figure(part, drawings)
         case Prose(paragraphs):
             return "".join(f"<p>{_prose(words)}</p>\n" for words in paragraphs)
         case Code(text):
@@ -126,10 +120,10 @@ def _card(card: Card) -> str:
 # --- figures
 
 
-def _figure(figure: ReportFigure, drawn: DrawnFigures) -> str:
-    if figure.name not in drawn:
+def _figure(figure: ReportFigure, drawings: DrawnFigures) -> str:
+    if figure.name not in drawings:
         return ""
-    links = (base64.b64encode(svg).decode() for svg in drawn[figure.name])
+    links = (base64.b64encode(svg).decode() for svg in drawings[figure.name])
     light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
     caption = _text(" ".join([page_text("figures", figure.name), *figure.about]))
     name = _text(figure.name)

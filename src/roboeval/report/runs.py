@@ -104,8 +104,8 @@ class JudgedRun:
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
     """The tasks with completions in any run, in the order of the suite."""
-    there = {score.task for run in runs for score in run.scores}
-    return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(there)]) if task in there]
+    judged = {score.task for run in runs for score in run.scores}
+    return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(judged)]) if task in judged]
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
@@ -131,10 +131,6 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
         if len(found) != 1:
             which = "more than one run has that name" if found else "no such run is in the report"
             raise UserError(f'--label names "{run}", but {which}; name one of {", ".join(map(str, paths))}')
-        if found[0] in labels:
-            raise UserError(f'--label names "{run}" twice; give one label')
-        if label.strip() in labels.values():
-            raise UserError(f'two runs have the label "{label.strip()}"; give each its own')
         labels[found[0]] = label.strip()
     return labels
 

@@ -83,8 +83,8 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     ]
     without = [run.name for run in runs if run.ablated is None]
     which = "any run" if len(without) == len(runs) else ", ".join(without)
-    note = f"Common-sense results are missing for {which}; judge with `roboeval evaluate --ablation`."
-    return sheet("tasks", rows, notes=[note] if without else [])
+    missing = f"Common-sense results are missing for {which}; judge with `roboeval evaluate --ablation`."
+    return sheet("tasks", rows, notes=[missing] if without else [])
 
 
 def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:

@@ -145,15 +145,15 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE_FILE).exists():
         write_whole(out / PAGE_FILE, page(title, UNFINISHED, [], {}).encode())
-    drawn: dict[str, DrawnFigure] = {}
+    drawings: dict[str, DrawnFigure] = {}
     for part in parts:
         if isinstance(part, Sheet):
             write_csv(part, out / "tables")
             yield part.name
         elif isinstance(part, ReportFigure):
-            drawn[part.name] = _draw(part, out / "figures")
+            drawings[part.name] = _draw(part, out / "figures")
             yield part.name
-    write_whole(out / PAGE_FILE, page(title, lead, sections, drawn).encode())
+    write_whole(out / PAGE_FILE, page(title, lead, sections, drawings).encode())
     _remove_others(out, {part.name for part in parts if isinstance(part, Sheet | ReportFigure)})
     yield "page"
 

@@ -127,8 +127,6 @@ def _phrases(form: SampledTaskFile, file: YamlFile, words: Sequence[str]) -> dic
     for name, regexes in form.phrases.items():
         if not name.isidentifier() or name in {PEOPLE_PLACEHOLDER, START}:
             raise file.wrong(f'"{name}" is not a valid name for phrases; rename it', "phrases", name)
-        if not any(f"{{{name}}}" in check.rtl for check in form.checks.values()):
-            raise file.wrong(f'no check uses the phrases "{name}"; use {{{name}}} in one', "phrases", name)
         phrases[name] = f"(?:{'|'.join(map(scope_flags, regexes))})"
     return phrases
 
@@ -189,20 +187,25 @@ class _Reader:
     # --- worlds
 
     def read_worlds(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
-        for number, world in enumerate(worlds):
-            at = ("worlds", number)
-            require = self._requirements(world.require, world.robot, (*at, "require"))
-            yield Scenario(world.world(self.file, at, self.skills), require)
+        for number, form in enumerate(worlds):
+            yield self._scenario(form, form.require, ("worlds", number), "require")
 
     def read_ablation(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
         if any(world.ablation is None for world in worlds):
             raise self.file.wrong("some worlds lack an ablation; add it to all or to none", "worlds")
         for number, form in enumerate(worlds):
-            at = ("worlds", number)
             people = form.people if form.ablation_people is None else form.ablation_people
-            world = form.model_copy(update={"people": people}).world(self.file, at, self.skills)
-            require = self._requirements(form.ablation or [], world.robot, (*at, "ablation"))
-            yield Scenario(world, require)
+            changed = form.model_copy(update={"people": people})
+            yield self._scenario(changed, form.ablation or [], ("worlds", number), "ablation")
+
+    def _scenario(
+        self, form: ScenarioFile, forms: Sequence[RequirementFile], at: YamlPath, key: str
+    ) -> Scenario:
+        require = tuple(
+            self._requirement(one.check, one.prompts, form.robot, (*at, key, index))
+            for index, one in enumerate(forms)
+        )
+        return Scenario(form.world(self.file, at, self.skills), require)
 
     def sample(self, sampler: WorldSampler, count: int, seed: int) -> Iterator[Scenario]:
         known: dict[tuple[str, int, str], Requirement] = {}
@@ -217,14 +220,6 @@ class _Reader:
             yield Scenario(sampler.world(setting), tuple(known[one] for one in require))
 
     # --- requirements
-
-    def _requirements(
-        self, forms: Sequence[RequirementFile], start: str, at: YamlPath
-    ) -> tuple[Requirement, ...]:
-        return tuple(
-            self._requirement(form.check, form.prompts, start, (*at, index))
-            for index, form in enumerate(forms)
-        )
 
     def _requirement(
         self, text: str, prompts: Mapping[int, str] | None, start: str, at: YamlPath

@@ -88,12 +88,14 @@ class _Comparison:
             for run in runs:
                 _draw_run(run)
         cells = [TaskCells(run, CompletionFilter()) for run in runs]
-        groups = [{**_column(run), "columns": of.columns} for run, of in zip(runs, cells, strict=True)]
-        tasks = dict.fromkeys(task for of in cells for task in of.tasks)
+        groups = [
+            {**_column(run), "columns": run_cells.columns} for run, run_cells in zip(runs, cells, strict=True)
+        ]
+        tasks = dict.fromkeys(task for run_cells in cells for task in run_cells.tasks)
         rows = [
             {
                 "name": shortened(task, MAX_NAME),
-                "cells": [cell for of in cells for cell in of.row(task)],
+                "cells": [cell for run_cells in cells for cell in run_cells.row(task)],
             }
             for task in tasks
         ]

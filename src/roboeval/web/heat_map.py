@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from codebotler.core.terminal import shortened
-from roboeval.analysis.metrics import mean_of
+from roboeval.analysis.metrics import mean_of, percent
 from roboeval.analysis.summary import Failures
 from roboeval.evaluation.failures import NO_PROGRAM, ending_of, plural_of
 from roboeval.evaluation.runs.completions import by_hand
@@ -18,13 +18,6 @@ SHADE_STEPS = 10
 MISSING = "-"
 MAX_NAME, MAX_MODELS_TEXT = 60, 200
 EMPTY_CELL = {"text": "", "shade": "none"}
-
-
-def percent(share: float) -> str:
-    """Format a share in whole percent; "<1" and ">99" avoid rounding to 0 and 100."""
-    if 0 < share < 0.01:  # noqa: PLR2004 - one percent
-        return "<1"
-    return ">99" if 0.99 < share < 1 else f"{100 * share:.0f}"  # noqa: PLR2004 - 99 percent
 
 
 def shade(share: float | None, *, bad: bool) -> str:
@@ -75,7 +68,7 @@ class TaskCells:
         self.tasks: dict[str, dict[int, dict[str, Any]]] = {}
         for prompt in run.prompts(counted):
             self.tasks.setdefault(prompt["task"], {})[prompt["prompt"]] = prompt
-        self._prompts = 1 + max((prompt for of in self.tasks.values() for prompt in of), default=-1)
+        self._prompts = 1 + max((prompt for prompts in self.tasks.values() for prompt in prompts), default=-1)
 
     @property
     def columns(self) -> list[dict[str, Any]]:
@@ -97,13 +90,13 @@ class TaskCells:
         title = "not judged yet" if mean is None else f"{text}% {self._verb}"
         return self._linked(task, None, text, f"mean {shade(mean, bad=self._bad)}", title)
 
-    def _cell(self, of: Mapping[str, Any]) -> dict[str, Any]:
-        share = of["share"]
-        text = f"({of['written']})" if share is None else percent(share)
-        title = f"{text}% {self._verb}, {of['counted']} of {of['judged']}"
+    def _cell(self, prompt: Mapping[str, Any]) -> dict[str, Any]:
+        share = prompt["share"]
+        text = f"({prompt['written']})" if share is None else percent(share)
+        title = f"{text}% {self._verb}, {prompt['counted']} of {prompt['judged']}"
         if share is None:
-            title = f"{of['written']} written, not judged yet"
-        return self._linked(of["task"], of["prompt"], text, shade(share, bad=self._bad), title)
+            title = f"{prompt['written']} written, not judged yet"
+        return self._linked(prompt["task"], prompt["prompt"], text, shade(share, bad=self._bad), title)
 
     def _linked(self, task: str, prompt: int | None, text: str, look: str, title: str) -> dict[str, Any]:
         here = (self._filter.task, self._filter.prompt) == (task, prompt)
@@ -124,8 +117,8 @@ def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
     by_run: list[dict[tuple[str, str | None], Failures]] = []
     largest: dict[tuple[str, str | None], float] = {}
     for run in runs:
-        by_run.append({(of.name, None): of for of in run.failures})
-        by_run[-1] |= {(of.name, kind.name): kind for of in run.failures for kind in of.kinds}
+        by_run.append({(cause.name, None): cause for cause in run.failures})
+        by_run[-1] |= {(cause.name, kind.name): kind for cause in run.failures for kind in cause.kinds}
         largest |= {key: max(one.share, largest.get(key, 0.0)) for key, one in by_run[-1].items()}
     order = sorted(
         largest, key=lambda key: (-largest[key[0], None], key[0], key[1] is not None, -largest[key])

@@ -11,8 +11,9 @@ from nicegui import html, ui
 
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
+from roboeval.analysis.metrics import percent
 from roboeval.evaluation.failures import plural_of
-from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, address, failure_text, models_of, percent
+from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, address, failure_text, models_of
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -119,10 +120,13 @@ class _RunPage:
             CompletionFilter(): ("all judged", run.judged),
             CompletionFilter(passed=True): ("passed", run.passed),
         }
-        for of in run.failures:
-            counts[CompletionFilter(failure_class=of.name)] = plural_of(of.name), of.count
-            for one in of.kinds:
-                counts[CompletionFilter(failure_class=of.name, failure_kind=one.name)] = one.name, one.count
+        for cause in run.failures:
+            counts[CompletionFilter(failure_class=cause.name)] = plural_of(cause.name), cause.count
+            for one in cause.kinds:
+                counts[CompletionFilter(failure_class=cause.name, failure_kind=one.name)] = (
+                    one.name,
+                    one.count,
+                )
         if list(self._kinds) != list(counts):
             self._ends.clear()
             with self._ends:
@@ -144,12 +148,12 @@ class _Kind:
             self._count = PlainText("b")
             self._share = PlainText("small", "", "quiet")
 
-    def show(self, count: int, of: int, *, is_here: bool) -> None:
+    def show(self, count: int, total: int, *, is_here: bool) -> None:
         """Show the count, its share, and whether the outcome is selected."""
         self._button.props(f"aria-pressed={'true' if is_here else 'false'}")
-        self._button.style(f"--share: {count / of if of else 0:.3f}")
+        self._button.style(f"--share: {count / total if total else 0:.3f}")
         self._count.say(f"{count:,}")
-        self._share.say(f"{percent(count / of)}%" if of else MISSING)
+        self._share.say(f"{percent(count / total)}%" if total else MISSING)
 
 
 def _draw_head(run: Snapshot, *, has_report: bool) -> None:

@@ -162,10 +162,10 @@ class _Reader:
     def _read_files(self) -> Results:
         faults: list[UserError] = []
         results = read_results(self._run, self._key, keep_failed=False, faults=faults)
-        there = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
+        existing = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
         name = results.head.get("suite") or results.about.get("suite")
         suite = self._store.suite(name if isinstance(name, str) else "paper")
-        return replace(results, suite=suite, faults=there)
+        return replace(results, suite=suite, faults=existing)
 
 
 def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:

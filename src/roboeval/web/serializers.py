@@ -155,11 +155,11 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
         tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
-    kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
+    kinds = [(cause.name, kind) for cause in run.failures for kind in cause.kinds]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
         **run_data(run),
-        "tasks": [{"task": task, "pass@1": means.get(task), "prompts": of} for task, of in tasks.items()],
+        "tasks": [{"task": task, "pass@1": means.get(task), "prompts": rows} for task, rows in tasks.items()],
         "failures": [
             {"class": name, "kind": kind.name, "count": kind.count, "share": kind.share}
             for name, kind in kinds

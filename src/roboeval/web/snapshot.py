@@ -185,11 +185,13 @@ class Snapshot:
     @cached_property
     def failures(self) -> list[Failures]:
         """The classes of failures that occur, each with its kinds, the most frequent first."""
-        classes = failures(tally_of(self.results.table)) if self.judged else ()
+        if not self.judged:
+            return []
         return [
             replace(
-                of, kinds=tuple(sorted((k for k in of.kinds if k.count), key=lambda k: (-k.count, k.name)))
+                cause,
+                kinds=tuple(sorted((k for k in cause.kinds if k.count), key=lambda k: (-k.count, k.name))),
             )
-            for of in classes
-            if of.count
+            for cause in failures(tally_of(self.results.table))
+            if cause.count
         ]

@@ -94,9 +94,9 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
     if bar is not None:
         names = ("completions", "requested") if state == RunState.GENERATING else ("judged", "to_judge")
-        done, of = (data.get(name) or 0 for name in names)
+        done, total = (data.get(name) or 0 for name in names)
         bar.set_visibility(state in {RunState.GENERATING, RunState.JUDGING})
-        bar.props(f"value={done / of if of else 0:.3f}").props["aria-label"] = f"{done:,} of {of:,}"
+        bar.props(f"value={done / total if total else 0:.3f}").props["aria-label"] = f"{done:,} of {total:,}"
 
 
 def count_text(data: Mapping[str, Any]) -> str:
@@ -121,8 +121,8 @@ def tasks_text(data: Mapping[str, Any]) -> str:
     """Format the number of tasks with completions, and of tasks in the suite."""
     if "tasks_there" not in data:
         return MISSING
-    of = data["tasks_of_suite"]
-    return f"{data['tasks_there']:,}" + ("" if of is None else f" of {of:,}")
+    total = data["tasks_of_suite"]
+    return f"{data['tasks_there']:,}" + ("" if total is None else f" of {total:,}")
 
 
 def date_text(data: Mapping[str, Any]) -> str:

@@ -128,8 +128,6 @@ def test_prices() -> None:
     for wrong in ("gpt", "gpt=1", "=1/2", "gpt=a/b", "gpt=-1/2", "gpt=nan/1", "gpt=1/2/3"):
         with pytest.raises(UserError, match="MODEL=INPUT/OUTPUT"):
             read_prices([wrong])
-    with pytest.raises(UserError, match=r'--price .*"a" twice'):
-        read_prices(["a=1/1", "a=2/2"])
     with pytest.raises(UserError, match=r'--price .*"x".*\ba$'):
         expect_known({"x": Price(1, 1)}, [made_up("a", {"Visit": (1,)})])
 
