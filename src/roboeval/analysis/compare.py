@@ -109,7 +109,7 @@ def p_text(p: float) -> str:
     return f"p = {p:.3f}" if p >= MIN_SHOWN_P else f"p < {MIN_SHOWN_P}"
 
 
-def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
+def comparison_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
     """Say which run is better, with its significance, and how many prompts were left out."""
     sentence = _better_sentence(comparison, names)
     if not comparison.left_out:

@@ -75,7 +75,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[l
     for row in failed:
         why = failure_of(row)
         causes[row["task"], why["class"], why["kind"], why["check"]].append(row)
-    shape_of = cache(shape)
+    shape_of = cache(normalised_lines)
     found = (group for rows in causes.values() for group in _group_similar(rows, programs, shape_of))
     turns: defaultdict[tuple[int, str], Iterator[int]] = defaultdict(count)
     ordered = sorted(found, key=lambda rows: key_of(rows[0]))
@@ -159,7 +159,7 @@ def group_data(group: FailureGroup) -> dict[str, Any]:
 # --- similar programs
 
 
-def shape(program: str) -> ProgramLines:
+def normalised_lines(program: str) -> ProgramLines:
     """Normalise a program to lines that do not depend on names, comments and layout."""
     tree = parsed(program) if len(program) <= MAX_COMPARED_CHARACTERS else None
     if not isinstance(tree, ast.Module):

@@ -23,7 +23,7 @@ from roboeval.linting.findings import Finding
 from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import judged_worlds
 from roboeval.suites.load import Requirement, Task
-from roboeval.suites.solutions import place_of, solutions
+from roboeval.suites.solutions import locate_solution, solutions
 from roboeval.suites.task import check_label
 
 
@@ -109,7 +109,7 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
             f'the solution "{solution.about}" should {expected}, but it '
             f"{'passes' if failed is None else 'fails'}{where}; correct the program, its `fails`, or a check"
         )
-        path, line = place_of(task, solution)
+        path, line = locate_solution(task, solution)
         yield Finding("misjudged", solution.about, message, path, line)
 
 

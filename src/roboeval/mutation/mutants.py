@@ -12,7 +12,7 @@ from itertools import chain, zip_longest
 from codebotler.core.cachedproperty import cached_property
 from roboeval.mutation.operator import Context, Operator, operators_in
 from roboeval.mutation.operators import control_flow, counting, manipulation, misuse, navigation, speech
-from roboeval.mutation.program_tree import ProgramTree, apply_edit, read
+from roboeval.mutation.program_tree import ProgramTree, apply_edit, parse_tree
 from roboeval.suites.load import Task
 from roboeval.suites.solutions import bare_diff, solutions
 
@@ -31,7 +31,7 @@ class Original:
     @cached_property
     def tree(self) -> ProgramTree | None:
         """The syntax tree; None if the program does not parse."""
-        return read(self.program)
+        return parse_tree(self.program)
 
     @property
     def text(self) -> str:

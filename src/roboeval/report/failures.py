@@ -27,7 +27,7 @@ MAX_REVERSALS_PER_RUN = 100  # groups in the table, per run
 # --- causes
 
 
-def why(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
+def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
     """Causes of failures (paper, section V.B)."""
     found = all_causes(runs, with_published=with_published)
     figure = ReportFigure("causes", lambda: figures.draw_causes(found), coverage_of(runs))
@@ -54,7 +54,7 @@ def most_frequent(run: JudgedRun) -> str:
     return f"{kind} ({plural_of(name)}), {count / run.completions.height:.0%} of all completions"
 
 
-def warnings(run: JudgedRun) -> list[str]:
+def cut_off_warnings(run: JudgedRun) -> list[str]:
     """Warn if many replies of a run were cut off."""
     warning = cut_off_replies(count_failures(tally_of(run.table)), run.results.scope).warning
     return [] if warning is None else [f"{warning}."]
@@ -85,7 +85,7 @@ def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
 # --- groups
 
 
-def similar_failures(runs: Sequence[JudgedRun]) -> Section:
+def failures_section(runs: Sequence[JudgedRun]) -> Section:
     """Groups of similar failures; the page shows the programs of the largest groups of each run."""
     most = max(MIN_GROUPS_PER_RUN, min(MAX_GROUPS_PER_RUN, MAX_GROUPS_SHOWN // len(runs)))
     every: list[tuple[str, FailureGroup]] = []

@@ -6,7 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.compare import MAX_PAIRS, compare_scores, other_differences, pairs_to_compare, verdict
+from roboeval.analysis.compare import (
+    MAX_PAIRS,
+    compare_scores,
+    comparison_sentence,
+    other_differences,
+    pairs_to_compare,
+)
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
@@ -118,7 +124,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
         except UserError:  # no prompt in common
             continue
         if len(sentences) < MAX_PAIRS:
-            sentences.append(verdict(found, (first.name, second.name)))
+            sentences.append(comparison_sentence(found, (first.name, second.name)))
             pair, over_prompts = f"{first.name} and {second.name}", found.over_prompts
             if not over_prompts.is_known:
                 notes.append(f"{pair}: the interval over prompts is {over_prompts.ends()}.")
@@ -141,7 +147,9 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
     try:
-        return [verdict(compare_scores(second.by_prompt, best.by_prompt), (second.name, best.name))]
+        return [
+            comparison_sentence(compare_scores(second.by_prompt, best.by_prompt), (second.name, best.name))
+        ]
     except UserError:  # no prompt in common
         return []
 

@@ -68,8 +68,8 @@ def sections(
         failures.other_suite(runs),
         house.house(runs),
         scores.thresholds(runs),
-        failures.why(runs, with_published=with_published),
-        failures.similar_failures(runs),
+        failures.causes_section(runs, with_published=with_published),
+        failures.failures_section(runs),
         breakdown.abilities(runs),
         breakdown.phrasings(runs),
         cost.rejection_sampling(runs),
@@ -89,7 +89,7 @@ def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
             coverage=run.coverage_sentence,
             failure=failures.most_frequent(run),
             cost=cost.cost_sentence(run, prices),
-            warnings=failures.warnings(run),
+            warnings=failures.cut_off_warnings(run),
         )
         for run in runs
     ]

@@ -46,7 +46,7 @@ def solutions(task: Task) -> tuple[Solution, ...]:
     return tuple(distinct.values())
 
 
-def place_of(task: Task, solution: Solution) -> tuple[Path, int | None]:
+def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
     """The file and line of a solution; the task file if another suite has it."""
     path = task.path.parents[1] / "solutions" / task.path.name
     programs = _read(task.path.parents[1], task).programs

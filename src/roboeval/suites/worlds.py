@@ -19,7 +19,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.regex_words import first_choice
-from roboeval.suites.expression import ExpressionError, Names, each_of, evaluate, parse_cached
+from roboeval.suites.expression import ExpressionError, Names, evaluate, iterate_loop, parse_cached
 from roboeval.suites.pairwise import Combination, sample_combinations
 from roboeval.suites.schema import IN_NO_ROOM, CornerFile, SampledTaskFile, SampledWorldsFile
 
@@ -232,7 +232,7 @@ def _expand(text: str, names: Names) -> Iterator[str]:
             if evaluate(test, names):
                 yield _format_call(body, names)
         case ast.GeneratorExp(body, [loop]):
-            for each in each_of(loop, names):
+            for each in iterate_loop(loop, names):
                 yield _format_call(body, each)
         case _:
             yield _format_call(_entry(text), names)

@@ -12,7 +12,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
 from roboeval.web.difference import RUNS_IN_PAIR, Difference, differences_of, draw_differences
-from roboeval.web.heat_map import MAX_NAME, TaskCells, address, failure_rows, models_of
+from roboeval.web.heat_map import MAX_NAME, TaskCells, failure_rows, models_of, run_address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -112,13 +112,13 @@ class _Comparison:
 
 
 def _column(run: Snapshot) -> dict[str, Any]:
-    return {"name": shortened(run.name, MAX_NAME), "title": models_of(run), "href": address(run.name)}
+    return {"name": shortened(run.name, MAX_NAME), "title": models_of(run), "href": run_address(run.name)}
 
 
 def _draw_run(run: Snapshot) -> None:
     data = run_data(run)
     with ui.element("li"):
-        html.a(shortened(run.name, MAX_NAME), href=outside(address(run.name))).props("dir=auto")
+        html.a(shortened(run.name, MAX_NAME), href=outside(run_address(run.name))).props("dir=auto")
         show_state(data, PlainText("small"))
         PlainText("b", score_text(data))
         PlainText("span", f"{completions_text(data)}, {models_of(run)}", "quiet")

@@ -29,7 +29,7 @@ from roboeval.evaluation.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import Key, by_hand, name_of
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_person, world_title
-from roboeval.web.heat_map import MAX_NAME, address
+from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -84,13 +84,13 @@ def _draw_head(
 ) -> None:
     key: Key = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
-        html.a(shortened(run.name, MAX_NAME), href=outside(f"{address(run.name)}{query}#completions")).props(
-            "dir=auto"
-        )
+        html.a(
+            shortened(run.name, MAX_NAME), href=outside(f"{run_address(run.name)}{query}#completions")
+        ).props("dir=auto")
         for text, other in zip(NEIGHBOUR_LINKS, run.neighbours(key, chosen), strict=True):
             if other is not None:
                 task, prompt, index = other
-                href = f"{address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
+                href = f"{run_address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
                 html.a(text, href=outside(href)).classes("beside")
     PlainText("h1", shortened(name_of(key), MAX_NAME))
     with ui.element("p").classes("facts"):
@@ -103,7 +103,7 @@ def _draw_head(
             PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
         if fix is not None:
             text = f"Most similar program that passes: {counted(fix.changed, 'line')} changed"
-            html.a(text, href=outside(f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
+            html.a(text, href=outside(f"{run_address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
     if data["stale"]:
         PlainText("p", PROGRAM_CHANGED, "trouble")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])

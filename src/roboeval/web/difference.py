@@ -12,10 +12,10 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.analysis.compare import compare_scores, pairs_to_compare, verdict
+from roboeval.analysis.compare import compare_scores, comparison_sentence, pairs_to_compare
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
 from roboeval.evaluation.runs.completions import KEY, Key, name_of
-from roboeval.web.heat_map import MAX_NAME, address
+from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
 from roboeval.web.widgets import interval_text
 
@@ -89,7 +89,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
         found = compare_scores(pass_at_1(first.scores), pass_at_1(second.scores))
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
-    sentence = verdict(found, names)
+    sentence = comparison_sentence(found, names)
     if not by_task:
         return Difference((first, second), sentence)
     overall = TaskRow("All tasks", (found.first, found.second), found.over_tasks, ())
@@ -150,6 +150,6 @@ def _draw_differing(row: TaskRow, runs: Sequence[Snapshot]) -> None:
                     verdicts = ("failed", "passed") if is_second else ("passed", "failed")
                     for run, text in zip(runs, verdicts, strict=True):
                         link = html.a(f"{shortened(run.name, MAX_NAME)} {text}")
-                        link.props["href"] = outside(f"{address(run.name)}/{name_of(key)}")
+                        link.props["href"] = outside(f"{run_address(run.name)}/{name_of(key)}")
             if (left := len(row.differing) - MAX_DIFFERING) > 0:
                 PlainText("li", f"and {left:,} more")

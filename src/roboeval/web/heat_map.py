@@ -34,7 +34,7 @@ def shade(share: float | None, *, bad: bool) -> str:
     return f"{'f' if bad else 's'}{step}"
 
 
-def address(run: str) -> str:
+def run_address(run: str) -> str:
     """The address of a run's page."""
     return f"/runs/{quote(run, safe='', errors='replace')}"
 
@@ -106,7 +106,7 @@ class TaskCells:
             "text": text,
             "shade": f"{look} here" if here else look,
             "title": f"{which}: {title}",
-            "href": f"{address(self._run.name)}{query}#completions",
+            "href": f"{run_address(self._run.name)}{query}#completions",
             "here": here,
             "at": [task, prompt],
         }
@@ -142,5 +142,5 @@ def _failure_cell(run: Snapshot, chosen: CompletionFilter, kind: Failures | None
         "text": text,
         "shade": shade(share, bad=True),
         "title": f"{shortened(run.name, MAX_NAME)}: {text}% ended {failure_text(chosen)}, {count:,}",
-        "href": f"{address(run.name)}{chosen.query(None)}#completions" if count else None,
+        "href": f"{run_address(run.name)}{chosen.query(None)}#completions" if count else None,
     }

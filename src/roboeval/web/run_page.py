@@ -13,7 +13,7 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import percent
 from roboeval.evaluation.failures import plural_of
-from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, address, failure_text, models_of
+from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, failure_text, models_of, run_address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -91,7 +91,7 @@ class _RunPage:
 
     def _choose(self, chosen: CompletionFilter) -> None:
         self._chosen = chosen
-        ui.navigate.history.replace(outside(address(self._run.name)) + chosen.query(self._evaluation))
+        ui.navigate.history.replace(outside(run_address(self._run.name)) + chosen.query(self._evaluation))
         self._show_chosen()
 
     def _show(self) -> None:
@@ -110,7 +110,7 @@ class _RunPage:
         self._all.set_visibility(chosen != CompletionFilter())
         source = f"/api/runs/{quote(run.name, safe='')}/completions{chosen.query(run.results.key) or '?'}"
         query = chosen.query(self._evaluation)
-        base = outside(address(run.name))
+        base = outside(run_address(run.name))
         self._list.show(source=outside(source), base=base, query=query, version=self._changes)
         self._show_kinds()
 
@@ -178,7 +178,7 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
         for other in run.evaluations if len(run.evaluations) > 1 else ():
             link = html.a(
                 shortened(other, MAX_NAME),
-                href=outside(address(run.name) + CompletionFilter().query(other)),
+                href=outside(run_address(run.name) + CompletionFilter().query(other)),
             )
             if other == key:
                 link.props('aria-current="true"')

@@ -14,7 +14,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import Estimate
-from roboeval.web.heat_map import MAX_NAME, MISSING, address
+from roboeval.web.heat_map import MAX_NAME, MISSING, run_address
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, interval_text, show_state, tasks_text
 
@@ -119,7 +119,7 @@ class _RunRow:
                 box.props["value"] = name
                 box.props["aria-label"] = f"Compare {shortened(name, MAX_NAME)} with others"
             with html.th().props("scope=row"):
-                with html.a(href=outside(address(name))):
+                with html.a(href=outside(run_address(name))):
                     PlainText("b", shortened(name, MAX_NAME))
                 self._models = PlainText("span", "", "quiet")
                 self._settings = PlainText("span", "", "quiet note")

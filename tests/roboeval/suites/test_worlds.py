@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from codebotler.core.errors import UserError
-from roboeval.suites.expression import ExpressionError, each_of, evaluate, parse_cached
+from roboeval.suites.expression import ExpressionError, evaluate, iterate_loop, parse_cached
 from roboeval.suites.load import load_suite
 from roboeval.suites.pairwise import cover_pairs, sample_combinations
 from roboeval.suites.schema import MAX_WORLDS
@@ -293,4 +293,4 @@ def test_who_calls_an_unknown_function_is_told_the_known_ones() -> None:
 def test_a_loop_binds_one_name() -> None:
     node = parse_cached("[p for p in people if p.room]")
     assert isinstance(node, ast.ListComp)
-    assert [each["p"].name for each in each_of(node.generators[0], FACTS)] == ["kim"]
+    assert [each["p"].name for each in iterate_loop(node.generators[0], FACTS)] == ["kim"]

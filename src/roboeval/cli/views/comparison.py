@@ -11,7 +11,13 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.compare import ComparedRun, Comparison, p_text, sample_size_sentences, verdict
+from roboeval.analysis.compare import (
+    ComparedRun,
+    Comparison,
+    comparison_sentence,
+    p_text,
+    sample_size_sentences,
+)
 from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.analysis.statistics import MIN_CLUSTERS
 from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences
@@ -45,7 +51,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
             f"{round(task.share, 9):+.3f}",
         )
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
-    sentence = Text(verdict(comparison, (a, b)), "bold")
+    sentence = Text(comparison_sentence(comparison, (a, b)), "bold")
     warnings = [
         Text(f"{visible(run.name)}: {warning}", "yellow")
         for run in runs

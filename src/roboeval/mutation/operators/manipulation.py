@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 
-from roboeval.mutation.operator import Context, Edits, others, where
+from roboeval.mutation.operator import Context, Edits, next_names, only_if
 from roboeval.mutation.program_tree import ProgramTree, argument, statement, text_of
 
 BRINGING_HERE = re.compile(
@@ -21,7 +21,7 @@ def _is_put_down(context: Context) -> bool:
     return not any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in context.prompts)
 
 
-@where(_is_put_down)
+@only_if(_is_put_down)
 def forget_to_place(program: ProgramTree, _: Context) -> Edits:
     """Does not put down the thing that it brings."""
     return ({step: []} for step, _call in program.steps("place"))
@@ -39,7 +39,7 @@ def bring_nothing(program: ProgramTree, _: Context) -> Edits:
         yield {step: [] for step in steps}
 
 
-@where(_is_put_down)
+@only_if(_is_put_down)
 def place_by_words(program: ProgramTree, _: Context) -> Edits:
     """Says that it brings a thing, but does not put it down."""
     return ({step: statement('say("Here it is.")')} for step, _call in program.steps("place"))
@@ -50,7 +50,7 @@ def wrong_thing(program: ProgramTree, context: Context) -> Edits:
     things = [argument(call, 0) for _, call in program.steps("pick", "place")]
     named = next((name for thing in things if (name := text_of(thing))), "")
     if len(context.things) > 1 and things:
-        for other in others(context.things, named):
+        for other in next_names(context.things, named):
             if other.lower() not in named.lower():
                 yield {thing: ast.Constant(other) for thing in things if thing is not None}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from roboeval.mutation.operator import Context, Edits, asks, others, where
+from roboeval.mutation.operator import Context, Edits, next_names, only_if, prompt_matches
 from roboeval.mutation.program_tree import (
     ProgramTree,
     argument,
@@ -16,10 +16,10 @@ from roboeval.mutation.program_tree import (
     text_of,
 )
 
-COMING_BACK = asks(
+COMING_BACK = prompt_matches(
     r"\b(come|came|coming|are) back\b|\bback (here|with me|to me)\b|\breturn (here|to me|to where)\b"
 )
-STAYING_OUT = asks(
+STAYING_OUT = prompt_matches(
     r"\b(no other room|nowhere else|no place besides|(other|remaining) rooms|just the labs|straight|directly)"
 )
 
@@ -55,7 +55,7 @@ def _return_places(program: ProgramTree) -> dict[ast.Call, ast.expr]:
     return {call: place for call, place in places if isinstance(place, ast.Name) and place.id in kept}
 
 
-@where(COMING_BACK)
+@only_if(COMING_BACK)
 def drop_the_return(program: ProgramTree, _: Context) -> Edits:
     """Does not come back."""
     returns = _return_places(program)
@@ -73,17 +73,17 @@ def wrong_room(program: ProgramTree, context: Context) -> Edits:
     for node in program.nodes:
         room = (text_of(node) or "").lower().removeprefix("the ")
         if room in {one.lower() for one in context.rooms}:
-            yield from ({node: ast.Constant(other)} for other in others(context.rooms, room))
+            yield from ({node: ast.Constant(other)} for other in next_names(context.rooms, room))
 
 
-@where(COMING_BACK)
+@only_if(COMING_BACK)
 def return_elsewhere(program: ProgramTree, context: Context) -> Edits:
     """Returns to a place other than its start."""
     rooms = dict.fromkeys((*context.rooms[:1], *context.idle_rooms(program)[-1:]))
     return ({place: ast.Constant(room)} for place in _return_places(program).values() for room in rooms)
 
 
-@where(COMING_BACK)
+@only_if(COMING_BACK)
 def return_to_here(program: ProgramTree, _: Context) -> Edits:
     """Returns to where it already is."""
     return ({place: expression("get_current_location()")} for place in _return_places(program).values())
@@ -108,7 +108,7 @@ def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
                     yield {loop: [together, rewrite(loop, {step: []})]}
 
 
-@where(STAYING_OUT)
+@only_if(STAYING_OUT)
 def detour(program: ProgramTree, context: Context) -> Edits:
     """Drives through a room that the instruction does not mention."""
     last = [step for step, _ in program.steps("go_to")][-1:]
@@ -191,7 +191,7 @@ def look_for_another(program: ProgramTree, context: Context) -> Edits:
             continue
         for known in (context.things, context.people):
             if name.lower() in {one.lower() for one in known}:
-                yield from ({wanted: ast.Constant(other)} for other in others(known, name, most=1))
+                yield from ({wanted: ast.Constant(other)} for other in next_names(known, name, most=1))
         yield {wanted: ast.Constant("unicorn")}
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from itertools import pairwise
 
-from roboeval.mutation.operator import Context, Edits, asks, others, where
+from roboeval.mutation.operator import Context, Edits, next_names, only_if, prompt_matches
 from roboeval.mutation.program_tree import (
     ProgramTree,
     argument,
@@ -19,7 +19,7 @@ from roboeval.mutation.program_tree import (
     text_of,
 )
 
-TELLING = asks(r"\b(tell|say|speak|report|inform|hear|know|announce|suggest)\b")
+TELLING = prompt_matches(r"\b(tell|say|speak|report|inform|hear|know|announce|suggest)\b")
 OPPOSITES = {
     "yes": "no",
     "no one": "everyone",
@@ -121,7 +121,7 @@ def wrong_person(program: ProgramTree, context: Context) -> Edits:
             found = re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)
             if found is None:
                 continue
-            for other in others(context.people, name, most=1):
+            for other in next_names(context.people, name, most=1):
                 put = other.capitalize() if found[0][:1].isupper() else other
                 yield {node: ast.Constant(text[: found.start()] + put + text[found.end() :])}
 
@@ -169,31 +169,31 @@ def _in_place_of(reported: ast.AST, value: str | float) -> ast.expr:
     return ast.Constant(str(value))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def forget_to_say(program: ProgramTree, _: Context) -> Edits:
     """Omits a message."""
     return ({step: []} for step, _call in program.steps("say"))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def say_nothing_of_it(program: ProgramTree, _: Context) -> Edits:
     """Replaces a message by one without information."""
     return ({step: statement('say("Done.")')} for step, _call in program.steps("say"))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def constant_for_a_value(program: ProgramTree, _: Context) -> Edits:
     """Reports a constant instead of a counted or received value."""
     return ({node: _in_place_of(node, value)} for node in _reported(program) for value in (1, 2, 12))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def hedge(program: ProgramTree, _: Context) -> Edits:
     """Reports several numbers, one of them right."""
     return ({node: _in_place_of(node, "0, 1, 2, 3 or 4")} for node in _reported(program))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
     """Omits a clause of a message."""
     asked = {inner for call in program.calls("ask") for inner in ast.walk(call)}
@@ -204,7 +204,7 @@ def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
                 yield {node: ast.Constant("".join(one for one in clauses if one is not left).strip(" ,;"))}
 
 
-@where(TELLING)
+@only_if(TELLING)
 def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
     """Omits a value of a message."""
     for node in _messages(program):
@@ -219,7 +219,7 @@ def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
                         yield {node: rest}
 
 
-@where(TELLING)
+@only_if(TELLING)
 def swap_values(program: ProgramTree, _: Context) -> Edits:
     """Swaps two values in a message."""
     targets = (node.target for node in program.nodes if isinstance(node, ast.For | ast.comprehension))
