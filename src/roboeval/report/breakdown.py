@@ -18,7 +18,6 @@ NO_INSTRUCTION = "instruction not recorded"
 REPORTING_TASKS = "come back and report"
 UNKNOWN_COUNT = "an unknown number (judged by an earlier version)"
 MAX_DISTINCT_WORDS = 12
-MAX_REPORT_SENTENCES = 20
 
 
 def abilities(runs: Sequence[JudgedRun]) -> Section:
@@ -55,7 +54,7 @@ def report_back_sentences(table: Sheet) -> list[str]:
         f"{name}: of {failed:,} failures in tasks that end with a report, "
         f"{UNKNOWN_COUNT if away is None else format(away, ',')} never returned and {lost:,} went to a room "
         "that does not exist."
-        for name, tasks, _, _, failed, away, _, lost, _ in table.rows[:MAX_REPORT_SENTENCES]
+        for name, tasks, _, _, failed, away, _, lost, _ in table.rows
         if tasks == REPORTING_TASKS and failed
     ]
 

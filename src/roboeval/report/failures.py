@@ -21,7 +21,6 @@ MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN, MAX_GROUPS_SHOWN = (
     4,
     200,
 )  # groups on the page: at most and at least per run, and in all
-MAX_REVERSALS_PER_RUN = 100  # groups in the table, per run
 
 
 # --- causes
@@ -154,14 +153,9 @@ def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
 def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
     """Groups of completions that pass under one suite only."""
     rows: list[list[Cell]] = []
-    notes: list[str] = []
     for one in found:
         sides = zip(one.suites, (one.first_only, one.second_only), strict=True)
         those = [(suite, group) for suite, groups in sides for group in groups]
-        those.sort(key=lambda pair: -len(pair[1].members))
-        for suite, group in those[:MAX_REVERSALS_PER_RUN]:
+        for suite, group in sorted(those, key=lambda pair: -len(pair[1].members)):
             rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
-        if (left := len(those) - MAX_REVERSALS_PER_RUN) > 0:
-            more = f"{left:,} more groups are not shown; list them with `roboeval compare --suites`."
-            notes.append(f"{one.name}: {more}")
-    return sheet("reversals", rows, notes=notes)
+    return sheet("reversals", rows)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from codebotler.core.terminal import shortened
 from codebotler.core.words import counted
 from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.evaluation.failures import label_of
@@ -192,10 +193,10 @@ def _failure_group(model: str, group: FailureGroup) -> str:
     data = {"model": model, "task": group.task, "kind": kind, "size": str(size)}
     attributes = "".join(f' data-{name}="{_text(value)}"' for name, value in data.items())
     check = group.failure["check"]
-    why = f"{check_label(check)}: {group.why}" if check else group.why
+    why = shortened(f"{check_label(check)}: {group.why}" if check else group.why, MAX_TEXT, str)
     return (
         f'<details class="group"{attributes}><summary><b>{size:,}</b><span>{_text(model)}, '
-        f'{_text(group.task)}, {_text(kind)}<br><span class="why">{_text(_cut(why, MAX_TEXT))}</span></span>'
+        f'{_text(group.task)}, {_text(kind)}<br><span class="why">{_text(why)}</span></span>'
         f'</summary><div class="inside">{_inside(group)}</div></details>\n'
     )
 
@@ -208,7 +209,7 @@ def _inside(group: FailureGroup) -> str:
     head = f"<p>{prompts}. Example: {name}{where}.</p>"
     if group.program is None:
         return f"{head}<p>The judged program was changed or removed.</p>"
-    program = f"<pre>{_text(_cut(group.program, MAX_PROGRAM_CHARACTERS))}</pre>"
+    program = f"<pre>{_text(shortened(group.program, MAX_PROGRAM_CHARACTERS, str))}</pre>"
     fix = group.fix
     if fix is None:
         nothing = "" if group.has_no_program else "<p>No program passes this task.</p>"
@@ -221,10 +222,5 @@ def _inside(group: FailureGroup) -> str:
 
 def _changed(sign: str, line: str) -> str:
     tag = {"-": "del", "+": "ins"}.get(sign, "span")
-    words = f"{sign} {_text(_cut(line, MAX_TEXT))}"
+    words = f"{sign} {_text(shortened(line, MAX_TEXT, str))}"
     return f"<{tag}>{words}</{tag}>" if tag != "span" else f"{words}\n"
-
-
-def _cut(text: str, most: int) -> str:
-    left = len(text) - most
-    return text if left <= 0 else f"{text[:most]}... {left:,} more characters"

@@ -35,7 +35,7 @@ from roboeval.report.sheets import (
 FIGURE_FORMATS = ("png", "pdf")
 PAGE_FILE = "index.html"
 UNFINISHED = ("This report is not finished. Run its command again.",)
-GENERATOR_WITHIN = 4_000  # characters; the start of a page contains its generator
+GENERATOR_WITHIN = 4_000  # bytes; the start of a page contains its generator
 
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
@@ -163,17 +163,12 @@ def expect_no_others(out: Path) -> None:
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
-    if others and not _is_report(out / PAGE_FILE):
+    page_file = out / PAGE_FILE
+    start = page_file.read_bytes()[:GENERATOR_WITHIN] if page_file.is_file() else b""
+    if others and GENERATOR.encode() not in start:
         raise UserError(
             f'is not a report but contains other files such as "{others[0]}"; name a new folder', file=out
         )
-
-
-def _is_report(page_file: Path) -> bool:
-    if not page_file.is_file():
-        return False
-    with page_file.open(errors="replace") as file:
-        return GENERATOR in file.read(GENERATOR_WITHIN)
 
 
 def _remove_others(out: Path, names: AbstractSet[str]) -> None:
