@@ -85,14 +85,8 @@ def _plot_lines(
             axes.plot(*zip(*points, strict=True), color=PALE, linewidth=0.7, zorder=1, **style)
             continue
         at = number if is_narrow else best.index(number)
-        dashes = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
-        look = {
-            "color": COLOURS[at],
-            "label": short_name(name),
-            "markersize": 3.2,
-            "clip_on": False,
-            **dashes,
-        }
+        look = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
+        look |= {"color": COLOURS[at], "label": short_name(name), "markersize": 3.2, "clip_on": False}
         axes.plot(*zip(*points, strict=True), **look)
     if not is_narrow:
         axes.plot([], [], color=PALE, linewidth=0.7, label=f"{len(lines) - MAX_COLOURED_RUNS} others")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
-from typing import TypeAlias
 
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Outcome
@@ -78,7 +77,11 @@ def judge(
     for one, name in names.items():
         if name not in known:
             groups.setdefault((one.family, one.seed, one.prompt_index), []).append(one)
-    batches = [*_batches(groups.values())]
+    batches = [
+        group[start : start + ROLLOUTS_PER_BATCH]
+        for group in groups.values()
+        for start in range(0, len(group), ROLLOUTS_PER_BATCH)
+    ]
     judged = shared_pool().map_distinct(
         lambda some: [_judge_batch(worlds, house, batch) for batch in some],
         batches,
@@ -100,16 +103,7 @@ def _key(one: Rollout, worlds: int, house: HouseRules | None) -> bytes:
     return digest(one.family, f"{one.seed} {one.prompt_index} {worlds}", rules, one.program)
 
 
-Batch: TypeAlias = Sequence[Rollout]
-
-
-def _batches(groups: Iterable[Batch]) -> Iterator[Batch]:
-    for group in groups:
-        for start in range(0, len(group), ROLLOUTS_PER_BATCH):
-            yield group[start : start + ROLLOUTS_PER_BATCH]
-
-
-def _judge_batch(worlds: int, house: HouseRules | None, batch: Batch) -> list[Components]:
+def _judge_batch(worlds: int, house: HouseRules | None, batch: Sequence[Rollout]) -> list[Components]:
     """Judge programs for the same prompt; runs in a thread with a worker."""
     first = batch[0]
     task = trained_task(first.family, first.seed, worlds=worlds)
@@ -119,14 +113,12 @@ def _judge_batch(worlds: int, house: HouseRules | None, batch: Batch) -> list[Co
     robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     worker = shared_pool().here()
     ran = worker.run_all([(one.program, robots) for one in batch])
-    return [
-        _components(outcomes, asked, parses=_has_run(outcomes) or worker.compiles(one.program, robots[0]()))
-        for one, outcomes in zip(batch, ran, strict=True)
-    ]
-
-
-def _has_run(outcomes: Sequence[Outcome]) -> bool:
-    return any(outcome.trace or outcome.error is None for outcome in outcomes)
+    components = []
+    for one, outcomes in zip(batch, ran, strict=True):
+        has_run = any(outcome.trace or outcome.error is None for outcome in outcomes)
+        parses = has_run or worker.compiles(one.program, robots[0]())
+        components.append(_components(outcomes, asked, parses=parses))
+    return components
 
 
 def _components(
