@@ -112,7 +112,7 @@ def nearest_fix(results: Results, key: Key) -> Fix | None:
 
 def _passing_of_task(results: Results, task: str) -> list[PassingProgram]:
     programs = results.programs
-    right = (key for key in sorted(results.passed) if key[0] == task and key in programs)
+    right = sorted(key for key in results.passed if key[0] == task and key in programs)
     return passing_programs((name_of(key), programs[key]) for key in right)
 
 
