@@ -156,9 +156,9 @@ def _table(sheet: Sheet) -> str:
         f'<div class="wide" tabindex="0" role="region" aria-label="{title}"><table>'
         f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
-    files = f'<p class="files">tables/{_text(sheet.name)}.csv</p>'
-    inside = f"{about}{table}{notes}{files}"
     name = _text(sheet.name)
+    link = f'<p class="files"><a href="tables/{name}.csv">tables/{name}.csv</a></p>'
+    inside = f"{about}{table}{notes}{link}"
     if len(sheet.rows) > MAX_UNFOLDED_ROWS:
         summary = f"<summary>{title} <span>{len(sheet.rows):,} rows</span></summary>"
         return f'<details class="sheet" id="table-{name}">{summary}{inside}</details>\n'
