@@ -15,8 +15,8 @@ from roboeval.evaluation.runs.rows import Row, failure_of
 from roboeval.evaluation.runs.traces import has_circumstances, trace_of
 from roboeval.suites.load import Suite
 
-REPORTS = "report-back"
-LOST = "GoToInvalidLocation"
+REPORT_ABILITY = "report-back"
+NO_SUCH_ROOM_ERROR = "GoToInvalidLocation"
 
 
 def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Estimate, Mapping[str, float]]]:
@@ -45,18 +45,23 @@ def compare_report_back(results: Results) -> pl.DataFrame:
     went to a room that does not exist (`lost`).
     """
     suite = results.known_suite
-    reports = pl.col("task").is_in([name for name, task in suite.tasks.items() if REPORTS in task.abilities])
+    reports = pl.col("task").is_in(
+        [name for name, task in suite.tasks.items() if REPORT_ABILITY in task.abilities]
+    )
     table = results.table.with_columns(reports=reports)
     scores = prompt_scores(table).group_by(reports=reports)
     counts = scores.agg("pass@1", completions=pl.col("n").sum(), failed=(pl.col("n") - pl.col("c")).sum())
     away = [(*key, never_returned(results.failed_row(key))) for key in results.failed]
     keys = {name: table.schema[name] for name in KEY}
-    gone = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
+    returns = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
     found = (
         completions_of(table)
-        .join(gone, on=KEY, how="left")
+        .join(returns, on=KEY, how="left")
         .group_by("reports")
-        .agg(never_returned=_count_failed(pl.col("away")), lost=(pl.col("failure_kind") == LOST).sum())
+        .agg(
+            never_returned=_count_failed(pl.col("away")),
+            lost=(pl.col("failure_kind") == NO_SUCH_ROOM_ERROR).sum(),
+        )
         .join(counts.with_columns(_mean("pass@1")), on="reports")
         .select("reports", "completions", "failed", "never_returned", "lost", "pass@1")
         .sort("reports", descending=True)

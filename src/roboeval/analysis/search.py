@@ -91,7 +91,6 @@ def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None
 
 
 def _verdicts_in_scope(row: Mapping[str, Any], query: TraceQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    """The verdicts in the worlds of a query, numbered from 1."""
     if query.task not in {None, row["task"]}:
         return
     for number, verdict in enumerate(row["verdicts"], 1):

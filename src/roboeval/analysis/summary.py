@@ -149,9 +149,9 @@ def causes(tally: Tally) -> Causes:
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
     """The kinds of a class that occur, known kinds first."""
-    there = {kind for one in found for kind in one.kinds.get(name, {})}
-    known = [kind for kind in CLASSES[name].kinds if kind in there]
-    return [*known, *sorted(there - {*known})]
+    occurring = {kind for one in found for kind in one.kinds.get(name, {})}
+    known = [kind for kind in CLASSES[name].kinds if kind in occurring]
+    return [*known, *sorted(occurring - {*known})]
 
 
 def summary_data(summary: EvaluationSummary) -> dict[str, Any]:

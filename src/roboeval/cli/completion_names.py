@@ -34,9 +34,9 @@ def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
 
 def split_names(incomplete: str) -> list[str]:
     """The splits of families."""
-    from roboeval.suites.families.suite import SPLITS
+    from roboeval.suites.families.suite import FIRST_SEEDS
 
-    return [name for name in SPLITS if name.startswith(incomplete)]
+    return [name for name in FIRST_SEEDS if name.startswith(incomplete)]
 
 
 def engine_names(incomplete: str) -> list[str]:

@@ -48,7 +48,7 @@ def find(
     that failed by reason.
     """
     from codebotler.simulator.pool import cores
-    from roboeval.analysis.cluster import cluster_data, describe_groups, group_failures
+    from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
     from roboeval.analysis.search import TraceQuery, count_searched, matches_by_task, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
@@ -67,7 +67,7 @@ def find(
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = group_failures(failed, results.programs)
     shown = together if json else together[:most]
-    clusters = list(watched(describe_groups(shown, results), "comparing", len(shown)))
+    described = list(watched(describe_groups(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if cut := sum(bool(one.cut) for one in every):
         note(f"undecided, since their traces were too long to keep: {how_many(cut)}")
@@ -80,11 +80,11 @@ def find(
             "found": [found_data(one, one.worlds, passed) for one in found],
             "undecided": [found_data(one, one.undecided, passed) for one in undecided],
         }
-        print_json({**data, "groups": list(map(cluster_data, clusters))})
+        print_json({**data, "groups": list(map(group_data, described))})
     else:
         counts = matches_by_task(found, results.table)
         is_search = formula is not None
-        print_rich(found_view(found, counts, total, clusters, groups=len(together), is_search=is_search))
+        print_rich(found_view(found, counts, total, described, groups=len(together), is_search=is_search))
 
 
 def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:

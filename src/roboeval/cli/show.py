@@ -160,7 +160,7 @@ def show_completion(
 ) -> None:
     """Print a completion, and the command that shows the program nearest to one that fails."""
     from codebotler.core.words import counted
-    from roboeval.analysis.cluster import nearest_fix
+    from roboeval.analysis.failure_groups import nearest_fix
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.explanation import completion_data
     from roboeval.evaluation.failures import NO_PROGRAM

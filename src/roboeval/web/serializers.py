@@ -22,7 +22,7 @@ from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
-MOST_FAULTS, MOST_NAME, MOST_REASON = 5, 120, 300
+MAX_FAULTS_SHOWN, MAX_SUITE_NAME, MAX_FAILURE_REASON = 5, 120, 300
 
 
 class RunState(StrEnum):
@@ -87,12 +87,10 @@ def settings_text(about: Mapping[str, Any]) -> str:
     settings = about.get("settings")
     named = settings.items() if isinstance(settings, dict) else ()
     return ", ".join(
-        f"{name.replace('_', '-')} {_format(value)}" for name, value in named if value is not None
+        f"{name.replace('_', '-')} {value if isinstance(value, str) else json.dumps(value)}"
+        for name, value in named
+        if value is not None
     )
-
-
-def _format(value: object) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def date_of(about: Mapping[str, Any]) -> str | None:
@@ -105,9 +103,9 @@ def notes(run: Snapshot) -> list[str]:
     """Describe problems of a run in sentences."""
     results, stale = run.results, len(run.results.stale)
     faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
-    found = [str(fault) for fault in faults[:MOST_FAULTS]]
-    if len(faults) > MOST_FAULTS:
-        found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
+    found = [str(fault) for fault in faults[:MAX_FAULTS_SHOWN]]
+    if len(faults) > MAX_FAULTS_SHOWN:
+        found.append(f"{len(faults) - MAX_FAULTS_SHOWN:,} more lines are damaged.")
     if faults:
         found.append("All other rows are shown.")
     if (warning := run.cut_off.warning) is not None:
@@ -115,7 +113,7 @@ def notes(run: Snapshot) -> list[str]:
     if stale:
         found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
-        name = shortened(str(results.head.get("suite")), MOST_NAME)
+        name = shortened(str(results.head.get("suite")), MAX_SUITE_NAME)
         found.append(
             f'The suite "{name}" was not found, so failed checks are not explained; '
             "use `roboeval serve --suite FOLDER`."
@@ -157,11 +155,11 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
         tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
-    kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
+    kinds = [(cause.name, kind) for cause in run.failures for kind in cause.kinds]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
         **run_data(run),
-        "tasks": [{"task": task, "pass@1": means.get(task), "prompts": of} for task, of in tasks.items()],
+        "tasks": [{"task": task, "pass@1": means.get(task), "prompts": rows} for task, rows in tasks.items()],
         "failures": [
             {"class": name, "kind": kind.name, "count": kind.count, "share": kind.share}
             for name, kind in kinds
@@ -188,7 +186,7 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         **{name: row[name] for name in (*KEY, "passed")},
         "failure": None if row["failure_class"] is None else failure,
-        "why": shortened(row["why"], MOST_REASON),
+        "why": shortened(row["why"], MAX_FAILURE_REASON),
         "worlds": row["worlds"],
         "stale": row["stale"],
     }
@@ -211,7 +209,7 @@ def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     try:
         data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
-        what = f"the row of {shortened(name_of(key), MOST_NAME)} is damaged; --redo judges it again"
+        what = f"the row of {shortened(name_of(key), MAX_SUITE_NAME)} is damaged; --redo judges it again"
         raise UserError(what, file=results.run.rows(results.key or "").name) from None
     if run.suite is None:
         for world in data["worlds"]:

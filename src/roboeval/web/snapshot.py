@@ -26,7 +26,7 @@ from roboeval.suites.task import check_label
 
 HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM)
 # The result of a program in a world: + satisfied, - not satisfied, ! error.
-SIGN = (
+WORLD_SIGN = (
     pl.when("satisfied")
     .then(pl.lit("+"))
     .when((pl.col("status") == "finished") | pl.col("error_kind").is_null())
@@ -34,17 +34,17 @@ SIGN = (
     .otherwise(pl.lit("!"))
 )
 # The cause of a failure: the failed check, the limit that stopped the program, or its error.
-ERROR = pl.col("error_message")
-WHY = (
+ERROR_MESSAGE = pl.col("error_message")
+FAILURE_CAUSE = (
     pl.when(HAS_NO_PROGRAM)
     .then(pl.col("failure_kind").replace(dict(NO_PROGRAM_SENTENCES)))
     .when(pl.col("failure_check").is_not_null())
     .then(pl.col("failure_check").map_elements(check_label, return_dtype=pl.String))
-    .when((pl.col("status") == "timeout") & ERROR.str.contains(r"^\d"))
-    .then(pl.format("stopped after {} (limit)", ERROR))
-    .otherwise(ERROR)
+    .when((pl.col("status") == "timeout") & ERROR_MESSAGE.str.contains(r"^\d"))
+    .then(pl.format("stopped after {} (limit)", ERROR_MESSAGE))
+    .otherwise(ERROR_MESSAGE)
 )
-MOST = 2**63
+INT64_LIMIT = 2**63
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class CompletionFilter:
     """Selects completions by the values of columns; also the query of pages and of the API."""
 
     task: Annotated[str | None, Query(description="Only this task.")] = None
-    prompt: Annotated[int | None, Query(ge=0, lt=MOST, description="Only this prompt, counted from 0.")] = (
-        None
-    )
+    prompt: Annotated[
+        int | None, Query(ge=0, lt=INT64_LIMIT, description="Only this prompt, counted from 0.")
+    ] = None
     passed: Annotated[bool | None, Query(description="Only those that passed, or that failed.")] = None
     failure_class: Annotated[str | None, Query(description="Only this class of failure.")] = None
     failure_kind: Annotated[str | None, Query(description="Only this kind of failure.")] = None
@@ -112,8 +112,11 @@ class Snapshot:
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
-            pl.when(HAS_NO_PROGRAM.first()).then(pl.lit("")).otherwise(SIGN.str.join("")).alias("worlds"),
-            WHY.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
+            pl.when(HAS_NO_PROGRAM.first())
+            .then(pl.lit(""))
+            .otherwise(WORLD_SIGN.str.join(""))
+            .alias("worlds"),
+            FAILURE_CAUSE.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
         )
         keys = [(storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
         schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64, "written": pl.Boolean}
@@ -182,11 +185,13 @@ class Snapshot:
     @cached_property
     def failures(self) -> list[Failures]:
         """The classes of failures that occur, each with its kinds, the most frequent first."""
-        classes = failures(tally_of(self.results.table)) if self.judged else ()
+        if not self.judged:
+            return []
         return [
             replace(
-                of, kinds=tuple(sorted((k for k in of.kinds if k.count), key=lambda k: (-k.count, k.name)))
+                cause,
+                kinds=tuple(sorted((k for k in cause.kinds if k.count), key=lambda k: (-k.count, k.name))),
             )
-            for of in classes
-            if of.count
+            for cause in failures(tally_of(self.results.table))
+            if cause.count
         ]

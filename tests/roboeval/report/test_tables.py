@@ -233,8 +233,6 @@ def test_labels_name_runs() -> None:
         (["a="], "RUN=TEXT"),
         (["=x"], "RUN=TEXT"),
         (["c=x"], "no such run"),
-        (["a=x", "runs/a=y"], "twice"),
-        (["a=x", "b=x"], "each its own"),
         (["d=x"], "more than one"),
     ],
 )

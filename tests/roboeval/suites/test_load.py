@@ -66,7 +66,6 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("category: Location", "category: Place", 5, '"Place"'),
         ("goes:", "2 goes:", 5, '"2 goes"'),
         ("says(what)", '"says(what, )"', 6, '"says(what, )"'),
-        ("says(what)", '"says(what, what)"', 6, 'two parameters "what"'),
         ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is not valid'),
         ("goto(", "gote(", 5, 'the check "goes" is not valid'),
         ("goto(", "inside(", 5, "only house rules have it"),

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from roboeval.analysis.metrics import percent
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.folder import Run
-from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, percent, shade
+from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, shade
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import CompletionFilter
 

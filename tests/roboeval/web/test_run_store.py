@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import load_suite
 from roboeval.web import run_store
-from roboeval.web.run_store import MOST_HELD, MissingError, RunStore
+from roboeval.web.run_store import MAX_SNAPSHOTS, MissingError, RunStore
 from seals import unseal
 
 
@@ -105,7 +105,7 @@ def test_evaluations_are_found_by_name(runs: Path) -> None:
 
 
 def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_store, "REST", 0)
+    monkeypatch.setattr(run_store, "REST_FACTOR", 0)
     store, run = RunStore(runs), Run(runs / "hasty")
     first = store.open("hasty")
     assert store.open("hasty") is first
@@ -124,7 +124,7 @@ def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: p
 
 
 def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_store, "REST", 1e9)
+    monkeypatch.setattr(run_store, "REST_FACTOR", 1e9)
     store, run = RunStore(runs), Run(runs / "hasty")
     first = store.open("hasty")
     completions = run.completions.read_bytes().splitlines(keepends=True)
@@ -163,12 +163,12 @@ def test_a_writer_is_seen_and_not_disturbed(runs: Path) -> None:
 
 
 def test_the_oldest_are_forgotten(runs: Path) -> None:
-    for number in range(MOST_HELD):
+    for number in range(MAX_SNAPSHOTS):
         (runs / f"run-{number}").mkdir()
         (runs / f"run-{number}" / "run.json").write_text("{}")
     store = RunStore(runs)
     first = store.open("hasty")
-    for number in range(MOST_HELD):
+    for number in range(MAX_SNAPSHOTS):
         store.open(f"run-{number}")
     assert store.open("hasty") is not first
 

@@ -12,7 +12,7 @@ import pytest
 from codebotler.core.files import to_line
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
-from roboeval.web.run_store import MOST_HELD, RunStore
+from roboeval.web.run_store import MAX_SNAPSHOTS, RunStore
 from roboeval.web.serializers import RunList, RunState, date_of, notes, run_data, settings_text
 
 
@@ -60,7 +60,7 @@ def test_many_damaged_lines_are_counted(runs: Path) -> None:
 def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
     runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for number in range(MOST_HELD + 2):
+    for number in range(MAX_SNAPSHOTS + 2):
         shutil.copytree(runs / "hasty", runs / f"run-{number}")
     (runs / "run-0" / "run.json").write_text("[]")
     reads: list[Path] = []
@@ -74,7 +74,7 @@ def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
     assert {run["state"] for run in all_runs.data(0)} == {RunState.READING}
     assert reads == []
     first = all_runs.data()
-    assert len(reads) == len(first) == MOST_HELD + 3
+    assert len(reads) == len(first) == MAX_SNAPSHOTS + 3
     assert {run["judged"] for run in first} == {45}
     assert [run["run"] for run in first if run["state"] == RunState.DAMAGED] == ["run-0"]
     assert all_runs.data(0) == all_runs.data() == first

@@ -11,11 +11,17 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.compare import ComparedRun, Comparison, p_text, sample_size_sentences, verdict
-from roboeval.analysis.statistics import FEW
+from roboeval.analysis.compare import (
+    ComparedRun,
+    Comparison,
+    comparison_sentence,
+    p_text,
+    sample_size_sentences,
+)
+from roboeval.analysis.failure_groups import FailureGroup
+from roboeval.analysis.statistics import MIN_CLUSTERS
 from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences
-from roboeval.cli.views.groups import cluster_view
+from roboeval.cli.views.groups import failure_group_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.failures import plural_of, shown_classes
 
@@ -29,7 +35,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
     rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
-    few = "too narrow for so few tasks" * (1 < len(comparison.tasks) < FEW)
+    few = "too narrow for so few tasks" * (1 < len(comparison.tasks) < MIN_CLUSTERS)
     for name, estimate, told in (
         ("over tasks", comparison.over_tasks, p_text(comparison.p_tasks)),
         ("over prompts", comparison.over_prompts, p_text(comparison.p_prompts)),
@@ -45,7 +51,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
             f"{round(task.share, 9):+.3f}",
         )
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
-    sentence = Text(verdict(comparison, (a, b)), "bold")
+    sentence = Text(comparison_sentence(comparison, (a, b)), "bold")
     warnings = [
         Text(f"{visible(run.name)}: {warning}", "yellow")
         for run in runs
@@ -99,10 +105,10 @@ def _tasks(one: VerdictChanges) -> Table:
     return table
 
 
-def _groups(every: Sequence[Cluster], most: int, what: str) -> list[RenderableType]:
+def _groups(every: Sequence[FailureGroup], most: int, what: str) -> list[RenderableType]:
     if not every:
         return []
     head = f"pass under {what}, in {len(every):,} group{'s' * (len(every) != 1)}:"
     left = len(every) - most
     more = [Text(f"{left:,} more groups; --groups shows more of them", "dim")] if left > 0 else []
-    return [Text(), Text(head, "bold"), Text(), *map(cluster_view, every[:most]), *more]
+    return [Text(), Text(head, "bold"), Text(), *map(failure_group_view, every[:most]), *more]

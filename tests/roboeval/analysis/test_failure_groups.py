@@ -5,8 +5,8 @@ from typing import Any, cast
 
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from made_results import results_of
-from roboeval.analysis.cluster import cluster_data, describe_groups, group_failures, nearest_fix
-from roboeval.cli.views.groups import cluster_view
+from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures, nearest_fix
+from roboeval.cli.views.groups import failure_group_view
 from roboeval.evaluation.runs.completions import Key
 from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
@@ -80,7 +80,7 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     refused, empty = describe_groups(group_failures(cast("list[Row]", rows[:3]), programs), results)
     assert [len(one.members) for one in (refused, empty)] == [2, 1]
     assert (refused.fix, refused.why) == (None, NO_PROGRAM_SENTENCES["refusal"])
-    text = printed(cluster_view(refused))
+    text = printed(failure_group_view(refused))
     assert NO_PROGRAM_SENTENCES["refusal"] in text
     assert 'in "' not in text, "no robot was in a world"
 
@@ -124,13 +124,13 @@ def test_the_representative_is_of_the_most_frequent_program() -> None:
 
 
 def test_a_group_for_machines() -> None:
-    data = json.loads(json.dumps(cluster_data(told())))
+    data = json.loads(json.dumps(group_data(told())))
     assert (data["size"], data["representative"], data["world"]) == (3, "Visit/0/1", "w")
     assert '+    say("me")' in data["fix"]["difference"]
 
 
 def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
-    shown = printed(cluster_view(told(f"say({HOSTILE}")), width=200)
+    shown = printed(failure_group_view(told(f"say({HOSTILE}")), width=200)
     assert SHOWN.removesuffix("\\n") in shown
     assert "\x1b" not in shown
     assert shown.startswith("3 completions of Visit, failed check: Location")
@@ -143,7 +143,7 @@ def test_programs_that_are_gone() -> None:
     (one,) = describe_groups([group], results)
     assert one.program is None
     assert one.fix is None
-    assert "no longer in this run" in printed(cluster_view(one), width=200)
+    assert "no longer in this run" in printed(failure_group_view(one), width=200)
 
 
 def test_only_the_world_that_decides_keeps_its_trace() -> None:
