@@ -8,7 +8,7 @@ import polars as pl
 
 from roboeval.analysis.counts import completions_of, prompt_scores, task_scores
 from roboeval.analysis.metrics import Estimate, by_formula, mean_of
-from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.failures import FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of
@@ -31,7 +31,10 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
     for ability in dict.fromkeys(ability for task in suite.tasks.values() for ability in task.abilities):
         tasks = [name for name in scores if name in suite.tasks and ability in suite.tasks[name].abilities]
         total = sum(count for (task, _), count in failed.items() if task in tasks)
-        shares = {name: sum(failed.get((task, name), 0) for task in tasks) / (total or 1) for name in CLASSES}
+        shares = {
+            name: sum(failed.get((task, name), 0) for task in tasks) / (total or 1)
+            for name in FAILURE_CLASSES
+        }
         if tasks:
             yield ability, len(tasks), by_formula([scores[name] for name in tasks], over="tasks"), shares
 

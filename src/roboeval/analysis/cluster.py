@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK_FUNCTION, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
-from roboeval.evaluation.failures import NO_PROGRAM
-from roboeval.evaluation.runs.completions import Key, name_of
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS
+from roboeval.evaluation.runs.completions import CompletionKey, name_of
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of, key_of
 
@@ -42,8 +42,8 @@ class Cluster:
 
     task: str
     failure: Mapping[str, Any]  # the failure of the representative
-    members: tuple[Key, ...]
-    representative: Key  # the first completion with the most frequent program
+    members: tuple[CompletionKey, ...]
+    representative: CompletionKey  # the first completion with the most frequent program
     program: str | None  # the program of the representative; None if it was removed
     reason: Mapping[str, Any]  # why the representative fails, in which world and line
     fix: Fix | None  # None if there is no program, or none that passes
@@ -51,7 +51,7 @@ class Cluster:
     @property
     def has_no_program(self) -> bool:
         """Whether the replies contained no program."""
-        return str(self.failure["class"]) == NO_PROGRAM
+        return str(self.failure["class"]) == NO_PROGRAM_CLASS
 
     @property
     def why(self) -> str:
@@ -66,7 +66,7 @@ class Cluster:
         return sorted({prompt for _, prompt, _ in self.members})
 
 
-def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]]:
+def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str]) -> list[list[Row]]:
     """Group failing completions, the largest groups first; groups of one size take turns by task.
 
     Replies without a program form one group for each task and kind.
@@ -96,7 +96,7 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
         most = max(often.values())
         row = next(row for row in rows if often[programs.get(key_of(row))] == most)
         program = programs.get(key_of(row))
-        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM
+        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM_CLASS
         yield Cluster(
             task=row["task"],
             failure=failure_of(row),
@@ -108,7 +108,7 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
         )
 
 
-def nearest_fix(results: Results, key: Key) -> Fix | None:
+def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
     """Find the smallest fix of a completion; None if its program was removed or none passes."""
     programs = results.programs
     if key not in programs:
@@ -118,10 +118,10 @@ def nearest_fix(results: Results, key: Key) -> Fix | None:
 
 
 def _group_similar(
-    rows: Sequence[Row], programs: Mapping[Key, str], shape_of: Callable[[str], Lines]
+    rows: Sequence[Row], programs: Mapping[CompletionKey, str], shape_of: Callable[[str], Lines]
 ) -> Iterator[list[Row]]:
     """Group rows with the same cause by the similarity of their programs."""
-    if failure_of(rows[0])["class"] == NO_PROGRAM:
+    if failure_of(rows[0])["class"] == NO_PROGRAM_CLASS:
         yield sorted(rows, key=key_of)
         return
     of_shape: defaultdict[Lines, list[Row]] = defaultdict(list)

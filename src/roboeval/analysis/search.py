@@ -14,7 +14,7 @@ import polars as pl
 from codebotler.rtl import Formula, Inconclusive, holds, parse
 from roboeval.analysis.counts import completions_of
 from roboeval.evaluation.processes import map_in_processes
-from roboeval.evaluation.runs.completions import KEY, Key
+from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import can_judge, trace_of
 
@@ -35,7 +35,7 @@ class TraceQuery:
 class TraceMatch:
     """The worlds in which a completion matches a query, by number from 1 and name."""
 
-    key: Key
+    key: CompletionKey
     worlds: tuple[tuple[int, str], ...]
     cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be stored
     earlier: tuple[tuple[int, str], ...] = ()  # undecided: an earlier version stored no places

@@ -53,7 +53,7 @@ def compare(
     """
     if suites is not None:
         compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
-    elif len(runs) == PAIR:
+    elif len(runs) == _PAIR:
         compare_runs(runs, suite, ablated=ablation, as_json=json)
     else:
         fail(
@@ -62,7 +62,7 @@ def compare(
         )
 
 
-PAIR = 2
+_PAIR = 2
 
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
@@ -96,7 +96,7 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
     if len({path.resolve() for path in paths}) < len(paths):
         fail("a run is named twice; name each run once")
     names = [name.strip() for name in suites.split(",")]
-    if len(names) != PAIR or len({*names}) != PAIR or not all(names):
+    if len(names) != _PAIR or len({*names}) != _PAIR or not all(names):
         fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
     found = []
     for path in paths:

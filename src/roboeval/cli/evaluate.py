@@ -37,8 +37,8 @@ from roboeval.cli.show import house_of, print_summary
 if TYPE_CHECKING:
     from roboeval.evaluation.batches import Imported
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.runs.completions import Key
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.completions import CompletionKey
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.rows import Row
     from roboeval.evaluation.runs.source import Source
     from roboeval.evaluation.runs.table import TableBuilder
@@ -69,7 +69,7 @@ def evaluate(
         from roboeval.analysis.summary import summarise
         from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
-        from roboeval.evaluation.runs.folder import Run, about_of, tasks_to_judge
+        from roboeval.evaluation.runs.folder import RunFolder, about_of, tasks_to_judge
         from roboeval.evaluation.runs.scope import JudgingScope
 
         judged_by = load(suite, rules, skills)
@@ -79,7 +79,7 @@ def evaluate(
         if left:
             note(f"not judged, since they have no ablation: {', '.join(left)}")
         tally, table, is_started = Tally(), None if rules is None else _new_table(), False
-        run = None if out is None else Run(out)
+        run = None if out is None else RunFolder(out)
         try:
             opened = opened_source(source, judged_by)
             run = run or opened.run
@@ -122,7 +122,7 @@ def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoRetur
 
 
 def _name_next_command(
-    run: Run, failed: Key | None, *, suite: str, ablated: bool, rules: Path | None
+    run: RunFolder, failed: CompletionKey | None, *, suite: str, ablated: bool, rules: Path | None
 ) -> None:
     """Note where verdicts are kept, and the command that shows the first failure."""
     from roboeval.evaluation.runs.completions import name_of
@@ -154,7 +154,7 @@ def after_a_stop(*, is_kept: bool, is_started: bool, redo: bool) -> str:
 
 def _judged(
     source: Source,
-    run: Run | None,
+    run: RunFolder | None,
     suite: Suite,
     tasks: frozenset[str] | None,
     *,
@@ -191,14 +191,14 @@ def import_(
     Answers to `generate --requests` are added to its run.
     """
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.source import is_answers
 
     if is_answers(Path(path)):
         import_batch(Path(path), out, suite)
         return
     completions = opened_source(path, load(suite)).completions
-    Run(out).keep(completions)
+    RunFolder(out).keep(completions)
     count = len(completions)
     again = command("evaluate", out, suite=suite)
     they = ("is", "it") if count == 1 else ("are", "them")
@@ -210,12 +210,12 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     with installed():
         from roboeval.evaluation.batches import import_answers
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.folder import RunFolder
 
     with path.open("rb") as file:
         count = sum(1 for _ in file)
     with metered("reading", count) as tell:
-        found = import_answers(Run(out), load(suite), path, progress=lambda done: tell(done, ""))
+        found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: tell(done, ""))
     missing = len(found.failed) + len(found.unanswered)
     again = command("evaluate", out, suite=suite)
     note(
@@ -231,7 +231,7 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
 
 def missing_sentences(found: Imported) -> Iterator[str]:
     """For each error, how many requests ended with it, and which; then those without an answer."""
-    by_error: dict[str, list[Key]] = {}
+    by_error: dict[str, list[CompletionKey]] = {}
     for key, error in found.failed.items():
         by_error.setdefault(error, []).append(key)
     for error, keys in by_error.items():
@@ -243,7 +243,7 @@ def missing_sentences(found: Imported) -> Iterator[str]:
 SHOWN = 10  # names of requests in a sentence
 
 
-def _named(keys: Sequence[Key]) -> str:
+def _named(keys: Sequence[CompletionKey]) -> str:
     from roboeval.evaluation.runs.completions import name_of
 
     more = len(keys) - SHOWN

@@ -20,7 +20,7 @@ from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
     from roboeval.analysis.search import TraceMatch, TraceQuery
-    from roboeval.evaluation.runs.completions import Key
+    from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.suites.load import Suite
 
 
@@ -52,11 +52,11 @@ def find(
     from roboeval.analysis.search import TraceQuery, count_searched, matches_by_task, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run, as_judged
+    from roboeval.evaluation.runs.folder import RunFolder, as_judged
 
     if negated and formula is None:
         fail("--not needs a formula; add one, or leave --not out")
-    known = as_judged(Run(run), load(suite), ablated=ablation)
+    known = as_judged(RunFolder(run), load(suite), ablated=ablation)
     task = None if task is None else known.task(task).name
     query = TraceQuery(formula, negated, task, world)
     expect_query(query, known, ablated=ablation)
@@ -108,7 +108,9 @@ def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
         fail(f'{where} has no world "{query.world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
-def found_data(one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[Key]) -> dict[str, Any]:
+def found_data(
+    one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[CompletionKey]
+) -> dict[str, Any]:
     """A completion and the worlds in which it was found, as JSON."""
     from roboeval.evaluation.runs.completions import name_of
 

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from codebotler.models.sampling import SamplingSettings
     from roboeval.evaluation.generate import GenerationProgress, Pace
     from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.folder import RunFolder
 
 MOST_REQUESTS = 50_000
 
@@ -64,13 +64,13 @@ class Requested:
     suite: str  # as --suite takes it
     out: Path | None
 
-    def run_of(self, model: Model | BatchModel) -> Run:
+    def run_of(self, model: Model | BatchModel) -> RunFolder:
         """The run that is named, or else that of the model."""
-        from roboeval.evaluation.runs.folder import Run
+        from roboeval.evaluation.runs.folder import RunFolder
 
         folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
         fresh = self.plan.suite.families is not None
-        return Run(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
+        return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
     def open(self) -> Model:
         """Open the model that is asked."""
@@ -127,7 +127,7 @@ def suite_of_families(suite: str, families: str | None, num_tasks: int | None, s
     return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
-def complete(run: Run, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
+def complete(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run

@@ -11,7 +11,7 @@ from codebotler.core.words import counted
 from roboeval.cli.output import note, watched
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
 
@@ -57,7 +57,7 @@ class Opened(NamedTuple):
     again: str  # the command that goes on with judging it
 
 
-def note_houses(runs: Iterable[Run], suite: str) -> None:
+def note_houses(runs: Iterable[RunFolder], suite: str) -> None:
     """Say that runs were judged with house rules, too, which are not shown unless they are named."""
     if houses := dict.fromkeys(house for run in runs for house in run.houses(suite)):
         files = " or ".join(f"--rules {house}.yaml" for house in houses)

@@ -12,12 +12,12 @@ from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, prin
 
 __all__ = ["fail", "metered", "note", "print_json", "print_rich", "print_text", "watched"]
 
-FEWEST = 5  # things that must be done before it is told how long the rest takes
+MIN_DONE_FOR_ESTIMATE = 5  # things that must be done before it is told how long the rest takes
 
-Item = TypeVar("Item")
+Watched = TypeVar("Watched")
 
 
-def watched(items: Iterable[Item], doing: str, total: int) -> Iterator[Item]:
+def watched(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
     """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
     with metered(doing, total) as tell:
         for done, item in enumerate(items, 1):
@@ -51,7 +51,7 @@ def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, 
 def _left(done: int, to_do: int, seconds: float) -> str:
     """How long the rest takes, at the rate so far."""
     # At first, what starts takes most of the time.
-    is_telling = to_do and done >= FEWEST and done * 50 >= done + to_do
+    is_telling = to_do and done >= MIN_DONE_FOR_ESTIMATE and done * 50 >= done + to_do
     return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_telling else ""
 
 

@@ -13,18 +13,18 @@ if TYPE_CHECKING:
     from roboeval.cli.views.rounds import Round
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.runs.completions import Completion, Key
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.completions import Completion, CompletionKey
+    from roboeval.evaluation.runs.folder import RunFolder
 
 
 def further_rounds(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
     most: int,
     *,
     repairs: bool,
     engine: Callable[[], OpenEngine],
-    complete: Callable[[Run, GenerationPlan], Path],
+    complete: Callable[[RunFolder, GenerationPlan], Path],
 ) -> list[Path]:
     """Request rejected programs again, round by round, judge all, and print what that brings.
 
@@ -57,13 +57,13 @@ def further_rounds(
     return [one.path for one in runs[1:]]
 
 
-def _is_of(key: Key, plan: GenerationPlan) -> bool:
+def _is_of(key: CompletionKey, plan: GenerationPlan) -> bool:
     return (plan.tasks is None or key[0] in plan.tasks) and key[2] < plan.num_completions
 
 
 def _rejected(
-    run: Run, plan: GenerationPlan, completions: dict[Key, Completion], engine: OpenEngine
-) -> Iterator[tuple[Key, list[str]]]:
+    run: RunFolder, plan: GenerationPlan, completions: dict[CompletionKey, Completion], engine: OpenEngine
+) -> Iterator[tuple[CompletionKey, list[str]]]:
     from roboeval.evaluation.checks import check_programs
 
     programs = {(one.task, one.program_sha256) for one in completions.values()}
@@ -75,10 +75,10 @@ def _rejected(
 
 
 def _round(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
-    completions: dict[Key, Completion],
-    problems: dict[Key, list[str]],
+    completions: dict[CompletionKey, Completion],
+    problems: dict[CompletionKey, list[str]],
     number: int,
     engine: OpenEngine,
 ) -> Round:

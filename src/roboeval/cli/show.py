@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
     from roboeval.analysis.broken_rules import BrokenRules
     from roboeval.analysis.summary import EvaluationSummary
-    from roboeval.evaluation.runs.completions import Key
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.completions import CompletionKey
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.results import Results
     from roboeval.evaluation.runs.selection import Selection
     from roboeval.suites.load import Suite
@@ -87,7 +87,7 @@ def show(
         note(f"{unfinished}; `{again}` continues")
 
 
-def house_of(run: Run | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
+def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
     """How a run did by the rules of a house, beside its evaluation without them if there is one."""
     from roboeval.analysis.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
@@ -104,7 +104,7 @@ def print_summary(
     *,
     title: str,
     as_json: bool,
-    stale: Iterable[Key] = (),
+    stale: Iterable[CompletionKey] = (),
     house: BrokenRules | None = None,
 ) -> None:
     """Print the tables of an evaluation."""
@@ -163,7 +163,7 @@ def show_completion(
     from roboeval.analysis.cluster import nearest_fix
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.explanation import completion_data
-    from roboeval.evaluation.failures import NO_PROGRAM
+    from roboeval.evaluation.failures import NO_PROGRAM_CLASS
 
     selection.expect_judged(judged)
     key = selection.key
@@ -173,7 +173,7 @@ def show_completion(
         print_json({**data, "ablation": judged.is_ablated})
     else:
         print_rich(completion_view(data, in_full=in_full, with_reply=with_reply))
-    if data["passed"] or data["failure"]["class"] == NO_PROGRAM:
+    if data["passed"] or data["failure"]["class"] == NO_PROGRAM_CLASS:
         return
     if (fix := nearest_fix(judged, key)) is not None:
         again = command("show", judged.run.path, fix.name, suite=suite, ablated=judged.is_ablated)

@@ -36,18 +36,18 @@ from roboeval.evaluation.requests import (
     timestamp,
     with_batch,
 )
-from roboeval.evaluation.runs.completions import Key, how_many, reply_row
-from roboeval.evaluation.runs.folder import Run, load_head
+from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
+from roboeval.evaluation.runs.folder import RunFolder, load_head
 from roboeval.evaluation.runs.source import LONGEST_ANSWER
 from roboeval.suites.load import Suite
 
 BEGINNING = b'{"custom_id": '
 IDENTITY = ("model", "settings", "template", "suite")  # entries of run.json
-ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
+REQUEST_ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
 
 
 def write_requests(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
     model: BatchModel,
     path: Path,
@@ -86,7 +86,7 @@ def write_requests(
     return len(todo)
 
 
-def request_id(about: Mapping[str, Any], key: Key, instruction: str) -> str:
+def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -> str:
     """The name of a request, with a hash of all that it depends on: no other run has the same one.
 
     Args:
@@ -115,21 +115,21 @@ class Imported:
 
     new: int
     total: int
-    failed: Mapping[Key, str] = field(repr=False)
-    unanswered: Sequence[Key] = field(repr=False)
+    failed: Mapping[CompletionKey, str] = field(repr=False)
+    unanswered: Sequence[CompletionKey] = field(repr=False)
 
 
 @dataclass(frozen=True)
 class _Answer:
     """What a batch endpoint says of a request."""
 
-    key: Key
+    key: CompletionKey
     status: int
     body: object
 
 
 def import_answers(
-    run: Run, suite: Suite, path: Path, *, progress: Callable[[int], object] = bool
+    run: RunFolder, suite: Suite, path: Path, *, progress: Callable[[int], object] = bool
 ) -> Imported:
     """Add the completions in a file of answers to the run that `write_requests` began.
 
@@ -174,7 +174,7 @@ BatchLine: TypeAlias = tuple[
 
 
 def _add(
-    run: Run, about: dict[str, Any], lines: list[BatchLine], usage: Counter[str], *, is_whole: bool
+    run: RunFolder, about: dict[str, Any], lines: list[BatchLine], usage: Counter[str], *, is_whole: bool
 ) -> None:
     """Add rows to a run, and to its run.json the tokens."""
     with closing(Appender(run.completions)) as file:
@@ -193,10 +193,10 @@ class _Replies:
 
     model: BatchModel
     plan: GenerationPlan
-    there: set[Key]  # completions that the run has
-    lines: dict[Key, BatchLine] = field(default_factory=dict)
-    failed: dict[Key, str] = field(default_factory=dict)
-    refused: dict[Key, ModelError] = field(default_factory=dict)
+    there: set[CompletionKey]  # completions that the run has
+    lines: dict[CompletionKey, BatchLine] = field(default_factory=dict)
+    failed: dict[CompletionKey, str] = field(default_factory=dict)
+    refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def add(self, answer: _Answer) -> None:
         """Add an answer, unless its request has a reply."""
@@ -223,7 +223,7 @@ class _Replies:
                 if key not in self.lines:
                     self._keep(key, reply_of_refusal(error))
 
-    def _keep(self, key: Key, reply: Reply) -> None:
+    def _keep(self, key: CompletionKey, reply: Reply) -> None:
         row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
         line = to_line(row)
         if len(line) > MAX_ROW:
@@ -232,7 +232,7 @@ class _Replies:
         self.failed.pop(key, None)
 
 
-def _expect_begun(run: Run, suite: Suite) -> dict[str, Any]:
+def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     """The run.json of a run that `write_requests` began by a suite."""
     if not run.about.is_file():
         begin = "name the run of `roboeval generate --requests`, which keeps them"
@@ -250,7 +250,7 @@ def _plan(suite: Suite, batch: Mapping[str, Any]) -> GenerationPlan:
     return GenerationPlan(suite, None if tasks is None else frozenset(tasks), batch["num_completions"])
 
 
-def _answers(path: Path, ids: Mapping[str, Key]) -> Iterator[_Answer]:
+def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[_Answer]:
     """The answers in a file; raises UserError if a line is none, or one to another request."""
     for number, line in read_lines(path, limit=LONGEST_ANSWER):
         if not line.strip():
@@ -261,7 +261,7 @@ def _answers(path: Path, ids: Mapping[str, Key]) -> Iterator[_Answer]:
             raise UserError(error.sentence, file=path, line=number) from None
 
 
-def _answer(line: bytes, ids: Mapping[str, Key]) -> _Answer:
+def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> _Answer:
     row = parsed_row(line)
     if row is None:
         raise UserError("this line is not JSON; perhaps the file is incomplete")
@@ -270,7 +270,7 @@ def _answer(line: bytes, ids: Mapping[str, Key]) -> _Answer:
         what = "a request" if "method" in row else "no answer of a batch endpoint"
         raise UserError(f"this line is {what}; name the file of answers")
     if not isinstance(name, str) or name not in ids:
-        known = isinstance(name, str) and ID.fullmatch(name)
+        known = isinstance(name, str) and REQUEST_ID.fullmatch(name)
         whose = "of another run, or of other settings" if known else "that no run has"
         raise UserError(f"this line answers a request {whose}: {name!r}")
     response, error = row.get("response"), row.get("error")

@@ -16,7 +16,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON_VERSION, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import read_checks
 from roboeval.suites.load import Suite
 
@@ -24,7 +24,13 @@ ProgramKey: TypeAlias = tuple[str, str]  # a task and the hash of a program
 
 
 def check_programs(
-    run: Run, suite: Suite, completions: Iterable[Completion], engine: OpenEngine, *, samples: int, seed: int
+    run: RunFolder,
+    suite: Suite,
+    completions: Iterable[Completion],
+    engine: OpenEngine,
+    *,
+    samples: int,
+    seed: int,
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
     """Yield the problems of each program, checking those that nobody has checked with these settings.
 
@@ -66,7 +72,7 @@ def check_programs(
                 yield key, problems
 
 
-def _open(run: Run, key: str, metadata: dict[str, Any]) -> Appender:
+def _open(run: RunFolder, key: str, metadata: dict[str, Any]) -> Appender:
     rows, about = run.checks(key), run.checks_head(key)
     about.parent.mkdir(exist_ok=True)
     if not about.exists() or load_head(about) != metadata:

@@ -16,7 +16,7 @@ from codebotler.simulator.worker import EngineError, Worker
 PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
 Ran = TypeVar("Ran")
-Value = TypeVar("Value")
+WorkResult = TypeVar("WorkResult")
 RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[Ran]]
 """Runs a few programs on a worker, and returns a result for each."""
 
@@ -25,8 +25,8 @@ class Engine(Protocol):
     """Calls functions that run programs isolated."""
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
+        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+    ) -> Iterator[WorkResult]:
         """The values of `then`, in the order of the programs, which are read as needed; equal ones run once.
 
         `function` and its results can be pickled; `then` runs in the main thread of a process if possible.
@@ -61,8 +61,8 @@ class Local:
             self._pool.__exit__()
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
+        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+    ) -> Iterator[WorkResult]:
         """See `Engine`."""
         here = self._pool.here
         return self._pool.map_distinct(

@@ -17,15 +17,15 @@ from codebotler.core.words import brief
 from codebotler.simulator.settings import PAPER
 from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
 from roboeval.evaluation.judge import judgements
-from roboeval.evaluation.runs.completions import Completion, Key, name_of
-from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head, selected_tasks
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_head, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
 from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 
 def evaluate_run(
-    run: Run,
+    run: RunFolder,
     suite: Suite,
     *,
     ablated: bool,
@@ -82,7 +82,10 @@ def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
 
 
 def _expect_of_run(
-    line: LocatedRow, written: Mapping[Key, Completion], left: Mapping[Key, Completion], file: Path
+    line: LocatedRow,
+    written: Mapping[CompletionKey, Completion],
+    left: Mapping[CompletionKey, Completion],
+    file: Path,
 ) -> None:
     """Raise UserError where a row judges what is not in the run, or judges it again."""
     key = key_of(line.row)
@@ -143,12 +146,12 @@ def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> fr
     return None if tasks is None or before is None else tasks | before
 
 
-def expect_same_judge(run: Run, suite: Suite) -> None:
+def expect_same_judge(run: RunFolder, suite: Suite) -> None:
     """Raise UserError if an evaluation of a run cannot go on, since the suite or the tool has changed."""
     _expect_same(run, suite, ablated=False)
 
 
-def _expect_same(run: Run, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
+def _expect_same(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
     """The content of KEY.json, None if there is none; raises UserError if the rows were judged otherwise."""
     key = evaluation_key(suite, ablated=ablated)
     path, rows = run.head(key), run.rows(key)

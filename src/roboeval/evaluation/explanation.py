@@ -18,16 +18,16 @@ from roboeval.evaluation.runs.replies import reply_data
 from roboeval.evaluation.runs.traces import can_judge, has_circumstances, trace_of
 from roboeval.suites.load import Scenario, Suite
 
-NOT_RECORDED = "instruction not recorded"
+INSTRUCTION_NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "this is the suite's text of the prompt:"
-GONE = "the judged program is no longer in this run"
-CHANGED = "the suite has changed since this was judged"
+PROGRAM_GONE = "the judged program is no longer in this run"
+SUITE_CHANGED = "the suite has changed since this was judged"
 EARLIER = "judged by an earlier version, which kept no places; evaluate again with --redo"
 CUT = "the trace was too long to keep, so this cannot be explained"
-TOO_LONG = "the traces of this program are too long to explain this as well"
+TRACES_TOO_LONG = "the traces of this program are too long to explain this as well"
 
 LOWERED = "This suite lower-cases strings before running; they are shown as it judges them."
-MOST_LINES = 1_000  # of a program that is shown
+MAX_PROGRAM_LINES = 1_000  # of a program that is shown
 MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
 EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one
 
@@ -72,8 +72,8 @@ def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
     """A line on where the instruction is from, if that needs saying, and the instruction, if it is known."""
     if recorded is not None or of_suite is None:
-        return NOT_RECORDED if recorded is None else None, recorded
-    return f"{NOT_RECORDED}; {OF_SUITE}", of_suite
+        return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
+    return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
 
 
 def failing_first(worlds: Iterable[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
@@ -132,14 +132,14 @@ def _explained(
     require = () if scenario is None else scenario.require
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
-        return {"explanation": f"{CHANGED} and no longer requires this here", "step": None}
+        return {"explanation": f"{SUITE_CHANGED} and no longer requires this here", "step": None}
     if not can_judge(requirement.formula, verdict):
         return {"explanation": EARLIER, "step": None}
     if not patience.reaches_for(trace):
-        return {"explanation": TOO_LONG, "step": None}
+        return {"explanation": TRACES_TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)
     if why is None:
-        return {"explanation": f"{CHANGED}; by now this is satisfied", "step": None}
+        return {"explanation": f"{SUITE_CHANGED}; by now this is satisfied", "step": None}
     return {"explanation": why.sentence, "step": None if why.event is None else why.event + 1}
 
 
@@ -152,8 +152,8 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
 def shown_lines(program: str) -> tuple[str, int]:
     """A program for people, in short lines without tabs, and how many lines are left out at its end."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
-    shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
-    return shown, max(0, len(lines) - MOST_LINES)
+    shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
+    return shown, max(0, len(lines) - MAX_PROGRAM_LINES)
 
 
 def cut_sentence(cut: Mapping[str, Any]) -> str:

@@ -12,8 +12,12 @@ from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
 
-NO_PROGRAM = "NoProgram"
-PYTHON, ROBOT, TASK = "PythonError", "RobotExecutionError", "TaskCompletionError"
+NO_PROGRAM_CLASS = "NoProgram"
+PYTHON_ERROR_CLASS, ROBOT_ERROR_CLASS, TASK_ERROR_CLASS = (
+    "PythonError",
+    "RobotExecutionError",
+    "TaskCompletionError",
+)
 
 
 @dataclass(frozen=True)
@@ -28,11 +32,11 @@ class FailureClass:
     is_always_shown: bool = True  # to people; of the others, only those that happened
 
 
-CLASSES: Mapping[str, FailureClass] = {
+FAILURE_CLASSES: Mapping[str, FailureClass] = {
     one.name: one
     for one in (
         FailureClass(
-            NO_PROGRAM,
+            NO_PROGRAM_CLASS,
             "no program",
             "without a program",
             NO_PROGRAM_KINDS,
@@ -40,7 +44,7 @@ CLASSES: Mapping[str, FailureClass] = {
             is_always_shown=False,
         ),
         FailureClass(
-            PYTHON,
+            PYTHON_ERROR_CLASS,
             "Python error",
             "Python errors",
             (
@@ -56,7 +60,7 @@ CLASSES: Mapping[str, FailureClass] = {
             ),
         ),
         FailureClass(
-            ROBOT,
+            ROBOT_ERROR_CLASS,
             "robot error",
             "robot errors",
             (
@@ -69,7 +73,7 @@ CLASSES: Mapping[str, FailureClass] = {
                 "AskInvalidOptions",  # beyond the paper's six
             ),
         ),
-        FailureClass(TASK, "failed check", "failed checks", get_args(Category)),
+        FailureClass(TASK_ERROR_CLASS, "failed check", "failed checks", get_args(Category)),
     )
 }
 """All classes; the kind of a failed check is the check's category. `failure` assigns them."""
@@ -77,17 +81,17 @@ CLASSES: Mapping[str, FailureClass] = {
 
 def label_of(name: str) -> str:
     """The label of a class; of an unknown one its name."""
-    return CLASSES[name].label if name in CLASSES else name
+    return FAILURE_CLASSES[name].label if name in FAILURE_CLASSES else name
 
 
 def plural_of(name: str) -> str:
     """The plural label of a class; of an unknown one its name."""
-    return CLASSES[name].plural if name in CLASSES else name
+    return FAILURE_CLASSES[name].plural if name in FAILURE_CLASSES else name
 
 
 def ending_of(name: str) -> str:
     """How programs end that fail by a class, such as `in a Python error`."""
-    return (CLASSES[name].ending if name in CLASSES else "") or f"in a {label_of(name)}"
+    return (FAILURE_CLASSES[name].ending if name in FAILURE_CLASSES else "") or f"in a {label_of(name)}"
 
 
 def shown_classes(happened: Collection[str]) -> list[str]:
@@ -95,12 +99,12 @@ def shown_classes(happened: Collection[str]) -> list[str]:
 
     The paper's three are always shown, so that runs can be compared; `NoProgram` only where it happened.
     """
-    return [name for name, one in CLASSES.items() if one.is_always_shown or name in happened]
+    return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
 def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
     """Why a reply held no program, in a sentence, from the failure of a row; None if it fails otherwise."""
-    if failure["class"] != NO_PROGRAM:
+    if failure["class"] != NO_PROGRAM_CLASS:
         return None
     return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
 
@@ -133,9 +137,14 @@ def failure(verdicts: Sequence[Verdict]) -> Failure | None:
             error = verdict.outcome.error
             if verdict.failed:
                 first = verdict.failed[0]
-                return {"class": TASK, "kind": first.category, "world": index, "check": first.text}
+                return {
+                    "class": TASK_ERROR_CLASS,
+                    "kind": first.category,
+                    "world": index,
+                    "check": first.text,
+                }
             assert error is not None, "a world without error and failed checks is satisfied"
             is_robots = verdict.outcome.status is Status.ROBOT_ERROR
-            name = ROBOT if is_robots else PYTHON
+            name = ROBOT_ERROR_CLASS if is_robots else PYTHON_ERROR_CLASS
             return {"class": name, "kind": error.kind, "world": index, "check": None}
     return None

@@ -33,8 +33,8 @@ from roboeval.evaluation.requests import (
     timestamp,
     with_batch,
 )
-from roboeval.evaluation.runs.completions import Key, how_many, reply_row
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
+from roboeval.evaluation.runs.folder import RunFolder
 
 FAILURES_IN_A_ROW = 3  # after so many, or one for each request under way, a model is given up
 
@@ -57,7 +57,7 @@ class GenerationProgress:
     interrupted: int  # requests under way at the last interruption, which may be paid twice
     usage: Counter[str]  # tokens of all completions
     under_way: int = 0  # requests at the end, if this was an interruption
-    failures: dict[Key, str] = field(default_factory=dict)  # error messages
+    failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages
     stopped: str | None = None  # why no further request is sent
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class GenerationProgress:
 
 
 def generate_run(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
     model: Model,
     pace: Pace,
@@ -128,7 +128,7 @@ def reply_of_refusal(error: ModelError) -> Reply:
     return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
 
 
-_KEY: ContextVar[Key] = ContextVar("_KEY")
+_KEY: ContextVar[CompletionKey] = ContextVar("_KEY")
 
 
 @dataclass(frozen=True)
@@ -172,12 +172,12 @@ class _Generation:
     error: ModelError | None = None
     _failures_in_a_row: int = 0
     _budget: int | None = None  # once it is spent
-    _refused: dict[Key, ModelError] = field(default_factory=dict)
+    _refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._paced = RateLimited(_LoggedModel(self.model, self.log), **asdict(self.pace))
 
-    async def generate(self, keys: list[Key]) -> None:
+    async def generate(self, keys: list[CompletionKey]) -> None:
         waiting = iter(keys)
         try:
             async with asyncio.TaskGroup() as group:
@@ -192,12 +192,12 @@ class _Generation:
         finally:
             await self.model.close()
 
-    async def _request_each(self, waiting: Iterator[Key]) -> None:
+    async def _request_each(self, waiting: Iterator[CompletionKey]) -> None:
         for key in waiting:
             if self.progress.stopped is None:
                 await self._request(key)
 
-    async def _request(self, key: Key) -> None:
+    async def _request(self, key: CompletionKey) -> None:
         _KEY.set(key)
         try:
             reply = await self._paced.reply(self.plan.prompt(key), number=self.plan.sample(key))
@@ -214,7 +214,7 @@ class _Generation:
             if self._failures_in_a_row >= max(FAILURES_IN_A_ROW, self.pace.concurrency):
                 self.progress.stopped = error.sentence
 
-    async def _keep(self, key: Key, reply: Reply) -> None:
+    async def _keep(self, key: CompletionKey, reply: Reply) -> None:
         line = self._line(key, reply)
         if len(line) > MAX_ROW:
             raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=True)
@@ -236,6 +236,6 @@ class _Generation:
             self.progress.done += 1
         self._refused.clear()
 
-    def _line(self, key: Key, reply: Reply) -> bytes:
+    def _line(self, key: CompletionKey, reply: Reply) -> bytes:
         row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
         return to_line({**row, **self.plan.mark()})

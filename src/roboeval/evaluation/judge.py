@@ -25,7 +25,7 @@ from roboeval.evaluation.serialization import judgements_for, row_line, with_rep
 from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Requirement, Scenario, Suite
 
-LOG = logging.getLogger("roboeval.evaluation.judge")
+_log = logging.getLogger("roboeval.evaluation.judge")
 
 BUDGET = 60  # seconds of processor time that judging one program may take, in all its worlds
 
@@ -120,7 +120,7 @@ def judgements(
         for by_prompt in opened.map_distinct(running, works(), judging):
             completion = waiting.popleft()
             if by_prompt is None:
-                LOG.warning(
+                _log.warning(
                     "%s is not judged: that took more than %g seconds of processor time; "
                     "`roboeval tasks --lint` finds slow regexes",
                     name_of(completion.key),

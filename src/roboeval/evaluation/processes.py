@@ -18,9 +18,9 @@ from typing import Any, Self, TypeVar
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import map_batches
 from codebotler.simulator.worker import EngineError
-from roboeval.evaluation.engines import BRIEF, Ran, RunPrograms, Value, Work, own_worker
+from roboeval.evaluation.engines import BRIEF, Ran, RunPrograms, Work, WorkResult, own_worker
 
-Key = TypeVar("Key")
+JobKey = TypeVar("JobKey")
 
 
 class Processes:
@@ -40,8 +40,8 @@ class Processes:
         """Nothing is left: the processes end with the results."""
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
+        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+    ) -> Iterator[WorkResult]:
         """See `Engine`."""
         functions = pickle.dumps((function, then))
         batch = partial(run_batch, functions, self._isolation)
@@ -49,19 +49,19 @@ class Processes:
 
 
 def map_in_processes(
-    function: Callable[[Sequence[Key]], Sequence[Value]],
-    keys: Iterable[Key],
+    function: Callable[[Sequence[JobKey]], Sequence[WorkResult]],
+    keys: Iterable[JobKey],
     *,
     workers: int,
-    name: Callable[[Key], bytes],
-) -> Iterator[Value]:
+    name: Callable[[JobKey], bytes],
+) -> Iterator[WorkResult]:
     """Call a function with a few keys at a time, in processes; yield the values in the order of the keys.
 
     `name` gives each key a short name of its own; equal keys are called once.
     """
     with process_pool(workers) as processes:
 
-        def submit(keys: Sequence[Key]) -> Future[Sequence[Value]]:
+        def submit(keys: Sequence[JobKey]) -> Future[Sequence[WorkResult]]:
             with starting():
                 return processes.submit(function, keys)
 

@@ -15,12 +15,12 @@ from codebotler.core.errors import UserError, installed
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import NO_SECCOMP, DistinctKeys, ResultFile
 from codebotler.simulator.worker import EngineError
-from roboeval.evaluation.engines import PYTHON_VERSION, Ran, RunPrograms, Value, Work, own_worker
+from roboeval.evaluation.engines import PYTHON_VERSION, Ran, RunPrograms, Work, WorkResult, own_worker
 
-LOG = logging.getLogger("roboeval.ray")
+_log = logging.getLogger("roboeval.ray")
 VERSIONS = f"codebotler {__version__} with Python {PYTHON_VERSION}"
 
-AHEAD = 2  # shards for each core that are under way, so that none waits for this process
+SHARDS_PER_CORE = 2  # shards for each core that are under way, so that none waits for this process
 RETRIES = 20  # of a shard whose machine is lost
 PATIENCE_S = 10  # until it is asked whether the cluster has any core left
 CONNECT_S = 5  # until something must have accepted a connection
@@ -60,8 +60,8 @@ class RayCluster:
         self._ray.shutdown()
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
+        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+    ) -> Iterator[WorkResult]:
         """See `Engine`.
 
         Shards that are under way when no more results are wanted run to their end: Ray 2.60 can abort this
@@ -91,7 +91,7 @@ class RayCluster:
                 most = self._most()
 
     def _most(self) -> int:  # shards under way
-        return self._workers or AHEAD * max(1, self._cores())
+        return self._workers or SHARDS_PER_CORE * max(1, self._cores())
 
     def _cores(self) -> int:
         return int(self._ray.cluster_resources().get("CPU", 0))
@@ -109,7 +109,7 @@ class RayCluster:
             except self._ray.exceptions.RayError as error:
                 raise EngineError(f"Ray lost a shard for good: {str(error).splitlines()[0]}") from None
             if warning and not self._warned:
-                LOG.warning(warning)
+                _log.warning(warning)
                 self._warned = True
             yield shard, values
 
@@ -129,11 +129,11 @@ class RayCluster:
 
 
 def run_shard(
-    functions: tuple[RunPrograms[Ran], Callable[[Ran], Value]],
+    functions: tuple[RunPrograms[Ran], Callable[[Ran], WorkResult]],
     works: Sequence[Work],
     versions: str,  # others might judge otherwise
     isolation: Mapping[str, bool],
-) -> tuple[list[Value], str | None]:
+) -> tuple[list[WorkResult], str | None]:
     """The results for programs, and a warning if they are not fully isolated; in a process of Ray's."""
     machine = platform.node()
     if versions != VERSIONS:

@@ -18,8 +18,8 @@ from codebotler.core.words import brief
 from codebotler.models.base import Model
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for, template_hash
-from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
-from roboeval.evaluation.runs.folder import Run, load_head
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of, read_completions
+from roboeval.evaluation.runs.folder import RunFolder, load_head
 from roboeval.suites.load import Suite
 
 if TYPE_CHECKING:
@@ -37,22 +37,22 @@ class GenerationPlan:
     tasks: frozenset[str] | None = None
     num_completions: int = 50
 
-    def keys(self) -> list[Key]:
+    def keys(self) -> list[CompletionKey]:
         """The completions: the first of each prompt, then the second, so that a part covers all tasks."""
         tasks = [task for name, task in self.suite.tasks.items() if self.tasks is None or name in self.tasks]
         prompts = [(task.name, prompt) for task in tasks for prompt in range(len(task.prompts))]
         return [(*prompt, index) for index in range(self.num_completions) for prompt in prompts]
 
-    def instruction(self, key: Key) -> str:
+    def instruction(self, key: CompletionKey) -> str:
         """The instruction that a completion is for."""
         return self.suite.tasks[key[0]].prompts[key[1]]
 
-    def prompt(self, key: Key) -> Prompt:
+    def prompt(self, key: CompletionKey) -> Prompt:
         """The request for a completion."""
         rules, skills = self.suite.house_sentences, self.suite.skills
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
-    def sample(self, key: Key) -> int:
+    def sample(self, key: CompletionKey) -> int:
         """The number of the sample, from which its seed comes."""
         return key[2]
 
@@ -64,7 +64,7 @@ class GenerationPlan:
         """What rows of completions.jsonl say besides the reply."""
         return {}
 
-    def completed(self, run: Run) -> Iterator[Completion]:
+    def completed(self, run: RunFolder) -> Iterator[Completion]:
         """The completions that a run has; raises UserError if one's instruction is no longer the suite's."""
         if not run.completions.is_file() or not run.completions.stat().st_size:
             return
@@ -89,7 +89,7 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 # --- run.json
 
 
-def run_metadata(run: Run, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
+def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
     """The content of run.json; raises UserError where completions are there that were generated otherwise."""
     fixed = {
         "model": model.name,
@@ -204,12 +204,12 @@ class RequestLog:
     interruption at any moment has none counted twice. The file goes when a run ends in order.
     """
 
-    def __init__(self, path: Path, done: set[Key], lost: int) -> None:  # `lost` as run.json has it
+    def __init__(self, path: Path, done: set[CompletionKey], lost: int) -> None:  # `lost` as run.json has it
         self.path = path
         earlier, noted = self._read()
         self.interrupted = len(noted - done)  # at the last interruption
         self.lost = max(lost, earlier + self.interrupted)
-        self.under_way: set[Key] = set()
+        self.under_way: set[CompletionKey] = set()
 
     def __enter__(self) -> Self:
         """Start the file anew, now that run.json knows of `lost`."""
@@ -223,25 +223,25 @@ class RequestLog:
         if kind is None and not self.under_way:
             self.path.unlink()
 
-    def sent(self, key: Key) -> None:
+    def sent(self, key: CompletionKey) -> None:
         """Note a request before it is sent; if the disk is full, the OSError keeps it from being sent."""
         self._file.append(to_line({"sent": key}))
         self.under_way.add(key)
 
-    def failed(self, key: Key) -> None:
+    def failed(self, key: CompletionKey) -> None:
         """Note that a request ended without a reply."""
         if key in self.under_way:
             self.kept(key)
             self._file.append(to_line({"failed": key}))
 
-    def kept(self, key: Key) -> None:
+    def kept(self, key: CompletionKey) -> None:
         """Forget a request; its completion, which is in its file now, shows that it has ended."""
         self.under_way.remove(key)
 
-    def _read(self) -> tuple[int, set[Key]]:
+    def _read(self) -> tuple[int, set[CompletionKey]]:
         """How many requests were lost before the file was started, and which ones it leaves open."""
         lost = 0
-        noted: set[Key] = set()
+        noted: set[CompletionKey] = set()
         for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():
             match row:
                 case {"lost": int(lost)}:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 from codebotler.prompts import Prompt
 from roboeval.evaluation.requests import GenerationPlan
-from roboeval.evaluation.runs.completions import Completion, Key
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.completions import Completion, CompletionKey
+from roboeval.evaluation.runs.folder import RunFolder
 
 ROUND = "round"  # the column of rows: in which round a program was written; absent in those of the first
 STRIDE = 1_000_000
@@ -32,15 +32,15 @@ class RoundPlan(GenerationPlan):
 
     number: int
     repairs: bool
-    earlier: Mapping[Key, Completion] = field(repr=False)
-    problems: Mapping[Key, Sequence[str]] = field(repr=False)
+    earlier: Mapping[CompletionKey, Completion] = field(repr=False)
+    problems: Mapping[CompletionKey, Sequence[str]] = field(repr=False)
 
-    def prompt(self, key: Key) -> Prompt:
+    def prompt(self, key: CompletionKey) -> Prompt:
         """The request for a completion; without a program there is nothing to repair."""
         first, program = super().prompt(key), self.earlier[key].program
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
-    def sample(self, key: Key) -> int:
+    def sample(self, key: CompletionKey) -> int:
         """The number of the sample, from which its seed comes."""
         return key[2] + self.number * STRIDE
 
@@ -52,9 +52,9 @@ class RoundPlan(GenerationPlan):
         """What the rows of this round say of it."""
         return {ROUND: self.number}
 
-    def folder(self, run: Run) -> Run:
+    def folder(self, run: RunFolder) -> RunFolder:
         """The run of this round, beside the first one's files."""
-        return Run(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
+        return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
 
 
 def round_of(completion: Completion) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 
 from codebotler.core.files import to_line
 from codebotler.core.trace import outcome_data
-from roboeval.evaluation.failures import NO_PROGRAM, Verdict, failure
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS, Verdict, failure
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
 
@@ -31,7 +31,7 @@ def with_reply(completion: Completion, judgement_json: bytes) -> bytes:
     if not judgement_json.startswith(FAILED_PREFIX) or (kind := completion.no_program) is None:
         return judgement_json
     found = json.loads(judgement_json)
-    cause = {"class": NO_PROGRAM, "kind": kind, "world": found["failure"]["world"], "check": None}
+    cause = {"class": NO_PROGRAM_CLASS, "kind": kind, "world": found["failure"]["world"], "check": None}
     return to_line({**found, "failure": cause}).removesuffix(b"\n")
 
 

@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from roboeval.analysis.metrics import Estimate, TaskScore, overall, threshold_curve
 from roboeval.analysis.resample import LIMITS
 from roboeval.analysis.summary import ALL, PASSED, Causes, kinds_in_order
-from roboeval.evaluation.failures import CLASSES, NO_PROGRAM, plural_of, shown_classes
+from roboeval.evaluation.failures import FAILURE_CLASSES, NO_PROGRAM_CLASS, plural_of, shown_classes
 from roboeval.report.drawing import (
     COLOURS,
     DASHES,
@@ -389,12 +389,12 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]], shown: Sequence[st
 
 def _looks() -> dict[str, tuple[str, str]]:
     """The colour and the hatch of each outcome; the paper's classes always have the same ones."""
-    others = [name for name in CLASSES if name != NO_PROGRAM]
+    others = [name for name in FAILURE_CLASSES if name != NO_PROGRAM_CLASS]
     colours = cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5))
     hatches = cycle(("", "////", "\\\\\\\\", "....", ""))
     of_others = {one: look for one, *look in zip(others, colours, hatches, strict=False)}
     looks = {name: (colour, hatch) for name, (colour, hatch) in of_others.items()}
-    return {PASSED: (FAINT, ""), NO_PROGRAM: (QUIET, ""), **looks}
+    return {PASSED: (FAINT, ""), NO_PROGRAM_CLASS: (QUIET, ""), **looks}
 
 
 def _with_count(name: str, count: int | None) -> str:

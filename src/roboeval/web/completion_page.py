@@ -26,7 +26,7 @@ from roboeval.evaluation.explanation import (
     instruction_shown,
 )
 from roboeval.evaluation.failures import label_of, no_program_sentence
-from roboeval.evaluation.runs.completions import Key, by_hand, name_of
+from roboeval.evaluation.runs.completions import CompletionKey, by_hand, name_of
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_person, world_title
 from roboeval.web.heat_map import address
@@ -63,7 +63,7 @@ def _read(
     if row is None:
         raise MissingError(f'this run has no completion "{shortened(name, MOST_NAME)}"')
     data = completion_details(snapshot, row)
-    key: Key = data["task"], data["prompt"], data["index"]
+    key: CompletionKey = data["task"], data["prompt"], data["index"]
     has_failed = data["passed"] is False and _no_program_sentence(data) is None
     fix = nearest_fix(snapshot.results, key) if has_failed else None
     return snapshot, data, fix
@@ -80,7 +80,7 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
 def _draw_head(
     run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: CompletionFilter, query: str
 ) -> None:
-    key: Key = data["task"], data["prompt"], data["index"]
+    key: CompletionKey = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
         html.a(shortened(run.name, MOST_NAME), href=outside(f"{address(run.name)}{query}#completions")).props(
             "dir=auto"

@@ -14,9 +14,9 @@ from typing import Any
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
-from roboeval.evaluation.explanation import GONE, completion_data, suite_instruction
+from roboeval.evaluation.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.requests import batches
-from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, name_of
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, by_hand, how_many, name_of
 from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
@@ -197,9 +197,9 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
 def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     """A completion with its program, and the steps, failed checks and explanations of each world."""
     results = run.results
-    key: Key = row["task"], row["prompt"], row["index"]
+    key: CompletionKey = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)
-    more = {"evaluation": results.key, "stale": row["stale"], "note": GONE if row["stale"] else None}
+    more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}
     if row["passed"] is None:
         known: dict[str, Any] = {
             name: getattr(completion, name, None) for name in ("model", "instruction", "program")

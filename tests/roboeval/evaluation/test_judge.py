@@ -15,7 +15,7 @@ from codebotler.rtl.formulas import Formula
 from codebotler.simulator.worker import EVENTS
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.judge import evaluate, judge
-from roboeval.evaluation.result_cache import LONGEST_REMEMBERED, ResultCache
+from roboeval.evaluation.result_cache import MAX_RESULT_EVENTS, ResultCache
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -325,7 +325,7 @@ def test_long_runs_are_not_remembered_and_others_forgotten(
 ) -> None:
     monkeypatch.setattr("roboeval.evaluation.result_cache.MOST_REMEMBERED", 2)
     scenario = suite.tasks["T"].scenarios[1]
-    long = Outcome(Status.FINISHED, HI * LONGEST_REMEMBERED)
+    long = Outcome(Status.FINISHED, HI * MAX_RESULT_EVENTS)
     runs = [Outcome(Status.FINISHED, (*HI, Event("say", text))) for text in "abc"]
     for run, times in ((long, 2), (runs[0], 1), (runs[1], 1), (runs[2], 1), (runs[0], 1)):
         tested.clear()

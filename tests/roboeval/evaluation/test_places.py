@@ -27,7 +27,7 @@ from made_results import results_of
 from roboeval.analysis.breakdown import never_returned
 from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
 from roboeval.analysis.tasks import prompt_data
-from roboeval.evaluation.explanation import CHANGED, completion_data
+from roboeval.evaluation.explanation import SUITE_CHANGED, completion_data
 from roboeval.evaluation.judge import is_met, judged, run_in_worlds
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row, decode_row, key_of
@@ -83,7 +83,7 @@ def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:
     outcome, row = judge(worker, suite, program)
     require = suite.tasks["T"].scenarios[0].require
     met = [is_met(one, outcome.trace) for one in require]
-    assert [why.startswith(CHANGED) for why in explained(row, suite)] == met
+    assert [why.startswith(SUITE_CHANGED) for why in explained(row, suite)] == met
     assert [bool(find(row, one.text).worlds) for one in require] == met
     return met
 

@@ -12,8 +12,8 @@ from codebotler.core.files import to_line
 from made_up_runs import HOSTILE, UNCHECKED, made_up, unfinished, usual
 from roboeval.analysis.resample import accepted_after
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.failures import CLASSES
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.failures import FAILURE_CLASSES
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.source import open_source
 from roboeval.report import paper
@@ -170,9 +170,9 @@ def test_published_means_are_those_of_the_table_of_pass_at_1(paper_suite: Suite)
 
 
 def test_published_causes_are_of_known_classes_and_kinds() -> None:
-    assert paper.published()["classes"].keys() <= {"passed", *CLASSES}
+    assert paper.published()["classes"].keys() <= {"passed", *FAILURE_CLASSES}
     for name, kinds in paper.published()["kinds"].items():
-        assert kinds.keys() - {"ZeroDivisionError"} <= set(CLASSES[name].kinds)
+        assert kinds.keys() - {"ZeroDivisionError"} <= set(FAILURE_CLASSES[name].kinds)
 
 
 def test_published_causes_only_where_asked_for() -> None:
@@ -192,7 +192,7 @@ def test_published_causes_only_where_asked_for() -> None:
 
 
 def judged_in(folder: Path, completions: Path, suite: Suite) -> JudgedRun:
-    run = Run(folder)
+    run = RunFolder(folder)
     run.keep(open_source(str(completions), suite).completions)
     for _ in evaluate_run(run, suite, tasks=None, ablated=False, redo=False, workers=2):
         pass

@@ -14,8 +14,8 @@ from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
-    GONE,
     LOWERED,
+    PROGRAM_GONE,
     cut_sentence,
     error_sentence,
     failing_first,
@@ -31,7 +31,7 @@ EXPLANATION = 2_000
 ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
 SHOW_REPLY = "--reply shows them."
-MOST_REPLY = 100_000  # characters of a text of a reply
+SHOWN_REPLY_CHARACTERS = 100_000  # characters of a text of a reply
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
@@ -48,7 +48,7 @@ def _program_line(program: Mapping[str, Any]) -> Text:
     same = len(program["indices"])
     often = Text(f"x{same:,}  " if same > 1 else "")
     if program["gone"]:
-        often.append(f"{GONE}\n", "yellow")
+        often.append(f"{PROGRAM_GONE}\n", "yellow")
     if program["passed"]:
         return often.append("passed", "green")
     text = Text.assemble(often, kind_view(program["failure"]))
@@ -104,7 +104,7 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     if data["model"] is not None:
         head.append(f"\nwritten by {visible(data['model'])}{by_hand([data['model']])}", "dim")
     if data["program"] is None:
-        return head.append(f"\n{GONE}", "yellow")
+        return head.append(f"\n{PROGRAM_GONE}", "yellow")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
     if origin is not None:
         head.append(f"\n{origin}", "dim")
@@ -122,7 +122,11 @@ def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[Rendera
     there = {name: text for name, text in texts.items() if text}
     if with_texts:
         for name, text in there.items():
-            parts += [Text(), Text(f"{name}:", "bold"), Text(shortened(text, MOST_REPLY, visible_lines))]
+            parts += [
+                Text(),
+                Text(f"{name}:", "bold"),
+                Text(shortened(text, SHOWN_REPLY_CHARACTERS, visible_lines)),
+            ]
     elif there:
         long = " and ".join(f"{name} ({len(text):,} characters)" for name, text in there.items())
         parts.append(Text(f"{long}: {SHOW_REPLY}", "dim"))

@@ -24,7 +24,7 @@ from roboeval.evaluation.runs.completions import by_hand, how_many
 if TYPE_CHECKING:
     from roboeval.analysis.broken_rules import BrokenRules
 
-FEW = 3  # tasks that are named; of more, their number is told
+MAX_TASKS_NAMED = 3  # tasks that are named; of more, their number is told
 
 
 def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
@@ -78,7 +78,11 @@ def _missed(missing: Missing) -> Iterator[Text]:
         ("not selected:", missing.not_selected),
     ]:
         if tasks:
-            named = ", ".join(map(visible, tasks)) if len(tasks) <= FEW else counted(len(tasks), "task")
+            named = (
+                ", ".join(map(visible, tasks))
+                if len(tasks) <= MAX_TASKS_NAMED
+                else counted(len(tasks), "task")
+            )
             yield Text(f"{reason} {named}", style="dim")
 
 

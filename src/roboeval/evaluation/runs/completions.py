@@ -21,12 +21,12 @@ from roboeval.suites.load import Suite
 COMPLETIONS = "completions.jsonl"
 EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
 
-MOST = 1_000_000_000
-Key: TypeAlias = tuple[str, int, int]
+NUMBER_LIMIT = 1_000_000_000
+CompletionKey: TypeAlias = tuple[str, int, int]
 KEY = ("task", "prompt", "index")  # as columns of tables and names in rows
 REQUIRED = (*KEY, "program")
 FIELDS = (*REQUIRED, "instruction", "model")
-NO_PROGRAM = "no_program"  # its column
+NO_PROGRAM_COLUMN = "no_program"  # its column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,16 +56,18 @@ class Completion:
 
     def __post_init__(self) -> None:
         for name, number in (("prompt", self.prompt), ("index", self.index)):
-            if type(number) is not int or not 0 <= number < MOST:
+            if type(number) is not int or not 0 <= number < NUMBER_LIMIT:
                 raise UserError(
-                    f"the {name} is {number!r}, but must be a whole number from 0 to {MOST - 1:,}"
+                    f"the {name} is {number!r}, but must be a whole number from 0 to {NUMBER_LIMIT - 1:,}"
                 )
         for name in ("task", "program", "instruction", "model"):
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
                 raise UserError(f"the {name} is {text!r}, not a text")
-        if (kind := self.more.get(NO_PROGRAM)) not in (None, *NO_PROGRAM_KINDS):
-            raise UserError(f'"{NO_PROGRAM}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}')
+        if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
+            raise UserError(
+                f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}'
+            )
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:
@@ -88,7 +90,7 @@ class Completion:
         return {name: value for name, value in known.items() if value is not None} | dict(self.more)
 
     @property
-    def key(self) -> Key:
+    def key(self) -> CompletionKey:
         """What no other row of a run shares."""
         return self.task, self.prompt, self.index
 
@@ -112,8 +114,8 @@ class Completion:
         Raises:
             EngineError: no isolated process can be started.
         """
-        if NO_PROGRAM in self.more:
-            kind: NoProgram | None = self.more[NO_PROGRAM]
+        if NO_PROGRAM_COLUMN in self.more:
+            kind: NoProgram | None = self.more[NO_PROGRAM_COLUMN]
             return kind
         reply = self.more.get("raw_reply")
         is_chat = isinstance(reply, str) and not (self.model or "").startswith("completions:")
@@ -127,7 +129,7 @@ class Completion:
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
 
 
-def reply_row(key: Key, instruction: str, model: str, reply: Reply) -> dict[str, Any]:
+def reply_row(key: CompletionKey, instruction: str, model: str, reply: Reply) -> dict[str, Any]:
     """The row of completions.jsonl for a model's reply to the instruction of a key."""
     of_whom = {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model}
     return {**of_whom, **reply.data()}
@@ -155,7 +157,7 @@ def read_completions(
     """
     path = Path(path)
     name = name or path
-    seen: dict[Key, int] = {}  # the lines
+    seen: dict[CompletionKey, int] = {}  # the lines
     try:
         for number, line in read_lines(path, name=name):
             try:
@@ -197,7 +199,7 @@ def _is_of_other(completion: Completion, suite: Suite) -> str | None:
     )
 
 
-def _expect_new(key: Key, seen: dict[Key, int], number: int) -> None:
+def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int) -> None:
     first_line = seen.setdefault(key, number)
     if first_line != number:
         raise UserError(f"{name_of(key)} is here again; it was already in line {first_line}")
@@ -210,7 +212,7 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
         raise UserError(sentence, file=str(file), line=line)
 
 
-def unknown(key: Key, suite: Suite) -> str | None:
+def unknown(key: CompletionKey, suite: Suite) -> str | None:
     """What is wrong with a completion's task or prompt, as a user of Python may give it; None if nothing."""
     task = suite.tasks.get(str(key[0]))
     if task is None:
@@ -222,7 +224,7 @@ def unknown(key: Key, suite: Suite) -> str | None:
     return None if 0 <= key[1] < len(task.prompts) else f"{name_of(key)}: {there_are}"
 
 
-def name_of(key: Key) -> str:
+def name_of(key: CompletionKey) -> str:
     """How a person names a row: TASK/PROMPT/INDEX."""
     return "/".join(map(str, key))
 

@@ -22,7 +22,7 @@ RULES = "-rules-"  # between a suite and house rules, in the name of an evaluati
 
 
 @dataclass(frozen=True)
-class Run:
+class RunFolder:
     """The folder of a run."""
 
     path: Path
@@ -154,17 +154,17 @@ class Run:
                 raise
 
 
-PATIENCE = 20  # times that a lock is tried
-PAUSE = 0.05  # seconds between two
+LOCK_ATTEMPTS = 20  # times that a lock is tried
+LOCK_PAUSE_SECONDS = 0.05  # seconds between two
 
 
 def _locked(descriptor: int) -> bool:
     """Lock a file; children of a process that was killed may hold it for a moment longer."""
-    for _ in range(PATIENCE):
+    for _ in range(LOCK_ATTEMPTS):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            time.sleep(PAUSE)
+            time.sleep(LOCK_PAUSE_SECONDS)
         else:
             return True
     return False
@@ -188,7 +188,7 @@ def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
     return None if tasks is None else frozenset(tasks)
 
 
-def about_of(run: Run) -> dict[str, Any]:
+def about_of(run: RunFolder) -> dict[str, Any]:
     """The content of a run's run.json; nothing if there is none."""
     return load_head(run.about) if run.about.exists() else {}
 
@@ -214,7 +214,7 @@ def tasks_to_judge(
     return kept, left
 
 
-def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
+def as_judged(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
     """The suite with the worlds in which a run was judged, if other ones were drawn then."""
     path = run.head(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
@@ -228,12 +228,12 @@ def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
 
 def evaluation_of(
     path: Path, suite: Suite, *, ablated: bool, again: str = "roboeval evaluate"
-) -> tuple[Run, str, Suite]:
+) -> tuple[RunFolder, str, Suite]:
     """A run, the name of its evaluation by a suite, and the suite with the worlds that it had then.
 
     Raises UserError if the suite has not judged it; the command `again` does.
     """
-    run = Run(path)
+    run = RunFolder(path)
     suite = as_judged(run, suite, ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not run.completions.is_file():

@@ -15,13 +15,20 @@ from typing import TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, read_text, text_of
 from codebotler.core.program import parse
-from roboeval.evaluation.runs.completions import KEY, Completion, Key, check_length, name_of, unknown
+from roboeval.evaluation.runs.completions import (
+    KEY,
+    Completion,
+    CompletionKey,
+    check_length,
+    name_of,
+    unknown,
+)
 from roboeval.suites.load import Suite
 
 MAX_UNPACKED = 1_000_000_000
-NAME = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
+PROGRAM_FILE_NAME = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
 NAMED = "TASK_PROMPT_INDEX.py, such as LunchTime_0_1.py"
-UNREADABLE = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError)
+UNREADABLE_ZIP = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError)
 
 File: TypeAlias = tuple[str, Callable[[], str]]  # its name, and what reads its text
 
@@ -56,11 +63,11 @@ def passed_over(path: Path) -> str | None:
 
 
 def _match(name: str) -> re.Match[str] | None:
-    return NAME.fullmatch(PurePosixPath(name).name)
+    return PROGRAM_FILE_NAME.fullmatch(PurePosixPath(name).name)
 
 
-def _by_key(files: Iterator[File], path: Path) -> dict[Key, File]:
-    by_key: dict[Key, File] = {}
+def _by_key(files: Iterator[File], path: Path) -> dict[CompletionKey, File]:
+    by_key: dict[CompletionKey, File] = {}
     for file in files:
         if match := _match(file[0]):
             key = match["task"], int(match["prompt"]), int(match["index"])
@@ -81,7 +88,7 @@ def _files(path: Path) -> Iterator[Iterator[File]]:
         return
     try:
         archive = zipfile.ZipFile(path)
-    except UNREADABLE as error:
+    except UNREADABLE_ZIP as error:
         raise UserError(f"is not a readable zip ({error})", file=path) from None
     with archive:
         yield _members(path, archive)
@@ -99,7 +106,7 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
         try:
             with archive.open(member) as file:
                 data = file.read(MAX_ROW + 1)
-        except UNREADABLE as error:
+        except UNREADABLE_ZIP as error:
             raise UserError(f"is not a readable zip ({error})", file=path) from None
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:

@@ -11,7 +11,7 @@ from roboeval.evaluation.runs.completions import Completion
 
 TOKENS = ("input_tokens", "output_tokens", "reasoning_tokens")
 REPLY_TEXTS = ("reasoning", "raw_reply")
-MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
+MAX_RECORDED = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
 
 
 def reply_data(completion: Completion | None) -> dict[str, Any] | None:
@@ -51,4 +51,4 @@ def reply_facts(reply: Mapping[str, Any]) -> list[str]:
 def number_or_none(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
     """A number of a row, from 0; None for anything else."""
     is_number = isinstance(value, kind) and not isinstance(value, bool)
-    return value if is_number and 0 <= value <= MOST else None
+    return value if is_number and 0 <= value <= MAX_RECORDED else None

@@ -15,8 +15,8 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from roboeval.evaluation.requests import requested_tasks
-from roboeval.evaluation.runs.completions import Completion, Key, read_completions
-from roboeval.evaluation.runs.folder import Run, evaluation_of, load_head, selected_tasks
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, read_completions
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_head, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
 from roboeval.evaluation.runs.scope import JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
@@ -62,17 +62,19 @@ def load_results(
 class Results:
     """One evaluation of a run, with its table."""
 
-    run: Run
+    run: RunFolder
     key: str | None
     suite: Suite | None  # None if it is not at hand
     head: Mapping[str, Any]  # KEY.json: by what was judged
     about: Mapping[str, Any]  # run.json: how the completions were asked for
-    completions: Mapping[Key, Completion]  # those in the run now, in order
-    places: Mapping[Key, tuple[int, int]] = field(repr=False)  # first byte and size of each row in the file
-    passed: Sequence[Key] = field(repr=False)
-    stale: Sequence[Key]  # whose verdicts are on other programs than stand in the run now
+    completions: Mapping[CompletionKey, Completion]  # those in the run now, in order
+    places: Mapping[CompletionKey, tuple[int, int]] = field(
+        repr=False
+    )  # first byte and size of each row in the file
+    passed: Sequence[CompletionKey] = field(repr=False)
+    stale: Sequence[CompletionKey]  # whose verdicts are on other programs than stand in the run now
     table: pl.DataFrame  # as `load_results` gives it
-    failed: Mapping[Key, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
+    failed: Mapping[CompletionKey, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
     faults: tuple[UserError, ...] = ()
 
     @property
@@ -100,12 +102,12 @@ class Results:
         return (self.key or "").endswith(ABLATED)
 
     @property
-    def programs(self) -> Mapping[Key, str]:
+    def programs(self) -> Mapping[CompletionKey, str]:
         """The programs that were judged, but those that have changed or are gone since."""
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
-    def row(self, key: Key) -> Row:
+    def row(self, key: CompletionKey) -> Row:
         """Read a row again, with all its traces; raises UserError if the file was written anew."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
@@ -119,7 +121,7 @@ class Results:
             pass
         raise UserError("was replaced meanwhile; try again", file=path)
 
-    def failed_row(self, key: Key) -> Row:
+    def failed_row(self, key: CompletionKey) -> Row:
         """The row of a completion that failed, without traces of worlds that did not decide."""
         row: Row = json.loads(self.failed[key])
         return row
@@ -136,7 +138,7 @@ def no_progress(lines: Iterator[LocatedRow], _total: int) -> Iterable[LocatedRow
 
 
 def read_results(
-    run: Run,
+    run: RunFolder,
     key: str | None,
     suite: Suite | None = None,
     *,
@@ -151,7 +153,7 @@ def read_results(
         (reuse_from.about, reuse_from.completions) if reuse_from else read_written(run, faults)
     )
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
-    failed: dict[Key, bytes] = {}
+    failed: dict[CompletionKey, bytes] = {}
 
     def add(row: Row) -> None:
         builder.add(row)
@@ -196,7 +198,9 @@ def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
     }
 
 
-def _accepted(run: Run, key: str | None, faults: list[UserError] | None) -> Mapping[tuple[str, str], bool]:
+def _accepted(
+    run: RunFolder, key: str | None, faults: list[UserError] | None
+) -> Mapping[tuple[str, str], bool]:
     """Whether the check found no problem, by task and hash of the program, where it was asked."""
     path = run.checks((key or "").removesuffix(ABLATED))
     accepted: dict[tuple[str, str], bool] = {}
@@ -210,20 +214,20 @@ def _accepted(run: Run, key: str | None, faults: list[UserError] | None) -> Mapp
 
 
 def read_rows(
-    run: Run,
+    run: RunFolder,
     key: str | None,
-    completions: Iterable[Key],
+    completions: Iterable[CompletionKey],
     add: Callable[[Row], None],
     *,
     faults: list[UserError] | None = None,
     on_line: Callable[[bytes], None] | None = None,
     progress: ShowProgress = no_progress,
-) -> tuple[Mapping[str, Any], Mapping[Key, tuple[int, int]]]:
+) -> tuple[Mapping[str, Any], Mapping[CompletionKey, tuple[int, int]]]:
     """Add each row of an evaluation; return its head, and where each row is in the file."""
     head = {} if key is None else _head(run.head(key), faults)
     tasks = selected_tasks(head)
     total = sum(tasks is None or task in tasks for task, _, _ in completions)
-    places: dict[Key, tuple[int, int]] = {}
+    places: dict[CompletionKey, tuple[int, int]] = {}
     lines = iter(()) if key is None else read_lines_of(run.rows(key), head, on_line=on_line, faults=faults)
     for line in progress(lines, total):
         add(line.row)
@@ -232,8 +236,8 @@ def read_rows(
 
 
 def read_written(
-    run: Run, faults: list[UserError] | None
-) -> tuple[Mapping[str, Any], Mapping[Key, Completion]]:
+    run: RunFolder, faults: list[UserError] | None
+) -> tuple[Mapping[str, Any], Mapping[CompletionKey, Completion]]:
     """How a run's completions were asked for, and they themselves."""
     about = _head(run.about, faults) if run.about.exists() else {}
     completions = read_completions(run.completions, growing=True, faults=faults)

@@ -18,7 +18,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
 
 LONGEST_LINE = 1_000_000_000  # bytes of a row that was written before rows were bounded
-KINDS = frozenset(SKILLS.recordings)
+EVENT_KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is not a row of an evaluation"
 BROKEN = "was damaged or changed after the evaluation was finished"
 # The group is an escape of half a surrogate pair; the rest is what looks like one.
@@ -148,7 +148,7 @@ def _expect_consistent(row: Row, data: object) -> None:
 def _expect_known_kinds(row: Row) -> None:
     for verdict in row["verdicts"]:
         for event in verdict["trace"]:
-            if event[0] not in KINDS and by_event(event[0]) is None:
+            if event[0] not in EVENT_KINDS and by_event(event[0]) is None:
                 raise ValueError(
                     f'"{event[0]}" is not a kind of event; name the file of its skill with --skills'
                 )

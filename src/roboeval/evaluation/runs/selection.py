@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.suites.load import Suite
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Selection:
         return "/".join(str(part) for part in (self.task, self.prompt, self.index) if part is not None)
 
     @property
-    def key(self) -> Key:
+    def key(self) -> CompletionKey:
         """The completion that it is, where it has all three parts."""
         assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - one thing
         return self.task, self.prompt, self.index

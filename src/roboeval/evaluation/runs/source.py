@@ -10,7 +10,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines
 from codebotler.models.recorded import RECORDED_NAMES, RecordedModel, open_recorded
 from roboeval.evaluation.runs.completions import COMPLETIONS, EXAMPLE, Completion, read_completions
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.published import passed_over, published_completions
 from roboeval.suites.load import Suite
 
@@ -20,7 +20,7 @@ class Source:
     """Completions that somebody names."""
 
     completions: Sequence[Completion]  # each known to the suite
-    run: Run | None = None  # in which they stand
+    run: RunFolder | None = None  # in which they stand
     left_aside: str | None = None  # a warning about files that are none
 
     def of(self, tasks: frozenset[str] | None) -> list[Completion]:
@@ -40,7 +40,7 @@ def open_source(text: str, suite: Suite) -> Source:
             "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
         )
     if (path / COMPLETIONS).is_file():
-        return Source([*Run(path).read(suite)], Run(path))
+        return Source([*RunFolder(path).read(suite)], RunFolder(path))
     if path.is_dir() or path.suffix == ".zip":
         return Source([*published_completions(path, suite)], left_aside=passed_over(path))
     if path.suffix == ".py":

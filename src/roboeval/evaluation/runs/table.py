@@ -11,13 +11,13 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
-from roboeval.evaluation.runs.completions import KEY, NO_PROGRAM, Completion, Key
+from roboeval.evaluation.runs.completions import KEY, NO_PROGRAM_COLUMN, Completion, CompletionKey
 from roboeval.evaluation.runs.replies import TOKENS, number_or_none
 from roboeval.evaluation.runs.rows import Row, event_count, key_of
 
 Tokens = TypeVar("Tokens", float, pl.Expr)
 MILLION = 1_000_000
-CHUNK = 10_000  # rows of the table that are held as Python objects at one time
+CHUNK_ROWS = 10_000  # rows of the table that are held as Python objects at one time
 
 COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "task": pl.String,
@@ -87,7 +87,7 @@ def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
     return table.with_columns(cost=price.of(pl.col("input_tokens"), pl.col("output_tokens")))
 
 
-def keys_where(table: pl.DataFrame, column: str) -> list[Key]:
+def keys_where(table: pl.DataFrame, column: str) -> list[CompletionKey]:
     """The completions for which a column about them is true."""
     return [*table.filter(pl.col(column), pl.col("world_number") == 0).select(KEY).iter_rows()]
 
@@ -108,7 +108,7 @@ class TableBuilder:
 
     def __init__(
         self,
-        completions: Mapping[Key, Completion] = {},  # those in the run now
+        completions: Mapping[CompletionKey, Completion] = {},  # those in the run now
         categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and text
         accepted: Mapping[tuple[str, str], bool] = {},  # by task and hash of the program
     ) -> None:
@@ -123,7 +123,7 @@ class TableBuilder:
 
     def add(self, row: Row) -> None:
         """Add a completion with its verdicts."""
-        if len(self._worlds) >= CHUNK:
+        if len(self._worlds) >= CHUNK_ROWS:
             self._store()
         written = self._completions.get(key_of(row))
         is_stale = written is None or written.program_sha256 != row["program_sha256"]
@@ -178,7 +178,7 @@ class TableBuilder:
 
 def _texts(written: Completion) -> tuple[str | bool | None, ...]:
     """The instruction, the program, and how its reply ended, where that was recorded."""
-    said = written.instruction, written.program, written.more.get(NO_PROGRAM), written.finish_reason
+    said = written.instruction, written.program, written.more.get(NO_PROGRAM_COLUMN), written.finish_reason
     is_cut_off = None if written.finish_reason is None else written.is_cut_off
     return *(None if text is None else storable(text) for text in said), is_cut_off
 
@@ -200,20 +200,20 @@ def storable(text: str) -> str:
 # --- as a file
 
 
-FORMATS = ("csv", "parquet")
+TABLE_FORMATS = ("csv", "parquet")
 BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # of files in these formats
 
 
 def kind_of(path: Path | None) -> str:
     """The format of a file's ending; csv if it has none of them."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
-    return ending if ending in FORMATS else FORMATS[0]
+    return ending if ending in TABLE_FORMATS else TABLE_FORMATS[0]
 
 
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
     """Write a table to a file as csv or parquet; the same table gives the same bytes."""
-    if kind not in FORMATS:
-        raise UserError(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
+    if kind not in TABLE_FORMATS:
+        raise UserError(f'there is no format "{kind}"; choose one of {", ".join(TABLE_FORMATS)}')
     if not path.parent.is_dir():
         raise UserError("there is no such folder", file=path.parent)
     content = io.BytesIO()

@@ -20,7 +20,7 @@ from codebotler.core.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.completions import Completion, read_completions
-from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+from roboeval.evaluation.runs.folder import RunFolder, tasks_to_judge
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import open_source, recorded_completions
 from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
@@ -31,23 +31,23 @@ GREETS = 'def task_program():\n    say("good day")\n'
 ADDRESS = "def task_program():\n    say(str(object()))\n    say(str(id([])))\n    say(str({'a', 'b', 'c'}))\n"
 
 
-def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> Run:
+def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> RunFolder:
     path.mkdir(parents=True)
     rows = [
         {"task": task, "prompt": 0, "index": index, "program": program}
         for index, program in enumerate(programs)
     ]
-    run = Run(path)
+    run = RunFolder(path)
     run.completions.write_bytes(b"".join(map(to_line, rows)))
     return run
 
 
-def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[Row]:
+def judged(run: RunFolder, suite: Suite, *, redo: bool = False) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
 
 
-def careful_run(path: Path, suite: Suite) -> Run:
-    run = Run(path)
+def careful_run(path: Path, suite: Suite) -> RunFolder:
+    run = RunFolder(path)
     run.keep([*recorded_completions("recorded:careful", suite)])
     return run
 
@@ -334,7 +334,7 @@ def test_a_run_that_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
     for path in (tmp_path / "there" / "run", tmp_path / "new" / "run", tmp_path / "there"):
         one = Completion(task="SayGoodDay", prompt=0, index=0, program=GREETS)
         with pytest.raises(KeyboardInterrupt):
-            Run(path).keep(Interrupted([one]))
+            RunFolder(path).keep(Interrupted([one]))
     assert sorted(path.name for path in tmp_path.rglob("*")) == [".lock", "there"]
 
 
@@ -387,7 +387,7 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     row = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": GREETS, "usage": {"output": 7}}
     path = tmp_path / "rows.jsonl"
     path.write_bytes(to_line(row))
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     run.keep(open_source(str(path), paper).completions)
     assert [c.row for c in read_completions(run.completions)] == [row]
     assert Completion.of(row).key == ("SayGoodDay", 0, 0)
