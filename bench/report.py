@@ -65,7 +65,7 @@ def made_up(folder: Path, number: int, suite: Suite) -> RunFolder:
     run.rows("paper").parent.mkdir(parents=True)
     about = {"model": f"model-{number}", "settings": {"temperature": 0.2}, "codebotler": "0.1.0"}
     run.about.write_bytes(to_text(about))
-    run.head("paper").write_bytes(to_text(evaluation_metadata(suite)))
+    run.manifest("paper").write_bytes(to_text(evaluation_metadata(suite)))
     with run.completions.open("wb") as completions, run.rows("paper").open("wb") as judged:
         for (task, prompt), those in by_prompt.items():
             for index in range(COMPLETIONS):

@@ -50,7 +50,7 @@ def made_up(folder: Path) -> RunFolder:
     with run.rows("paper").open("rb") as judged:
         for line in judged:
             seal.add(line)
-    run.head("paper").write_bytes(to_text({**evaluation_metadata(suite), **seal.data()}))
+    run.manifest("paper").write_bytes(to_text({**evaluation_metadata(suite), **seal.data()}))
     return run
 
 

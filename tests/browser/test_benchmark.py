@@ -406,7 +406,7 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
             row["failure"] |= {"class": whole[:300], "kind": whole[:300], "check": check}
 
     changed(run, make_evil)
-    head = json.loads(run.head("paper").read_text())
+    head = json.loads(run.manifest("paper").read_text())
     shutil.copy(run.rows("paper"), run.rows(name))
     with serving(run.path.parent) as server:
         for size in (DESK, PHONE) if len(evil) > LONGEST else (PHONE,):

@@ -111,7 +111,7 @@ def results_of(
         run=RunFolder(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",
         suite=suite,
-        head=head,
+        manifest=head,
         about={},
         completions=written,
         table=table,

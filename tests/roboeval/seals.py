@@ -11,6 +11,6 @@ from roboeval.evaluation.runs.folder import RunFolder
 
 def unseal(run: Path, key: str = "paper") -> None:
     """Let an evaluation be one that was not finished, whose rows may be any."""
-    path = RunFolder(run).head(key)
+    path = RunFolder(run).manifest(key)
     head = json.loads(path.read_text())
     path.write_bytes(to_text({name: value for name, value in head.items() if name not in {"rows", "sha256"}}))

@@ -20,9 +20,9 @@ from roboeval.cli.options import (
     RunArgument,
     SuiteOption,
     WorkersOption,
-    named,
+    path_argument,
 )
-from roboeval.cli.output import fail, note, print_json, print_rich, watched
+from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
 if TYPE_CHECKING:
     import polars as pl
@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 def compare(
     runs: Annotated[
         list[Path],
-        typer.Argument(help="Two runs that were judged; with --suites, one or more.", parser=named("a run")),
+        typer.Argument(
+            help="Two runs that were judged; with --suites, one or more.", parser=path_argument("a run")
+        ),
     ],
     suite: SuiteOption = "paper",
     suites: Annotated[
@@ -139,17 +141,17 @@ def resample(
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
         results = open_current(run, suite, ablated=False, rules=rules).results
         checker = engine_for(len(results.places))
-        prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
+        prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
     coverage = results.scope.coverage(len(results.places))
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
-        of = {"suite": results.head["suite"], "samples": samples, "seed": seed, **asdict(coverage)}
+        of = {"suite": results.manifest["suite"], "samples": samples, "seed": seed, **asdict(coverage)}
         print_json({**of, **curve_data(prompts, limits)})
     else:
         print_rich(resample_view(prompts, limits, title=str(run), coverage=coverage))
 
 
-def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
+def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
     """The table of a run with the answers of the check to each program; the run keeps the answers."""
     from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
@@ -157,4 +159,4 @@ def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEn
     judged = [results.completions[key] for key in results.places]
     different = {(completion.task, completion.program) for completion in judged}
     checking = check_programs(results.run, results.known_suite, judged, engine, samples=samples, seed=seed)
-    return with_answers(results.table, dict(watched(checking, "checking", len(different))))
+    return with_answers(results.table, dict(show_progress(checking, "checking", len(different))))

@@ -29,13 +29,13 @@ from roboeval.cli.options import (
     WorkersOption,
     WorldSeedOption,
     WorldsOption,
-    named,
+    path_argument,
 )
-from roboeval.cli.output import fail, metered, note, watched
+from roboeval.cli.output import fail, note, progress_meter, show_progress
 from roboeval.cli.show import house_of, print_summary
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.batches import Imported
+    from roboeval.evaluation.batches import ImportResult
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.evaluation.runs.folder import RunFolder
@@ -81,7 +81,7 @@ def evaluate(
         tally, table, is_started = Tally(), None if rules is None else _new_table(), False
         run = None if out is None else RunFolder(out)
         try:
-            opened = opened_source(source, judged_by)
+            opened = open_named_source(source, judged_by)
             run = run or opened.run
             about = {} if opened.run is None else about_of(opened.run)
             scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
@@ -91,7 +91,7 @@ def evaluate(
                 run.keep(opened.completions)
             running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
-            for row in watched(rows, "judging", scope.total):
+            for row in show_progress(rows, "judging", scope.total):
                 is_started = True
                 tally.add(row)
                 if table is not None:
@@ -100,7 +100,7 @@ def evaluate(
             house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
         except KeyboardInterrupt:
-            note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
+            note(f"roboeval: {stop_sentence(is_kept=run is not None, is_started=is_started, redo=redo)}")
             raise SystemExit(STOPPED) from None
         if run is not None:
             _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
@@ -133,7 +133,7 @@ def _name_next_command(
     note(f"verdicts are in {run.path}; `{again}` {does}")
 
 
-def opened_source(text: str, suite: Suite) -> Source:
+def open_named_source(text: str, suite: Suite) -> Source:
     """Completions that a user names; note which files were left aside."""
     from roboeval.evaluation.runs.source import open_source
 
@@ -143,7 +143,7 @@ def opened_source(text: str, suite: Suite) -> Source:
     return source
 
 
-def after_a_stop(*, is_kept: bool, is_started: bool, redo: bool) -> str:
+def stop_sentence(*, is_kept: bool, is_started: bool, redo: bool) -> str:
     """What Ctrl-C leaves behind, and how to go on."""
     if not is_kept:
         return "stopped; nothing is kept (add --out RUN to keep verdicts)"
@@ -182,7 +182,8 @@ def import_(
         str, typer.Argument(help="A .jsonl, a folder or zip of .py completions, or answers of a batch.")
     ],
     out: Annotated[
-        Path, typer.Option(help="The run folder to create, or for answers theirs.", parser=named("a run"))
+        Path,
+        typer.Option(help="The run folder to create, or for answers theirs.", parser=path_argument("a run")),
     ],
     suite: SuiteOption = "paper",
 ) -> None:
@@ -197,7 +198,7 @@ def import_(
     if is_answers(Path(path)):
         import_batch(Path(path), out, suite)
         return
-    completions = opened_source(path, load(suite)).completions
+    completions = open_named_source(path, load(suite)).completions
     RunFolder(out).keep(completions)
     count = len(completions)
     again = command("evaluate", out, suite=suite)
@@ -214,7 +215,7 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
 
     with path.open("rb") as file:
         count = sum(1 for _ in file)
-    with metered("reading", count) as tell:
+    with progress_meter("reading", count) as tell:
         found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: tell(done, ""))
     missing = len(found.failed) + len(found.unanswered)
     again = command("evaluate", out, suite=suite)
@@ -229,7 +230,7 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
         raise SystemExit(1)
 
 
-def missing_sentences(found: Imported) -> Iterator[str]:
+def missing_sentences(found: ImportResult) -> Iterator[str]:
     """For each error, how many requests ended with it, and which; then those without an answer."""
     by_error: dict[str, list[CompletionKey]] = {}
     for key, error in found.failed.items():

@@ -16,7 +16,7 @@ from roboeval.cli.options import (
     SuiteOption,
     TaskOption,
 )
-from roboeval.cli.output import fail, note, print_json, print_rich, watched
+from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
 if TYPE_CHECKING:
     from roboeval.analysis.search import TraceMatch, TraceQuery
@@ -52,22 +52,22 @@ def find(
     from roboeval.analysis.search import TraceQuery, count_searched, matches_by_task, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import RunFolder, as_judged
+    from roboeval.evaluation.runs.folder import RunFolder, with_judged_worlds
 
     if negated and formula is None:
         fail("--not needs a formula; add one, or leave --not out")
-    known = as_judged(RunFolder(run), load(suite), ablated=ablation)
+    known = with_judged_worlds(RunFolder(run), load(suite), ablated=ablation)
     task = None if task is None else known.task(task).name
     query = TraceQuery(formula, negated, task, world)
     expect_query(query, known, ablated=ablation)
     lines: list[bytes] = []
     results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
-    every = list(watched(search(lines, query, workers=workers or cores()), "looking", len(lines)))
+    every = list(show_progress(search(lines, query, workers=workers or cores()), "looking", len(lines)))
     found = [one for one in every if one.worlds]
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = group_failures(failed, results.programs)
     shown = together if json else together[:most]
-    clusters = list(watched(describe_groups(shown, results), "comparing", len(shown)))
+    clusters = list(show_progress(describe_groups(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if cut := sum(bool(one.cut) for one in every):
         note(f"undecided, since their traces were too long to keep: {how_many(cut)}")

@@ -38,7 +38,7 @@ from roboeval.cli.options import (
     TasksOption,
     WorkersOption,
 )
-from roboeval.cli.output import fail, metered, note
+from roboeval.cli.output import fail, note, progress_meter
 from roboeval.cli.report import report
 from roboeval.cli.rounds import further_rounds
 
@@ -50,11 +50,11 @@ if TYPE_CHECKING:
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import RunFolder
 
-MOST_REQUESTS = 50_000
+MAX_BATCH_REQUESTS = 50_000
 
 
 @dataclass(frozen=True)
-class Requested:
+class GenerationRequest:
     """What a command requests: of which model, and for which run."""
 
     name: str  # of the model
@@ -84,7 +84,7 @@ class Requested:
 
 
 @inherit_options(model_settings)
-def requested(
+def read_options(
     model: ModelOption = None,
     out: OutOption = None,
     num_completions: NumOption = 50,
@@ -97,7 +97,7 @@ def requested(
     token_budget: BudgetOption = None,
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
-) -> Requested:
+) -> GenerationRequest:
     """What options request."""
     from codebotler.models.chosen import choose_model
     from roboeval.evaluation.generate import Pace
@@ -112,7 +112,7 @@ def requested(
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    return Requested(chosen.name, settings, plan, pace, suite, out)
+    return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
 
 
 def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
@@ -127,12 +127,12 @@ def suite_of_families(suite: str, families: str | None, num_tasks: int | None, s
     return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
-def complete(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
+def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
-    meter = Meter()
+    meter = GenerationMeter()
     try:
         with meter:
             progress = generate_run(run, plan, model, pace, on_progress=meter.show)
@@ -147,7 +147,7 @@ def complete(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> 
     return run.path
 
 
-@inherit_options(requested)
+@inherit_options(read_options)
 def generate(
     *,
     requests: RequestsOption = None,
@@ -157,17 +157,17 @@ def generate(
 
     After an interruption, the same command continues.
     """
-    what = requested(**options)
+    what = read_options(**options)
     if requests is not None:
         write_batch(what, requests)
         return
     model = what.open()
     note_unsent(what.settings, model)
-    path = complete(what.run_of(model), what.plan, model, what.pace)
+    path = complete_run(what.run_of(model), what.plan, model, what.pace)
     note(f"the completions are in {path}; `{command('evaluate', path, suite=what.suite)}` judges them")
 
 
-def write_batch(what: Requested, path: Path) -> None:
+def write_batch(what: GenerationRequest, path: Path) -> None:
     """Write the requests of a run to a file, and note how to go on."""
     with installed():
         from codebotler.models.batch import BatchModel
@@ -176,17 +176,17 @@ def write_batch(what: Requested, path: Path) -> None:
     with closing(BatchModel(what.name, what.settings)) as model:
         note_unsent(what.settings, model)
         run = what.run_of(model)
-        with metered("writing", len(what.plan.keys())) as tell:
+        with progress_meter("writing", len(what.plan.keys())) as tell:
             count = write_requests(run, what.plan, model, path, progress=lambda done: tell(done, ""))
     again = command("import", "ANSWERS.jsonl", "--out", run.path, suite=what.suite)
     note(
         f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` takes the answers"
     )
-    if count > MOST_REQUESTS:
-        note(f"OpenAI takes at most {MOST_REQUESTS:,} requests in a file; split it")
+    if count > MAX_BATCH_REQUESTS:
+        note(f"OpenAI takes at most {MAX_BATCH_REQUESTS:,} requests in a file; split it")
 
 
-@inherit_options(requested)
+@inherit_options(read_options)
 def run(
     *,
     tasks: TasksOption = None,
@@ -218,12 +218,12 @@ def run(
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
 
-    what = requested(tasks=tasks, **options)
+    what = read_options(tasks=tasks, **options)
     suite, plan, model = what.suite, what.plan, what.open()
     note_unsent(what.settings, model)
     first = what.run_of(model)
     expect_same_judge(first, plan.suite)  # before anything is paid for
-    path = complete(first, plan, model, what.pace)
+    path = complete_run(first, plan, model, what.pace)
     evaluate(
         str(path),
         suite=suite,
@@ -242,7 +242,7 @@ def run(
                 repair or retries,
                 repairs=bool(repair),
                 engine=lambda: engine_for(0),
-                complete=lambda run, plan: complete(run, plan, what.open(), what.pace),
+                complete=lambda run, plan: complete_run(run, plan, what.open(), what.pace),
             )
     if with_report:
         write_report_of(paths, suite, workers)
@@ -259,7 +259,7 @@ def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
         raise SystemExit(STOPPED) from None
 
 
-class Meter(ExitStack):
+class GenerationMeter(ExitStack):
     """Shows the progress of a run: its rate, its tokens and the time left."""
 
     progress: GenerationProgress | None = None
@@ -271,8 +271,10 @@ class Meter(ExitStack):
             if progress.found:
                 note(f"{progress.found:,} of {counted(progress.total, 'completion')} were there already")
             if progress.interrupted:
-                note(f"{under_way(progress.interrupted)} when this was interrupted, which may be paid twice")
-            self._draw = self.enter_context(metered("generating", progress.total, progress.found))
+                note(
+                    f"{requests_under_way(progress.interrupted)} when this was interrupted, which may be paid twice"
+                )
+            self._draw = self.enter_context(progress_meter("generating", progress.total, progress.found))
         else:
             tokens = progress.usage.total()
             rate = f"{progress.rate:.1f} a second"
@@ -284,10 +286,10 @@ class Meter(ExitStack):
             return "stopped before the first request; run the same command again"
         kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are kept"
         open_requests = self.progress.under_way
-        paid = f"; {under_way(open_requests)}, which may be paid twice" if open_requests else ""
+        paid = f"; {requests_under_way(open_requests)}, which may be paid twice" if open_requests else ""
         return f"stopped; {kept}{paid}; the same command continues where it stopped"
 
 
-def under_way(requests: int) -> str:
+def requests_under_way(requests: int) -> str:
     """Such as `1 request was under way`."""
     return f"{counted(requests, 'request')} {'was' if requests == 1 else 'were'} under way"

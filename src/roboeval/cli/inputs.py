@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from codebotler.core.words import counted
-from roboeval.cli.output import note, watched
+from roboeval.cli.output import note, show_progress
 
 if TYPE_CHECKING:
     from roboeval.evaluation.runs.folder import RunFolder
@@ -68,7 +68,7 @@ def expect_same_suite(opened: Sequence[Opened]) -> None:
     """Raise UserError if runs were judged by suites of different content."""
     from codebotler.core.errors import UserError
 
-    digests = [str(one.results.head.get("digest")) for one in opened]
+    digests = [str(one.results.manifest.get("digest")) for one in opened]
     if len({*digests}) == 1:
         return
     now = opened[0].results.known_suite.digest
@@ -88,16 +88,18 @@ def open_run(
     *,
     ablated: bool,
     rules: Path | None = None,
+    completion: str | None = None,
     reuse_from: Results | None = None,
     on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run; `on_line` is called with each line of its verdicts.
+    """Read a judged run, or only its rows on the task of a completion.
 
-    The completions are taken over from `reuse_from`, another evaluation of the same run.
+    `on_line` is called with each line of its verdicts; `reuse_from` is another evaluation of the run.
     """
     from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
+    from roboeval.evaluation.runs.selection import parse_selection
 
     again = command("evaluate", run, suite=suite_name, ablated=ablated, rules=rules)
     folder, key, suite = evaluation_of(run, load(suite_name, rules), ablated=ablated, again=again)
@@ -105,19 +107,20 @@ def open_run(
         folder,
         key,
         suite,
+        task=parse_selection(completion, suite).task,
         reuse_from=reuse_from,
         on_line=on_line,
-        progress=lambda lines, total: watched(lines, "reading", total),
+        progress=lambda lines, total: show_progress(lines, "reading", total),
     )
     if suite.house is not None and rules is not None:
-        judged_by = results.head.get("house_rules") or {}
+        judged_by = results.manifest.get("house_rules") or {}
         if judged_by.get(suite.house.name) != suite.house.digest:
             raise UserError(
                 f"has changed since the run was judged; `{again} --redo` judges by it", file=rules
             )
-    if results.head.get("digest") != suite.digest:
+    if results.manifest.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
-    more = _to_go_on(results, suite)
+    more = _continue_options(results, suite)
     return Opened(results, command("evaluate", run, *more, suite=suite_name, ablated=ablated, rules=rules))
 
 
@@ -137,16 +140,16 @@ def open_current(
     from codebotler.core.errors import UserError
 
     opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from, on_line=on_line)
-    if (complaint := complaint_of(opened.results)) is not None:
+    if (complaint := stale_sentence(opened.results)) is not None:
         raise UserError(f"{complaint}; `{opened.again} --redo` judges the current programs")
     if opened.results.table.is_empty():
         raise UserError(f"no completion has been judged; `{opened.again}` continues", file=run)
-    if (unfinished := unfinished_of(opened.results)) is not None:
+    if (unfinished := unfinished_sentence(opened.results)) is not None:
         note(f"{unfinished}, and only those count; `{opened.again}` continues")
     return opened
 
 
-def complaint_of(results: Results) -> str | None:
+def stale_sentence(results: Results) -> str | None:
     """A sentence about rows whose programs are no longer in the run; None without such rows."""
     from roboeval.evaluation.runs.completions import name_of
 
@@ -157,7 +160,7 @@ def complaint_of(results: Results) -> str | None:
     return f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
 
 
-def unfinished_of(results: Results) -> str | None:
+def unfinished_sentence(results: Results) -> str | None:
     """A clause about completions that are not judged yet; None without such completions."""
     from roboeval.evaluation.runs.completions import how_many
 
@@ -165,12 +168,12 @@ def unfinished_of(results: Results) -> str | None:
     return None if count >= total else f"{count:,} of {how_many(total)} judged"
 
 
-def _to_go_on(results: Results, suite: Suite) -> list[str]:
+def _continue_options(results: Results, suite: Suite) -> list[str]:
     """Options with which a command goes on with an evaluation."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
     words = []
-    every = tasks_to_judge(suite, None, ablated=bool(results.head.get("ablation")))[0]
+    every = tasks_to_judge(suite, None, ablated=bool(results.manifest.get("ablation")))[0]
     if results.tasks is not None and results.tasks != every:
         words += ["--tasks", ",".join(sorted(results.tasks))]
     if suite.with_own_worlds().digest != suite.digest:

@@ -12,8 +12,8 @@ import typer
 
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import load
-from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, named
-from roboeval.cli.output import note, print_rich, watched
+from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, path_argument
+from roboeval.cli.output import note, print_rich, show_progress
 
 if TYPE_CHECKING:
     from roboeval.mutation.mutants import Original
@@ -53,7 +53,9 @@ def mutate(
     ] = 400,
     out: Annotated[
         Path | None,
-        typer.Option(help="Keep scores, mutants and survivors in this folder.", parser=named("a folder")),
+        typer.Option(
+            help="Keep scores, mutants and survivors in this folder.", parser=path_argument("a folder")
+        ),
     ] = None,
     brief: Annotated[bool, typer.Option("--brief", help="Only the tables, without the survivors.")] = False,
     at_least: Annotated[
@@ -71,9 +73,9 @@ def mutate(
     from roboeval.mutation.trials import mutation_score
 
     known = load(suite)
-    wanted = wanted_tasks(known, tasks)
+    wanted = select_tasks(known, tasks)
     further = named_programs(also or [], known)
-    score = partial(mutation_score, worlds=worlds, most=most, seed=seed, progress=watched)
+    score = partial(mutation_score, worlds=worlds, most=most, seed=seed, progress=show_progress)
     with WorkerPool(workers or cores(), one_process_per_run=one_process_per_run) as pool:
         scores = [score(task, known, pool, further=further.get(task.name, ())) for task in wanted]
     show_scores(scores, known.name, brief=brief)
@@ -84,7 +86,7 @@ def mutate(
         raise SystemExit(1)
 
 
-def wanted_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
+def select_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
     """The tasks that a user names, also with commas, as other commands take them after --tasks."""
     names = [name for word in words or suite.tasks for name in word.split(",")]
     return [suite.task(name) for name in dict.fromkeys(names)]

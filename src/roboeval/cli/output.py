@@ -10,23 +10,23 @@ from typing import NoReturn, TypeVar
 
 from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, print_text, progress
 
-__all__ = ["fail", "metered", "note", "print_json", "print_rich", "print_text", "watched"]
+__all__ = ["fail", "note", "print_json", "print_rich", "print_text", "progress_meter", "show_progress"]
 
 MIN_DONE_FOR_ESTIMATE = 5  # things that must be done before it is told how long the rest takes
 
 Watched = TypeVar("Watched")
 
 
-def watched(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
+def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
     """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
-    with metered(doing, total) as tell:
+    with progress_meter(doing, total) as tell:
         for done, item in enumerate(items, 1):
             yield item
             tell(done, "")  # only now it is done: who is interrupted by what this says has the item
 
 
 @contextmanager
-def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
+def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
     """A progress bar, or lines; to be called with how much is done (`before` included) and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.compare import checked
+from roboeval.cli.compare import check_run
 from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
-from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, named
-from roboeval.cli.output import fail, note, watched
+from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, path_argument
+from roboeval.cli.output import fail, note, show_progress
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(help="Runs that were judged.", parser=named("a run"))],
-    out: Annotated[Path, typer.Option(help="The folder to write to.", parser=named("a folder"))],
+    runs: Annotated[list[Path], typer.Argument(help="Runs that were judged.", parser=path_argument("a run"))],
+    out: Annotated[Path, typer.Option(help="The folder to write to.", parser=path_argument("a folder"))],
     suite: SuiteOption = "paper",
     published: Annotated[
         bool, typer.Option("--published", help="Add the paper's published causes of failures.")
@@ -80,7 +80,7 @@ def report(
     with busy("putting together"):
         parts = sections(read, with_published=published, prices=prices, command=again)
     written = write_report(*headline(read), parts, out)
-    for _ in watched(written, "writing", pieces(parts)):
+    for _ in show_progress(written, "writing", pieces(parts)):
         pass
     if rules is None:
         note_houses([one.results.run for one in opened], suite)
@@ -106,7 +106,7 @@ def judged_run(
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
-        table = checked(results, engine=engine)
+        table = check_run(results, engine=engine)
     if beside is not None:
         other = open_current(run.path, beside, ablated=False, reuse_from=results).results
     if rules is not None:

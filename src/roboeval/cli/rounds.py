@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from codebotler.core.terminal import print_rich
-from roboeval.cli.output import watched
+from roboeval.cli.output import show_progress
 
 if TYPE_CHECKING:
     from roboeval.cli.views.rounds import Round
@@ -68,7 +68,7 @@ def _rejected(
 
     programs = {(one.task, one.program_sha256) for one in completions.values()}
     checking = check_programs(run, plan.suite, completions.values(), engine, samples=5, seed=0)
-    problems = dict(watched(checking, "checking", len(programs)))
+    problems = dict(show_progress(checking, "checking", len(programs)))
     for key, one in completions.items():
         if listed := problems[one.task, one.program_sha256]:
             yield key, listed
@@ -93,7 +93,7 @@ def _round(
 
     rows = evaluate_run(run, plan.suite, ablated=False, tasks=plan.tasks, redo=False, engine=engine)
     tally, usage = Tally(), no_usage()
-    for row in watched(rows, "judging", len(completions)):
+    for row in show_progress(rows, "judging", len(completions)):
         if key_of(row) in completions:
             tally.add(row)
     requested = [one for one in completions.values() if round_of(one) == number]

@@ -19,14 +19,21 @@ from codebotler.cli.options import (
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import (
     command,
-    complaint_of,
     load,
     note_houses,
     open_current,
     open_run,
-    unfinished_of,
+    stale_sentence,
+    unfinished_sentence,
 )
-from roboeval.cli.options import AblationOption, HouseRulesOption, JsonOption, RunArgument, SuiteOption, named
+from roboeval.cli.options import (
+    AblationOption,
+    HouseRulesOption,
+    JsonOption,
+    RunArgument,
+    SuiteOption,
+    path_argument,
+)
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:
@@ -70,7 +77,7 @@ def show(
     if not is_one and (in_full or with_reply):
         option = "--all" if in_full else "--reply"
         fail(f"{option} applies to one completion; name it as TASK/PROMPT/INDEX, or leave out {option}")
-    judged, again = open_run(run, suite, ablated=ablation, rules=rules)
+    judged, again = open_run(run, suite, ablated=ablation, rules=rules, completion=what if is_one else None)
     selection = parse_selection(what, judged.known_suite)
     if selection.task is None:
         show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
@@ -81,9 +88,9 @@ def show(
     else:
         selection.expect_judged(judged)
         show_part(judged, selection.task, selection.prompt, as_json=json)
-    if (complaint := complaint_of(judged)) is not None:
+    if (complaint := stale_sentence(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
-    if not is_one and (unfinished := unfinished_of(judged)) is not None:
+    if not is_one and (unfinished := unfinished_sentence(judged)) is not None:
         note(f"{unfinished}; `{again}` continues")
 
 
@@ -186,7 +193,8 @@ def export(
         str | None, typer.Option(help="csv or parquet; by default the ending of --out, or csv.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="The file; by default beside the verdicts.", parser=named("a file"))
+        Path | None,
+        typer.Option(help="The file; by default beside the verdicts.", parser=path_argument("a file")),
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
@@ -196,7 +204,7 @@ def export(
 ) -> None:
     """Write a run's verdicts as one flat table."""
     from codebotler.core.files import expect_replaceable
-    from roboeval.evaluation.runs.table import BEGINNINGS, Price, kind_of, with_cost, write_table
+    from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, kind_of, with_cost, write_table
 
     kind = format or kind_of(out)
     try:
@@ -206,7 +214,7 @@ def export(
     results = open_current(run, suite, ablated=ablation).results
     table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
-    expect_replaceable(path, *BEGINNINGS)
+    expect_replaceable(path, *TABLE_BEGINNINGS)
     write_table(table, path, kind)
     note(f"the table is in {path}")
 

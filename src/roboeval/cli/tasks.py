@@ -11,7 +11,7 @@ import typer
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import command, load
 from roboeval.cli.options import JsonOption, SuiteOption
-from roboeval.cli.output import fail, note, print_json, print_rich, print_text, watched
+from roboeval.cli.output import fail, note, print_json, print_rich, print_text, show_progress
 
 if TYPE_CHECKING:
     from roboeval.suites.load import Suite
@@ -95,7 +95,7 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     linted = (lint(one, judge_solutions(one, suite, workers=cores())) for one in wanted)
-    findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
+    findings = [found for several in show_progress(linted, "linting", len(wanted)) for found in several]
     print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)

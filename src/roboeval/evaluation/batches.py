@@ -37,8 +37,8 @@ from roboeval.evaluation.requests import (
     with_batch,
 )
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
-from roboeval.evaluation.runs.folder import RunFolder, load_head
-from roboeval.evaluation.runs.source import LONGEST_ANSWER
+from roboeval.evaluation.runs.folder import RunFolder, load_json_object
+from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
 from roboeval.suites.load import Suite
 
 BEGINNING = b'{"custom_id": '
@@ -103,7 +103,7 @@ def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportResult:
     """What a run holds after answers were added.
 
     Args:
@@ -130,7 +130,7 @@ class _Answer:
 
 def import_answers(
     run: RunFolder, suite: Suite, path: Path, *, progress: Callable[[int], object] = bool
-) -> Imported:
+) -> ImportResult:
     """Add the completions in a file of answers to the run that `write_requests` began.
 
     A completion that is there stays; the first reply to a request counts.
@@ -165,7 +165,7 @@ def import_answers(
         if new:
             _add(run, about, new, usage, is_whole=not missing)
     failed = {key: found.failed[key] for key in missing if key in found.failed}
-    return Imported(len(new), len(expected), failed, [key for key in missing if key not in failed])
+    return ImportResult(len(new), len(expected), failed, [key for key in missing if key not in failed])
 
 
 BatchLine: TypeAlias = tuple[
@@ -237,7 +237,7 @@ def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     if not run.about.is_file():
         begin = "name the run of `roboeval generate --requests`, which keeps them"
         raise UserError(f"is no run; these are answers to requests of a run; {begin}", file=run.path)
-    about = load_head(run.about)
+    about = load_json_object(run.about)
     if not isinstance(about.get("settings"), dict) or not batches(about):
         raise UserError("holds imported completions, which answers cannot be added to", file=run.path)
     if about.get("suite") != suite.name:
@@ -252,7 +252,7 @@ def _plan(suite: Suite, batch: Mapping[str, Any]) -> GenerationPlan:
 
 def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[_Answer]:
     """The answers in a file; raises UserError if a line is none, or one to another request."""
-    for number, line in read_lines(path, limit=LONGEST_ANSWER):
+    for number, line in read_lines(path, limit=MAX_ANSWER_BYTES):
         if not line.strip():
             continue
         try:

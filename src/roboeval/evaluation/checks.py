@@ -16,7 +16,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON_VERSION, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_head
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_json_object
 from roboeval.evaluation.runs.rows import read_checks
 from roboeval.suites.load import Suite
 
@@ -73,9 +73,9 @@ def check_programs(
 
 
 def _open(run: RunFolder, key: str, metadata: dict[str, Any]) -> Appender:
-    rows, about = run.checks(key), run.checks_head(key)
+    rows, about = run.checks(key), run.checks_manifest(key)
     about.parent.mkdir(exist_ok=True)
-    if not about.exists() or load_head(about) != metadata:
+    if not about.exists() or load_json_object(about) != metadata:
         rows.unlink(missing_ok=True)
         write_whole(about, to_text(metadata))
     return Appender(rows)

@@ -15,9 +15,9 @@ from codebotler.simulator.worker import EngineError, Worker
 
 PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
-Ran = TypeVar("Ran")
+RawResult = TypeVar("RawResult")
 WorkResult = TypeVar("WorkResult")
-RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[Ran]]
+RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[RawResult]]
 """Runs a few programs on a worker, and returns a result for each."""
 
 
@@ -25,7 +25,7 @@ class Engine(Protocol):
     """Calls functions that run programs isolated."""
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
         """The values of `then`, in the order of the programs, which are read as needed; equal ones run once.
 
@@ -37,7 +37,9 @@ class Engine(Protocol):
 OpenEngine = AbstractContextManager[Engine]
 
 
-BRIEF = 100_000  # events and the like that are made before garbage is looked for: nearly all live briefly
+GC_THRESHOLD = (
+    100_000  # events and the like that are made before garbage is looked for: nearly all live briefly
+)
 
 
 class Local:
@@ -52,7 +54,7 @@ class Local:
         else:
             self._pool = WorkerPool(self._given, **self._isolation).__enter__()
         self._threshold = gc.get_threshold()
-        gc.set_threshold(BRIEF, *self._threshold[1:])
+        gc.set_threshold(GC_THRESHOLD, *self._threshold[1:])
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -61,7 +63,7 @@ class Local:
             self._pool.__exit__()
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
         """See `Engine`."""
         here = self._pool.here

@@ -18,7 +18,7 @@ from codebotler.simulator.settings import PAPER
 from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
 from roboeval.evaluation.judge import judgements
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
-from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_head, selected_tasks
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
 from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
@@ -43,12 +43,12 @@ def evaluate_run(
     with run.writing():
         run.rows(key).parent.mkdir(exist_ok=True)
         if redo:
-            for path in (run.rows(key), run.head(key)):
+            for path in (run.rows(key), run.manifest(key)):
                 path.unlink(missing_ok=True)
         was = _expect_same(run, suite, ablated=ablated)
         about = evaluation_metadata(suite, ablated=ablated, tasks=_selected(tasks, was))
         if was is None:
-            write_whole(run.head(key), to_text(about))
+            write_whole(run.manifest(key), to_text(about))
         written = {one.key: one for one in (run.read(suite) if completions is None else completions)}
         with contextlib.closing(Appender(run.rows(key))) as rows:
             seal, left = Seal(), dict(written)
@@ -59,7 +59,7 @@ def evaluate_run(
                     yield line.row
             left = {key: one for key, one in left.items() if _is_in(one.task, selected_tasks(about))}
             if was is not None and is_sealed(was) and (left or seal.is_broken(was)):
-                write_whole(run.head(key), to_text(about))
+                write_whole(run.manifest(key), to_text(about))
             wanted = [one for one in left.values() if _is_in(one.task, tasks)]
             for completion, judgement in judgements(
                 wanted, suite, ablated=ablated, engine=engine or Local(workers)
@@ -74,7 +74,7 @@ def evaluate_run(
             finished = {**about, **seal.data()}
             if not left and finished != was:
                 rows.sync()
-                write_whole(run.head(key), to_text(finished))
+                write_whole(run.manifest(key), to_text(finished))
 
 
 def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
@@ -154,22 +154,22 @@ def expect_same_judge(run: RunFolder, suite: Suite) -> None:
 def _expect_same(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
     """The content of KEY.json, None if there is none; raises UserError if the rows were judged otherwise."""
     key = evaluation_key(suite, ablated=ablated)
-    path, rows = run.head(key), run.rows(key)
+    path, rows = run.manifest(key), run.rows(key)
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise UserError(
                 "is missing, so it is unknown how the rows were judged; --redo starts over", file=path
             )
         return None
-    was = load_head(path)
+    was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
-            what = f"{CALLED.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
+            what = f"{METADATA_NAMES.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
             raise UserError(f"was judged with another {what}; --redo starts over", file=path)
     return was
 
 
-CALLED = {
+METADATA_NAMES = {
     "version": "version of the suite",
     "digest": "content of the suite",
     "rules": "set of rules of simulation",

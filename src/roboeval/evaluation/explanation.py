@@ -22,13 +22,13 @@ INSTRUCTION_NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "this is the suite's text of the prompt:"
 PROGRAM_GONE = "the judged program is no longer in this run"
 SUITE_CHANGED = "the suite has changed since this was judged"
-EARLIER = "judged by an earlier version, which kept no places; evaluate again with --redo"
-CUT = "the trace was too long to keep, so this cannot be explained"
+PLACES_MISSING = "judged by an earlier version, which kept no places; evaluate again with --redo"
+TRACE_CUT = "the trace was too long to keep, so this cannot be explained"
 TRACES_TOO_LONG = "the traces of this program are too long to explain this as well"
 
-LOWERED = "This suite lower-cases strings before running; they are shown as it judges them."
+LOWERCASED_NOTE = "This suite lower-cases strings before running; they are shown as it judges them."
 MAX_PROGRAM_LINES = 1_000  # of a program that is shown
-MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
+MAX_EXPLAINED_SIZE = 1_000_000  # of the traces of a completion, to explain it, by these weights:
 EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one
 
 
@@ -85,7 +85,7 @@ class Patience:
     """How much of the traces of one completion is still compared with what was required."""
 
     def __init__(self) -> None:
-        self._left = MOST_COMPARED
+        self._left = MAX_EXPLAINED_SIZE
 
     def reaches_for(self, trace: Trace) -> bool:
         """Take a trace into account; whether a check on it is still explained."""
@@ -128,13 +128,13 @@ def _explained(
 ) -> dict[str, Any]:
     """Why a check fails, and the number of the step, from 1, that makes it fail, if it is one."""
     if "cut" in verdict:
-        return {"explanation": CUT, "step": None}
+        return {"explanation": TRACE_CUT, "step": None}
     require = () if scenario is None else scenario.require
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
         return {"explanation": f"{SUITE_CHANGED} and no longer requires this here", "step": None}
     if not can_judge(requirement.formula, verdict):
-        return {"explanation": EARLIER, "step": None}
+        return {"explanation": PLACES_MISSING, "step": None}
     if not patience.reaches_for(trace):
         return {"explanation": TRACES_TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)
@@ -149,7 +149,7 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
 
 
-def shown_lines(program: str) -> tuple[str, int]:
+def first_lines(program: str) -> tuple[str, int]:
     """A program for people, in short lines without tabs, and how many lines are left out at its end."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])

@@ -94,7 +94,7 @@ def ending_of(name: str) -> str:
     return (FAILURE_CLASSES[name].ending if name in FAILURE_CLASSES else "") or f"in a {label_of(name)}"
 
 
-def shown_classes(happened: Collection[str]) -> list[str]:
+def classes_to_show(happened: Collection[str]) -> list[str]:
     """The classes that people are shown, given those by which something failed.
 
     The paper's three are always shown, so that runs can be compared; `NoProgram` only where it happened.
@@ -102,11 +102,13 @@ def shown_classes(happened: Collection[str]) -> list[str]:
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
-def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
+def no_program_sentence(failure_of_verdicts: Mapping[str, Any]) -> str | None:
     """Why a reply held no program, in a sentence, from the failure of a row; None if it fails otherwise."""
-    if failure["class"] != NO_PROGRAM_CLASS:
+    if failure_of_verdicts["class"] != NO_PROGRAM_CLASS:
         return None
-    return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
+    return next(
+        (words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure_of_verdicts["kind"]), ""
+    )
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ class Verdict:
         return replace(self, failed=asked, satisfied=not asked)
 
 
-def failure(verdicts: Sequence[Verdict]) -> Failure | None:
+def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
     """The failure of a completion: the first unsatisfied world decides; None if all are satisfied.
 
     Within that world the error decides, else the first failed check. Where a world may wait for ever,

@@ -25,14 +25,14 @@ from roboeval.suites.load import Suite, load_suite
 Registered = TypeVar("Registered", bound=Callable[..., object])
 
 
-def of_codebotler(function: Registered) -> Registered:
+def register_as_codebotler(function: Registered) -> Registered:
     """Have Inspect name a function `codebotler/...`, by what its module is called."""
     function.__module__ = "codebotler"
     return function
 
 
 @task
-@of_codebotler
+@register_as_codebotler
 def roboeval(
     suite: str = "paper",
     tasks: str | list[str] | None = None,
@@ -72,7 +72,7 @@ def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
 
 
 @solver
-@of_codebotler
+@register_as_codebotler
 def prompting(suite: str = "paper") -> Solver:
     """The prompt of `roboeval generate`: with the skills and some examples before the instruction."""
     known = load_suite(suite)
@@ -89,7 +89,7 @@ def prompting(suite: str = "paper") -> Solver:
 
 
 @scorer(metrics=[accuracy(), stderr(cluster="task"), grouped(accuracy(), "task", all=False)])
-@of_codebotler
+@register_as_codebotler
 def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = None) -> Scorer:
     """The verdict of `roboeval evaluate` on the program in a reply, in a thread beside the event loop."""
 

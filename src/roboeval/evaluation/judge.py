@@ -19,9 +19,9 @@ from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.result_cache import ResultCache
-from roboeval.evaluation.runs.completions import Completion, name_of, unknown
+from roboeval.evaluation.runs.completions import Completion, find_key_fault, name_of
 from roboeval.evaluation.runs.rows import Row
-from roboeval.evaluation.serialization import judgements_for, row_line, with_reply
+from roboeval.evaluation.serialization import add_reply_fault, judgements_for, row_line
 from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Requirement, Scenario, Suite
 
@@ -116,7 +116,7 @@ def judgements(
 
     with engine as opened:
         running = partial(run_in_worlds, suite, ablated=ablated)
-        judging = partial(judged, suite, ablated=ablated)
+        judging = partial(judge_outcomes, suite, ablated=ablated)
         for by_prompt in opened.map_distinct(running, works(), judging):
             completion = waiting.popleft()
             if by_prompt is None:
@@ -128,7 +128,7 @@ def judgements(
                 )
                 yield completion, None
             else:
-                yield completion, with_reply(completion, by_prompt[completion.prompt])
+                yield completion, add_reply_fault(completion, by_prompt[completion.prompt])
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
@@ -136,7 +136,7 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
         kind = type(completion).__name__
         what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
         raise UserError(f"a completion is of the type {kind}; {what}")
-    if (problem := unknown(completion.key, suite)) is not None:
+    if (problem := find_key_fault(completion.key, suite)) is not None:
         raise UserError(problem)
     if ablated and suite.tasks[completion.task].ablation is None:
         raise UserError(f'the task "{completion.task}" has no ablation')
@@ -160,7 +160,9 @@ def robot_in(world: World, suite: Suite) -> SimulatedRobot:
     return SimulatedRobot(world, suite.rules, suite.skills, guard=guard)
 
 
-def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> tuple[bytes, ...] | None:
+def judge_outcomes(
+    suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool
+) -> tuple[bytes, ...] | None:
     """The judgements on a program that ran in all worlds of a task, as JSON; None if judging takes too long.
 
     There is one for each prompt; until then it does not matter for which of them a program was written.

@@ -18,7 +18,7 @@ from typing import Any, Self, TypeVar
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import map_batches
 from codebotler.simulator.worker import EngineError
-from roboeval.evaluation.engines import BRIEF, Ran, RunPrograms, Work, WorkResult, own_worker
+from roboeval.evaluation.engines import GC_THRESHOLD, RawResult, RunPrograms, Work, WorkResult, own_worker
 
 JobKey = TypeVar("JobKey")
 
@@ -40,7 +40,7 @@ class Processes:
         """Nothing is left: the processes end with the results."""
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
         """See `Engine`."""
         functions = pickle.dumps((function, then))
@@ -62,7 +62,7 @@ def map_in_processes(
     with process_pool(workers) as processes:
 
         def submit(keys: Sequence[JobKey]) -> Future[Sequence[WorkResult]]:
-            with starting():
+            with starting_processes():
                 return processes.submit(function, keys)
 
         try:
@@ -76,7 +76,7 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Processes that end with the block, or with this process."""
     context = get_context("spawn")
     with ExitStack() as held:
-        with starting():
+        with starting_processes():
             pipe, ours = context.Pipe(duplex=False)
             held.enter_context(pipe)
             processes = ProcessPoolExecutor(workers, context, exit_with_parent, (pipe,))
@@ -86,7 +86,7 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def starting() -> Iterator[None]:
+def starting_processes() -> Iterator[None]:
     """Start processes that do not hear Ctrl-C, or raise EngineError."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which they inherit
     try:
@@ -99,7 +99,7 @@ def starting() -> Iterator[None]:
 
 def exit_with_parent(pipe: Connection) -> None:
     """Let this process end as soon as the other end of a pipe is closed."""
-    gc.set_threshold(BRIEF, *gc.get_threshold()[1:])
+    gc.set_threshold(GC_THRESHOLD, *gc.get_threshold()[1:])
 
     def end() -> None:
         pipe.poll(None)
@@ -110,11 +110,11 @@ def exit_with_parent(pipe: Connection) -> None:
 
 def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
     """The results for programs, on the worker of this process."""
-    function, then = loaded(functions)
+    function, then = load_functions(functions)
     return [then(ran) for ran in function(own_worker(**isolation), works)]
 
 
 @lru_cache(maxsize=1)
-def loaded(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
+def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
     """The functions that this side has pickled: they hold a whole suite, which is loaded once."""
     return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - see above

@@ -15,7 +15,7 @@ from codebotler.core.errors import UserError, installed
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import NO_SECCOMP, DistinctKeys, ResultFile
 from codebotler.simulator.worker import EngineError
-from roboeval.evaluation.engines import PYTHON_VERSION, Ran, RunPrograms, Work, WorkResult, own_worker
+from roboeval.evaluation.engines import PYTHON_VERSION, RawResult, RunPrograms, Work, WorkResult, own_worker
 
 _log = logging.getLogger("roboeval.ray")
 VERSIONS = f"codebotler {__version__} with Python {PYTHON_VERSION}"
@@ -60,7 +60,7 @@ class RayCluster:
         self._ray.shutdown()
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], WorkResult]
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
         """See `Engine`.
 
@@ -129,7 +129,7 @@ class RayCluster:
 
 
 def run_shard(
-    functions: tuple[RunPrograms[Ran], Callable[[Ran], WorkResult]],
+    functions: tuple[RunPrograms[RawResult], Callable[[RawResult], WorkResult]],
     works: Sequence[Work],
     versions: str,  # others might judge otherwise
     isolation: Mapping[str, bool],

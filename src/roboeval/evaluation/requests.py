@@ -19,14 +19,14 @@ from codebotler.models.base import Model
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for, template_hash
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of, read_completions
-from roboeval.evaluation.runs.folder import RunFolder, load_head
+from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
 
 if TYPE_CHECKING:
     from codebotler.models.batch import BatchModel  # which imports large libraries
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies
-LATER = ("reasoning_effort", "extra_body")  # settings that runs of earlier versions do not name
+OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # settings that runs of earlier versions do not name
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel
     }
     earlier: dict[str, Any] = {}
     if run.about.exists():
-        earlier = load_head(run.about)
+        earlier = load_json_object(run.about)
         if not isinstance(earlier.get("settings"), dict):
             raise UserError("holds imported completions; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
@@ -120,7 +120,7 @@ def _recorded(settings: SamplingSettings) -> dict[str, Any]:
     return {
         name: value
         for name, value in asdict(settings).items()
-        if name not in WITHOUT_EFFECT and (value is not None or name not in LATER)
+        if name not in WITHOUT_EFFECT and (value is not None or name not in OPTIONAL_SETTINGS)
     }
 
 

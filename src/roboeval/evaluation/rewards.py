@@ -19,13 +19,13 @@ from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import AHEAD, LARGEST, shared_pool
 from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
-from roboeval.evaluation.runs.completions import unknown
+from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
 
 Judged = TypeVar("Judged")
-ERRED = 0.5  # the part of what a run did before an error that counts: it had better returned there
+ERROR_FACTOR = 0.5  # the part of what a run did before an error that counts: it had better returned there
 
-REMEMBERED = 100_000  # rewards; a policy that learns writes the same program again and again
+MAX_CACHED_REWARDS = 100_000  # rewards; a policy that learns writes the same program again and again
 
 
 def reward(
@@ -65,9 +65,9 @@ def reward(
     chosen = suite if isinstance(suite, Suite) else load_suite(suite)
     if worlds is not None or seed is not None:
         chosen = chosen.with_worlds(worlds, seed)
-    if (problem := unknown((task, prompt, 0), chosen)) is not None:
+    if (problem := find_key_fault((task, prompt, 0), chosen)) is not None:
         raise UserError(problem)
-    return REWARDS.of(chosen, task, first_alike(chosen, task, prompt), programs)
+    return REWARDS.of(chosen, task, first_equal_prompt(chosen, task, prompt), programs)
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,12 @@ class Share:
         kept: list[bool] = []
         for is_now, was_met in zip(are_met(outcome, scenario), at_start, strict=True):
             (kept if was_met else gained).append(is_now)
-        whole = 1.0 if may_satisfy(outcome, scenario) else ERRED
+        whole = 1.0 if may_satisfy(outcome, scenario) else ERROR_FACTOR
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
 
 
 @lru_cache(maxsize=160)  # prompts of a suite, twice
-def first_alike(suite: Suite, task: str, prompt: int) -> int:
+def first_equal_prompt(suite: Suite, task: str, prompt: int) -> int:
     """The first prompt that asks for the same as a prompt."""
     scenarios = suite.tasks[task].scenarios
     asked = [[scenario.asked_by(number) for scenario in scenarios] for number in range(prompt + 1)]
@@ -97,7 +97,7 @@ def first_alike(suite: Suite, task: str, prompt: int) -> int:
 
 
 @lru_cache(maxsize=160)
-def asked_in(suite: Suite, task: str, prompt: int) -> list[tuple[Scenario, list[bool]]]:
+def requirements_of(suite: Suite, task: str, prompt: int) -> list[tuple[Scenario, list[bool]]]:
     """What a prompt asks for in each world, and whether that is met before the robot has done anything."""
     asked = [scenario.asked_by(prompt) for scenario in suite.tasks[task].scenarios]
     return [(scenario, [is_met(one, ()) for one in scenario.require]) for scenario in asked]
@@ -114,7 +114,7 @@ def total(shares: Sequence[Share]) -> float:
     return fmean([*earned, *(share.kept * elsewhere for share in shares if share.gained is None)])
 
 
-class Remembered(Generic[Judged]):
+class RewardCache(Generic[Judged]):
     """What was judged, by a name for each, so that nothing is judged twice; what is old is forgotten."""
 
     def __init__(self) -> None:
@@ -128,13 +128,13 @@ class Remembered(Generic[Judged]):
         with self._lock:
             return {name: self._known[name] for name in names if name in self._known}
 
-    def add(self, judged: Mapping[bytes, Judged]) -> None:
+    def add(self, judge_programs: Mapping[bytes, Judged]) -> None:
         """Remember these, which are new or were asked for again."""
         with self._lock:
-            self._known |= judged
-            for name in judged:
+            self._known |= judge_programs
+            for name in judge_programs:
                 self._known.move_to_end(name)
-            while len(self._known) > REMEMBERED:
+            while len(self._known) > MAX_CACHED_REWARDS:
                 self._known.popitem(last=False)
 
 
@@ -142,7 +142,7 @@ class Rewards:
     """The rewards of programs, remembered so that each is judged once."""
 
     def __init__(self) -> None:
-        self._known: Remembered[float] = Remembered()
+        self._known: RewardCache[float] = RewardCache()
 
     def of(self, suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
         """The rewards of programs, in their order."""
@@ -153,8 +153,8 @@ class Rewards:
         try:
             pool = shared_pool()
             futures.extend(
-                pool.submit(judged, suite, task, prompt, batch)
-                for batch in batches([*new.values()], pool.workers)
+                pool.submit(judge_programs, suite, task, prompt, batch)
+                for batch in split_programs([*new.values()], pool.workers)
             )
             found = chain.from_iterable(future.result() for future in futures)
             rewards.update(zip(new, found, strict=True))
@@ -165,15 +165,15 @@ class Rewards:
         return [rewards[name] for name in names]
 
 
-def batches(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
+def split_programs(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
     """Programs in batches, enough of them that all workers have some."""
     size = max(1, min(LARGEST, -(-len(programs) // (AHEAD * workers))))
     return [programs[start : start + size] for start in range(0, len(programs), size)]
 
 
-def judged(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
+def judge_programs(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
     """The rewards of programs, in a thread that has a worker."""
-    asked = asked_in(suite, task, prompt)
+    asked = requirements_of(suite, task, prompt)
     robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     ran = shared_pool().here().run_all([(program, robots) for program in programs])
     return [

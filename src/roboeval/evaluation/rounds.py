@@ -15,7 +15,7 @@ from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder
 
 ROUND = "round"  # the column of rows: in which round a program was written; absent in those of the first
-STRIDE = 1_000_000
+SAMPLE_STRIDE = 1_000_000
 """The distance between the numbers of samples of two rounds, so that each has a seed of its own."""
 
 
@@ -42,7 +42,7 @@ class RoundPlan(GenerationPlan):
 
     def sample(self, key: CompletionKey) -> int:
         """The number of the sample, from which its seed comes."""
-        return key[2] + self.number * STRIDE
+        return key[2] + self.number * SAMPLE_STRIDE
 
     def given(self) -> Iterator[Completion]:
         """The completions that are taken over, since the check accepted them."""

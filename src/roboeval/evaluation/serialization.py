@@ -10,7 +10,7 @@ from typing import Any
 
 from codebotler.core.files import to_line
 from codebotler.core.trace import outcome_data
-from roboeval.evaluation.failures import NO_PROGRAM_CLASS, Verdict, failure
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS, Verdict, failure_of_verdicts
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
 
@@ -23,7 +23,7 @@ HASH_PLACEHOLDER = "0" * 64
 FAILED_PREFIX = b'{"passed": false, '  # as `judgement` writes it
 
 
-def with_reply(completion: Completion, judgement_json: bytes) -> bytes:
+def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
     """The judgement on a program, given as JSON, with what is wrong with its reply if that held no program.
 
     Text that is no program ends in some error, and half a program fails some check: neither is the cause.
@@ -62,8 +62,8 @@ def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
 
 def judgement(verdicts: list[Verdict]) -> bytes:
     """The judgement on a program, as JSON that fits into a row."""
-    why = failure(verdicts)
-    return bounded(
+    why = failure_of_verdicts(verdicts)
+    return limit_size(
         {
             "passed": why is None,
             "failure": why,
@@ -88,7 +88,7 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
 # --- how large a row may be
 
 
-def bounded(judgement: Mapping[str, Any]) -> bytes:
+def limit_size(judgement: Mapping[str, Any]) -> bytes:
     """A judgement as JSON that fits into a row: of a longer one each world has an equal share of it."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]

@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from roboeval.analysis.metrics import Estimate, TaskScore, overall, threshold_curve
 from roboeval.analysis.resample import LIMITS
 from roboeval.analysis.summary import ALL, PASSED, Causes, kinds_in_order
-from roboeval.evaluation.failures import FAILURE_CLASSES, NO_PROGRAM_CLASS, plural_of, shown_classes
+from roboeval.evaluation.failures import FAILURE_CLASSES, NO_PROGRAM_CLASS, classes_to_show, plural_of
 from roboeval.report.drawing import (
     COLOURS,
     DASHES,
@@ -344,7 +344,7 @@ def _percent(share: float) -> str:
 def causes(found: Sequence[tuple[str, Causes]]) -> Figure:
     """Draw the outcomes of completions by class, and the kinds of each class."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
-    shown = shown_classes(happened)
+    shown = classes_to_show(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}
     tallest = max(3, *map(len, kinds.values()))
     many = len(found) > MOST_NUMBERS

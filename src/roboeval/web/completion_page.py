@@ -19,14 +19,14 @@ from codebotler.web.frame import PlainText, outside
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.cluster import Fix, nearest_fix
 from roboeval.evaluation.explanation import (
-    LOWERED,
+    LOWERCASED_NOTE,
     cut_sentence,
     error_sentence,
     failing_first,
     instruction_shown,
 )
 from roboeval.evaluation.failures import label_of, no_program_sentence
-from roboeval.evaluation.runs.completions import CompletionKey, by_hand, name_of
+from roboeval.evaluation.runs.completions import CompletionKey, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_person, world_title
 from roboeval.web.heat_map import address
@@ -98,7 +98,7 @@ def _draw_head(
             verdict = shortened(f"{label_of(why['class'])}: {why['kind']}")
         PlainText("small", verdict, f"state state-{state}")
         if data["model"] is not None:
-            PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
+            PlainText("span", f"written by {shortened(data['model'], 200)}{recorded_suffix([data['model']])}")
         if fix is not None:
             text = f"Most similar program that passes: {counted(fix.changed, 'line')} changed"
             html.a(text, href=outside(f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
@@ -155,7 +155,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
             PlainText("p", sentence, "trouble")
             return
         if completion["lowered"] and judged:
-            PlainText("p", LOWERED, "quiet")
+            PlainText("p", LOWERCASED_NOTE, "quiet")
         if not judged:
             PlainText("p", "This completion has not been judged yet.", "quiet")
         for number, data in failing_first(judged):

@@ -11,7 +11,7 @@ from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import mean_of
 from roboeval.analysis.summary import Failures
 from roboeval.evaluation.failures import NO_PROGRAM_CLASS, ending_of, plural_of
-from roboeval.evaluation.runs.completions import by_hand
+from roboeval.evaluation.runs.completions import recorded_suffix
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
 STEPS = 10
@@ -44,7 +44,7 @@ def models_of(run: Snapshot) -> str:
     """Format the models of a run."""
     if not run.models:
         return "model not recorded"
-    return shortened(", ".join(run.models), MOST_MODELS) + by_hand(run.models)
+    return shortened(", ".join(run.models), MOST_MODELS) + recorded_suffix(run.models)
 
 
 def failure_text(chosen: CompletionFilter) -> str | None:

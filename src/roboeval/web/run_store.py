@@ -153,14 +153,14 @@ class _Reader:
         run, key = self._run, self._key or ""
         checks = run.checks(key.removesuffix(ABLATED))
         within = self._store.folder.resolve()
-        paths = (run.completions, run.about, run.rows(key), run.head(key), checks)
+        paths = (run.completions, run.about, run.rows(key), run.manifest(key), checks)
         return tuple(_stamp(path, within) for path in paths)
 
     def _read_files(self) -> Results:
         faults: list[UserError] = []
         results = read_results(self._run, self._key, keep_failed=False, faults=faults)
         there = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
-        name = results.head.get("suite") or results.about.get("suite")
+        name = results.manifest.get("suite") or results.about.get("suite")
         suite = self._store.suite(name if isinstance(name, str) else "paper")
         return replace(results, suite=suite, faults=there)
 

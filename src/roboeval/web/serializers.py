@@ -16,7 +16,7 @@ from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
 from roboeval.evaluation.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.requests import batches
-from roboeval.evaluation.runs.completions import KEY, CompletionKey, by_hand, how_many, name_of
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
@@ -61,8 +61,8 @@ def run_data(run: Snapshot) -> dict[str, Any]:
     return {
         "run": run.name,
         "models": run.models,
-        "by_hand": bool(by_hand(run.models)),
-        "suite": (results.head if results.key else results.about).get("suite"),
+        "by_hand": bool(recorded_suffix(run.models)),
+        "suite": (results.manifest if results.key else results.about).get("suite"),
         "evaluation": results.key,
         "evaluations": list(run.evaluations),
         "state": state_of(run),
@@ -115,12 +115,12 @@ def notes(run: Snapshot) -> list[str]:
     if stale:
         found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
-        name = shortened(str(results.head.get("suite")), MOST_NAME)
+        name = shortened(str(results.manifest.get("suite")), MOST_NAME)
         found.append(
             f'The suite "{name}" was not found, so failed checks are not explained; '
             "use `roboeval serve --suite FOLDER`."
         )
-    elif run.judged and run.suite is not None and results.head.get("digest") != run.suite.digest:
+    elif run.judged and run.suite is not None and results.manifest.get("digest") != run.suite.digest:
         found.append("The suite has changed since this run was judged; explanations may be missing.")
     return found
 

@@ -18,7 +18,7 @@ from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
 from roboeval import load_results
 from roboeval.analysis.tally import Tally
-from roboeval.cli.output import watched
+from roboeval.cli.output import show_progress
 from roboeval.evaluation.runs.rows import Row
 from seals import unseal
 
@@ -418,7 +418,7 @@ def test_progress_counts_what_has_been_passed_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("roboeval.cli.output.QUIET_S", 0.0)
-    items = watched("ab", "judging", 2)
+    items = show_progress("ab", "judging", 2)
     assert (next(items), capsys.readouterr().err) == ("a", "")
     assert (next(items), capsys.readouterr().err[:15]) == ("b", "judging: 1 of 2")
 

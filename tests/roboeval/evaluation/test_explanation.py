@@ -21,7 +21,12 @@ from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
-from roboeval.evaluation.explanation import INSTRUCTION_NOT_RECORDED, LOWERED, OF_SUITE, completion_data
+from roboeval.evaluation.explanation import (
+    INSTRUCTION_NOT_RECORDED,
+    LOWERCASED_NOTE,
+    OF_SUITE,
+    completion_data,
+)
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
@@ -401,4 +406,4 @@ def test_lowered_texts_are_shown_as_they_are_judged_and_explained() -> None:
         written = replace(completion(), program="def task_program():\n    say('Good Day')\n")
         text = printed(completion_view(row(written, said), written, suite), 120)
         assert 'said "good day"' in text
-        assert (LOWERED in text) is (rules == SimulationSettings())
+        assert (LOWERCASED_NOTE in text) is (rules == SimulationSettings())

@@ -28,7 +28,7 @@ from roboeval.analysis.breakdown import never_returned
 from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
 from roboeval.analysis.tasks import prompt_data
 from roboeval.evaluation.explanation import SUITE_CHANGED, completion_data
-from roboeval.evaluation.judge import is_met, judged, run_in_worlds
+from roboeval.evaluation.judge import is_met, judge_outcomes, run_in_worlds
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, trace_of
@@ -60,7 +60,7 @@ def suite_of(world: World, rules: SimulationSettings, *formulas: str, skills: Sk
 def judge(worker: Worker, suite: Suite, program: str) -> tuple[Outcome, dict[str, Any]]:
     """How a program ends, and its row as it is read back."""
     ((name, outcomes),) = run_in_worlds(suite, worker, [("T", program)], ablated=False)
-    told = judged(suite, (name, outcomes), ablated=False)
+    told = judge_outcomes(suite, (name, outcomes), ablated=False)
     assert told is not None
     line = row_line(Completion(task="T", prompt=0, index=0, program=program), told[0])
     assert key_of(decode_row(line, check_kinds=suite.skills is SKILLS)) == ("T", 0, 0)

@@ -231,7 +231,7 @@ def test_hostile_texts_come_as_they_are(runs: Path) -> None:
 
 
 def test_a_suite_of_ones_own_is_named(runs: Path, tmp_path: Path) -> None:
-    head = RunFolder(runs / "hasty").head("paper")
+    head = RunFolder(runs / "hasty").manifest("paper")
     head.write_text(json.dumps({**json.loads(head.read_text()), "suite": "mine"}))
     with serving(runs) as server:
         run = told(server, "/api/runs/hasty")

@@ -176,7 +176,7 @@ def test_the_oldest_are_forgotten(runs: Path) -> None:
 def test_suites_are_those_that_ship_and_those_that_are_named(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
     assert RunStore(runs).open("hasty").suite == load_suite("paper")
-    run.head("paper").write_text('{"suite": "../../my-suite"}')
+    run.manifest("paper").write_text('{"suite": "../../my-suite"}')
     assert RunStore(runs).open("hasty").suite is None
-    run.head("paper").write_text('{"suite": ["paper"]}')
+    run.manifest("paper").write_text('{"suite": ["paper"]}')
     assert RunStore(runs).open("hasty").suite == load_suite("paper")

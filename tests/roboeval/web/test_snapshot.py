@@ -150,8 +150,10 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
         (45, 40, False, 45, RunState.UNFINISHED),
         (45, 45, False, None, RunState.JUDGED),
     ]
-    head = json.loads(run.head("paper").read_text())
-    run.head("paper").write_text(json.dumps({k: v for k, v in head.items() if k not in {"rows", "sha256"}}))
+    head = json.loads(run.manifest("paper").read_text())
+    run.manifest("paper").write_text(
+        json.dumps({k: v for k, v in head.items() if k not in {"rows", "sha256"}})
+    )
     for written, judged, is_written, requested, state in cases:
         run.completions.write_bytes(b"".join(completions[:written]))
         run.rows("paper").write_bytes(b"".join(rows[:judged]))

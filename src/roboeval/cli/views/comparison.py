@@ -17,7 +17,7 @@ from roboeval.analysis.statistics import FEW
 from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences
 from roboeval.cli.views.groups import cluster_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.failures import plural_of, shown_classes
+from roboeval.evaluation.failures import classes_to_show, plural_of
 
 
 def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun]) -> RenderableType:
@@ -58,7 +58,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
 def _ends(runs: tuple[ComparedRun, ComparedRun]) -> Table:
     """How the completions of both runs fail, by class."""
     table = ruled("share that fails", *(visible(run.name) for run in runs))
-    for name in shown_classes([name for run in runs for name, share in run.classes.items() if share]):
+    for name in classes_to_show([name for run in runs for name, share in run.classes.items() if share]):
         table.add_row(plural_of(name), *(f"{run.classes.get(name, 0.0):.1%}" for run in runs))
     return table
 

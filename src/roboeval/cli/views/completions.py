@@ -14,16 +14,16 @@ from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
-    LOWERED,
+    LOWERCASED_NOTE,
     PROGRAM_GONE,
     cut_sentence,
     error_sentence,
     failing_first,
+    first_lines,
     instruction_shown,
-    shown_lines,
 )
 from roboeval.evaluation.failures import label_of, no_program_sentence
-from roboeval.evaluation.runs.completions import by_hand, name_of
+from roboeval.evaluation.runs.completions import name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, world_title
 
@@ -40,7 +40,7 @@ def prompt_view(data: Mapping[str, Any]) -> RenderableType:
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _program_line(program))
     lines = prompt_lines(data["task"], data)
-    lines[0].append(by_hand(data["models"]))
+    lines[0].append(recorded_suffix(data["models"]))
     return Group(*lines, Text(), table)
 
 
@@ -84,7 +84,7 @@ def completion_view(
         return Group(*parts, Text(), Text(why_none, "red"))
     worlds = data["worlds"]
     if data["lowered"]:
-        parts += [Text(), Text(LOWERED, "dim")]
+        parts += [Text(), Text(LOWERCASED_NOTE, "dim")]
     satisfied = []
     for number, world in failing_first(worlds):
         title = Text(world_title(number, f" of {len(worlds)}", visible(world["world"])), "bold")
@@ -102,7 +102,7 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     why = data["failure"]
     head.append_text(Text("passed", "green") if why is None else kind_view(why))
     if data["model"] is not None:
-        head.append(f"\nwritten by {visible(data['model'])}{by_hand([data['model']])}", "dim")
+        head.append(f"\nwritten by {visible(data['model'])}{recorded_suffix([data['model']])}", "dim")
     if data["program"] is None:
         return head.append(f"\n{PROGRAM_GONE}", "yellow")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
@@ -134,7 +134,7 @@ def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[Rendera
 
 
 def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
-    source, left = shown_lines(program)
+    source, left = first_lines(program)
     syntax = Syntax(
         source,
         "python",

@@ -18,8 +18,8 @@ from codebotler.core.words import counted
 from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import EvaluationSummary, Failures, Missing
 from roboeval.cli.views.completions import kind_view, prompt_lines
-from roboeval.evaluation.failures import plural_of, shown_classes
-from roboeval.evaluation.runs.completions import by_hand, how_many
+from roboeval.evaluation.failures import classes_to_show, plural_of
+from roboeval.evaluation.runs.completions import how_many, recorded_suffix
 
 if TYPE_CHECKING:
     from roboeval.analysis.broken_rules import BrokenRules
@@ -37,7 +37,7 @@ def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
 
 def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     """The tables of an evaluation."""
-    head = Text(visible(title) + by_hand(summary.scope.models), style="bold")
+    head = Text(visible(title) + recorded_suffix(summary.scope.models), style="bold")
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
     n, failed = judged_count(summary.prompts), sum(each.count for each in summary.failures)
@@ -48,7 +48,7 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     if failed:
         told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all judged:"
         happened = [one.name for one in summary.failures if one.count]
-        shown = happened if n == 1 else {*happened, *shown_classes(happened)}
+        shown = happened if n == 1 else {*happened, *classes_to_show(happened)}
         listed = [_failure_table(one) for one in summary.failures if one.name in shown]
         tables = Columns(listed, padding=(1, 3))
         parts += [Text(), Text(told), Text(), tables]
@@ -145,7 +145,7 @@ def task_view(data: Mapping[str, Any]) -> RenderableType:
     """A task, prompt by prompt; the data is that of `task_data`."""
     task = data["task"]
     models = {model for prompt in data["prompts"] for model in prompt["models"]}
-    parts: list[RenderableType] = [Text(visible(task) + by_hand(models), style="bold")]
+    parts: list[RenderableType] = [Text(visible(task) + recorded_suffix(models), style="bold")]
     if data["summary"]:
         parts.append(Text(visible(data["summary"])))
     for prompt in data["prompts"]:

@@ -182,7 +182,9 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
     completion = Completion.of(row)
     if 2 * len(line) > MAX_ROW:  # else it stays short enough, however it is written
         check_length(row, None)
-    if suite is not None and (problem := unknown(completion.key, suite) or _is_of_other(completion, suite)):
+    if suite is not None and (
+        problem := find_key_fault(completion.key, suite) or _is_of_other(completion, suite)
+    ):
         raise UserError(problem)
     return completion
 
@@ -212,7 +214,7 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
         raise UserError(sentence, file=str(file), line=line)
 
 
-def unknown(key: CompletionKey, suite: Suite) -> str | None:
+def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:
     """What is wrong with a completion's task or prompt, as a user of Python may give it; None if nothing."""
     task = suite.tasks.get(str(key[0]))
     if task is None:
@@ -234,7 +236,7 @@ def how_many(count: int) -> str:
     return counted(count, "completion")
 
 
-def by_hand(models: Collection[str | None]) -> str:
+def recorded_suffix(models: Collection[str | None]) -> str:
     """What a title adds if some models are recorded programs, which stand for no real model."""
     recorded = [model for model in models if model is not None and model.startswith("recorded:")]
     if not recorded:

@@ -46,7 +46,7 @@ class RunFolder:
         """The rows of an evaluation, by its `evaluation_key`."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
-    def head(self, key: str) -> Path:
+    def manifest(self, key: str) -> Path:
         """By what the rows of an evaluation were judged."""
         return self.path / "evaluations" / f"{key}.json"
 
@@ -54,7 +54,7 @@ class RunFolder:
         """The problems of its programs; `key` is that of their evaluation."""
         return self.path / "checks" / f"{key}.jsonl"
 
-    def checks_head(self, key: str) -> Path:
+    def checks_manifest(self, key: str) -> Path:
         """How they were checked."""
         return self.path / "checks" / f"{key}.json"
 
@@ -170,7 +170,7 @@ def _locked(descriptor: int) -> bool:
     return False
 
 
-def load_head(path: Path) -> dict[str, Any]:
+def load_json_object(path: Path) -> dict[str, Any]:
     """Read a KEY.json or run.json."""
     text = read_text(path)
     try:
@@ -182,15 +182,15 @@ def load_head(path: Path) -> dict[str, Any]:
     return data
 
 
-def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
+def selected_tasks(manifest: Mapping[str, Any]) -> frozenset[str] | None:
     """The tasks that a KEY.json names; None for all."""
-    tasks = head.get("tasks")
+    tasks = manifest.get("tasks")
     return None if tasks is None else frozenset(tasks)
 
 
 def about_of(run: RunFolder) -> dict[str, Any]:
     """The content of a run's run.json; nothing if there is none."""
-    return load_head(run.about) if run.about.exists() else {}
+    return load_json_object(run.about) if run.about.exists() else {}
 
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
@@ -214,13 +214,13 @@ def tasks_to_judge(
     return kept, left
 
 
-def as_judged(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
+def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
     """The suite with the worlds in which a run was judged, if other ones were drawn then."""
-    path = run.head(evaluation_key(suite, ablated=ablated))
+    path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():
         return suite
-    match load_head(path):
+    match load_json_object(path):
         case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0 and (worlds, seed) != drawn:
             return suite.with_worlds(worlds, seed).with_house_rules(suite.house)
     return suite
@@ -234,7 +234,7 @@ def evaluation_of(
     Raises UserError if the suite has not judged it; the command `again` does.
     """
     run = RunFolder(path)
-    suite = as_judged(run, suite, ablated=ablated)
+    suite = with_judged_worlds(run, suite, ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not run.completions.is_file():
         raise UserError("is not a run: it has no completions.jsonl", file=path)

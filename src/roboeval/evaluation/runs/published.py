@@ -20,8 +20,8 @@ from roboeval.evaluation.runs.completions import (
     Completion,
     CompletionKey,
     check_length,
+    find_key_fault,
     name_of,
-    unknown,
 )
 from roboeval.suites.load import Suite
 
@@ -41,7 +41,7 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
     """
     with _files(path) as files:
         for key, (name, read) in sorted(_by_key(files, path).items()):
-            if suite is not None and (problem := unknown(key, suite)):
+            if suite is not None and (problem := find_key_fault(key, suite)):
                 raise UserError(problem, file=name)
             texts = _assigned(read(), name)
             row = dict(zip(KEY, key, strict=True))
@@ -51,7 +51,7 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
             yield completion
 
 
-def passed_over(path: Path) -> str | None:
+def left_aside_warning(path: Path) -> str | None:
     """A warning about Python files in a folder or zip that are not named as completions are, if any."""
     with _files(path) as files:
         names = [name for name, _ in files if name.endswith(".py") and not _match(name)]

@@ -16,7 +16,7 @@ import polars as pl
 from codebotler.core.errors import UserError
 from roboeval.evaluation.requests import requested_tasks
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, read_completions
-from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_head, selected_tasks
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
 from roboeval.evaluation.runs.scope import JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
@@ -65,7 +65,7 @@ class Results:
     run: RunFolder
     key: str | None
     suite: Suite | None  # None if it is not at hand
-    head: Mapping[str, Any]  # KEY.json: by what was judged
+    manifest: Mapping[str, Any]  # KEY.json: by what was judged
     about: Mapping[str, Any]  # run.json: how the completions were asked for
     completions: Mapping[CompletionKey, Completion]  # those in the run now, in order
     places: Mapping[CompletionKey, tuple[int, int]] = field(
@@ -86,7 +86,7 @@ class Results:
     @property
     def tasks(self) -> frozenset[str] | None:
         """The tasks that were selected, and those that were requested since; None for all."""
-        selected, requested = selected_tasks(self.head), requested_tasks(self.about)
+        selected, requested = selected_tasks(self.manifest), requested_tasks(self.about)
         if self.is_ablated or selected is None:
             return selected
         return None if requested is None else selected | requested
@@ -127,14 +127,8 @@ class Results:
         return row
 
 
-ShowProgress: TypeAlias = Callable[
-    [Iterator[LocatedRow], int], Iterable[LocatedRow]
-]  # passes rows on; gets their number
-
-
-def no_progress(lines: Iterator[LocatedRow], _total: int) -> Iterable[LocatedRow]:
-    """Pass lines on."""
-    return lines
+ShowProgress: TypeAlias = Callable[[Iterator[LocatedRow], int], Iterable[LocatedRow]]
+"""Passes rows on; the second argument is their number."""
 
 
 def read_results(
@@ -142,31 +136,52 @@ def read_results(
     key: str | None,
     suite: Suite | None = None,
     *,
-    reuse_from: Results | None = None,  # another evaluation of the same run, whose completions are taken over
-    keep_failed: bool = True,  # may take much memory
+    task: str | None = None,
+    reuse_from: Results | None = None,
+    keep_failed: bool = True,
     faults: list[UserError] | None = None,
-    on_line: Callable[[bytes], None] | None = None,  # gets the line of each row
-    progress: ShowProgress = no_progress,
+    on_line: Callable[[bytes], None] | None = None,
+    progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
-    """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
-    about, completions = (
-        (reuse_from.about, reuse_from.completions) if reuse_from else read_written(run, faults)
-    )
+    """Read an evaluation of a run, each file once.
+
+    Args:
+        run: the run.
+        key: the name of the evaluation; None if there is none.
+        suite: the suite that judged it; None if it is not at hand.
+        task: the task whose rows to read; by default all.
+        reuse_from: another evaluation of the run, whose completions are not read again.
+        keep_failed: whether to keep the rows that failed, which may take much memory.
+        faults: collects errors in files, which are raised otherwise.
+        on_line: called with the line of each row.
+        progress: passes rows on and shows progress.
+    """
+    if reuse_from:
+        about, completions = reuse_from.about, reuse_from.completions
+    else:
+        about, completions = read_written(run, faults)
+    manifest = {} if key is None else _load_or_add_fault(run.manifest(key), faults)
+    selected = selected_tasks(manifest) if task is None else {task}
+    total = sum(selected is None or name in selected for name, _, _ in completions)
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
     failed: dict[CompletionKey, bytes] = {}
-
-    def add(row: Row) -> None:
+    places: dict[CompletionKey, tuple[int, int]] = {}
+    rows = run.rows(key or "")
+    lines = (
+        iter(()) if key is None else read_lines_of(rows, manifest, task=task, on_line=on_line, faults=faults)
+    )
+    for line in progress(lines, total):
+        row = line.row
         builder.add(row)
         if keep_failed and row["failure"] is not None:
             failed[key_of(row)] = without_other_traces(row, row["failure"]["world"])
-
-    head, places = read_rows(run, key, completions, add, faults=faults, on_line=on_line, progress=progress)
+        places[key_of(row)] = line.at, line.size
     table = builder.table()
     return Results(
         run=run,
         key=key,
         suite=suite,
-        head=head,
+        manifest=manifest,
         about=about,
         completions=completions,
         places=places,
@@ -213,40 +228,18 @@ def _accepted(
     return accepted
 
 
-def read_rows(
-    run: RunFolder,
-    key: str | None,
-    completions: Iterable[CompletionKey],
-    add: Callable[[Row], None],
-    *,
-    faults: list[UserError] | None = None,
-    on_line: Callable[[bytes], None] | None = None,
-    progress: ShowProgress = no_progress,
-) -> tuple[Mapping[str, Any], Mapping[CompletionKey, tuple[int, int]]]:
-    """Add each row of an evaluation; return its head, and where each row is in the file."""
-    head = {} if key is None else _head(run.head(key), faults)
-    tasks = selected_tasks(head)
-    total = sum(tasks is None or task in tasks for task, _, _ in completions)
-    places: dict[CompletionKey, tuple[int, int]] = {}
-    lines = iter(()) if key is None else read_lines_of(run.rows(key), head, on_line=on_line, faults=faults)
-    for line in progress(lines, total):
-        add(line.row)
-        places[key_of(line.row)] = line.at, line.size
-    return head, places
-
-
 def read_written(
     run: RunFolder, faults: list[UserError] | None
 ) -> tuple[Mapping[str, Any], Mapping[CompletionKey, Completion]]:
     """How a run's completions were asked for, and they themselves."""
-    about = _head(run.about, faults) if run.about.exists() else {}
+    about = _load_or_add_fault(run.about, faults) if run.about.exists() else {}
     completions = read_completions(run.completions, growing=True, faults=faults)
     return about, {(sys.intern(one.task), one.prompt, one.index): one for one in completions}
 
 
-def _head(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
+def _load_or_add_fault(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
     try:
-        return load_head(path)
+        return load_json_object(path)
     except UserError as error:
         add_or_raise(error, faults)
         return {}

@@ -12,12 +12,12 @@ from typing import Annotated, Any, NotRequired, TypeAlias, TypedDict
 import msgspec
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import read_lines, read_rows
+from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
 
-LONGEST_LINE = 1_000_000_000  # bytes of a row that was written before rows were bounded
+MAX_LINE_BYTES = 1_000_000_000  # bytes of a row that was written before rows were bounded
 EVENT_KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is not a row of an evaluation"
 BROKEN = "was damaged or changed after the evaluation was finished"
@@ -171,20 +171,22 @@ class LocatedRow:
 
 def read_lines_of(
     path: Path,
-    head: Mapping[str, Any],
+    manifest: Mapping[str, Any],
     *,
     seal: Seal | None = None,
+    task: str | None = None,
     on_line: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
 ) -> Iterator[LocatedRow]:
-    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
+    """Read an evaluation, or its rows on one task, and ignore a torn last line; add or raise faults."""
+    name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
     at, is_reported = 0, False
-    for number, line in read_lines(path, limit=LONGEST_LINE):
+    for number, line in read_lines(path, limit=MAX_LINE_BYTES):
         seal.add(line)
         try:
-            if line.strip():
-                row = decode_row(line, check_kinds=not is_sealed(head))
+            if name in line and line.strip():
+                row = decode_row(line, check_kinds=not is_sealed(manifest))
                 if on_line is not None:
                     on_line(line)
                 yield LocatedRow(number, at, len(line), row)
@@ -194,7 +196,7 @@ def read_lines_of(
             add_or_raise(UserError(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
             is_reported = True
         at += len(line)
-    if seal.is_broken(head) and not is_reported:
+    if seal.is_broken(manifest) and not is_reported:
         add_or_raise(UserError(f"{BROKEN}; --redo starts over", file=path), faults)
 
 
@@ -226,11 +228,11 @@ class Seal:
         """As KEY.json writes it."""
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
-    def is_broken(self, head: Mapping[str, Any]) -> bool:
+    def is_broken(self, manifest: Mapping[str, Any]) -> bool:
         """Whether these are other rows than when the evaluation was finished."""
-        return is_sealed(head) and any(head.get(name) != value for name, value in self.data().items())
+        return is_sealed(manifest) and any(manifest.get(name) != value for name, value in self.data().items())
 
 
-def is_sealed(head: Mapping[str, Any]) -> bool:
+def is_sealed(manifest: Mapping[str, Any]) -> bool:
     """Whether a KEY.json is that of a finished evaluation; that of an earlier version never is."""
-    return "rows" in head or "sha256" in head
+    return "rows" in manifest or "sha256" in manifest

@@ -127,7 +127,7 @@ def limit_of(about: Mapping[str, Any]) -> int | None:
 
 # --- replies that were cut off
 
-TOLERATED = 0.02  # share of replies that may be cut off without a warning
+MAX_CUT_OFF_SHARE = 0.02  # share of replies that may be cut off without a warning
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class CutOff:
     @property
     def warning(self) -> str | None:
         """A sentence for people with what mends it; None where few replies were cut off."""
-        if self.share <= TOLERATED:
+        if self.share <= MAX_CUT_OFF_SHARE:
             return None
         at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"
         how = "set" if self.limit is None else "raise or leave out"

@@ -11,7 +11,7 @@ from codebotler.core.files import MAX_ROW, parsed_row, read_lines
 from codebotler.models.recorded import RECORDED_NAMES, RecordedModel, open_recorded
 from roboeval.evaluation.runs.completions import COMPLETIONS, EXAMPLE, Completion, read_completions
 from roboeval.evaluation.runs.folder import RunFolder
-from roboeval.evaluation.runs.published import passed_over, published_completions
+from roboeval.evaluation.runs.published import left_aside_warning, published_completions
 from roboeval.suites.load import Suite
 
 
@@ -42,20 +42,20 @@ def open_source(text: str, suite: Suite) -> Source:
     if (path / COMPLETIONS).is_file():
         return Source([*RunFolder(path).read(suite)], RunFolder(path))
     if path.is_dir() or path.suffix == ".zip":
-        return Source([*published_completions(path, suite)], left_aside=passed_over(path))
+        return Source([*published_completions(path, suite)], left_aside=left_aside_warning(path))
     if path.suffix == ".py":
         raise UserError(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
     return Source([*read_completions(path, suite)])
 
 
-LONGEST_ANSWER = 10 * MAX_ROW  # bytes; it may say more than we keep
+MAX_ANSWER_BYTES = 10 * MAX_ROW  # bytes; it may say more than we keep
 
 
 def is_answers(path: Path) -> bool:
     """Whether a file begins like one of requests to a batch endpoint, or of its answers."""
     if not path.is_file():
         return False
-    _, line = next(read_lines(path, limit=LONGEST_ANSWER), (0, b""))
+    _, line = next(read_lines(path, limit=MAX_ANSWER_BYTES), (0, b""))
     try:
         row = parsed_row(line)
     except UserError:

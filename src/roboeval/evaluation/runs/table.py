@@ -201,7 +201,7 @@ def storable(text: str) -> str:
 
 
 TABLE_FORMATS = ("csv", "parquet")
-BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # of files in these formats
+TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # of files in these formats
 
 
 def kind_of(path: Path | None) -> str:

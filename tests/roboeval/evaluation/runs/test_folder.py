@@ -55,7 +55,7 @@ def careful_run(path: Path, suite: Suite) -> RunFolder:
 def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS, "go_to('nowhere')\n"])
     judged(run, paper)
-    about = json.loads(run.head("paper").read_text())
+    about = json.loads(run.manifest("paper").read_text())
     assert about["suite"] == "paper"
     assert about["digest"] == paper.digest
     assert about["rules"]["literals"] == "lowercase"
@@ -146,7 +146,7 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     assert kills >= 3
     rows = judged(run, paper)
     assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
-    assert run.head("paper").read_bytes() == whole.head("paper").read_bytes()
+    assert run.manifest("paper").read_bytes() == whole.manifest("paper").read_bytes()
     assert len(rows) == sum(1 for _ in read_completions(run.completions))
 
 
@@ -243,12 +243,12 @@ def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
 ) -> None:
     run = a_run(tmp_path / "run", [GREETS])
     judged(run, paper)
-    about = json.loads(run.head("paper").read_text())
-    run.head("paper").write_text(json.dumps(about | {name: value}))
+    about = json.loads(run.manifest("paper").read_text())
+    run.manifest("paper").write_text(json.dumps(about | {name: value}))
     with pytest.raises(UserError, match=rf"{re.escape(what)}.* --redo"):
         judged(run, paper)
     assert len(judged(run, paper, redo=True)) == 1
-    assert json.loads(run.head("paper").read_text()) == about
+    assert json.loads(run.manifest("paper").read_text()) == about
 
 
 def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, paper: Suite) -> None:
@@ -295,12 +295,12 @@ def test_further_tasks_are_judged_beside_those_that_were(tmp_path: Path, paper: 
     before = run.rows("paper").read_bytes()
     assert judged_tasks("LunchTime", "SayGoodDay") == ["SayGoodDay", "SayGoodDay", "LunchTime"]
     assert run.rows("paper").read_bytes().startswith(before)
-    whole = run.rows("paper").read_bytes(), run.head("paper").read_bytes()
+    whole = run.rows("paper").read_bytes(), run.manifest("paper").read_bytes()
     assert json.loads(whole[1])["tasks"] == ["LunchTime", "SayGoodDay"]
     assert judged_tasks("LunchTime") == ["LunchTime"]
-    assert (run.rows("paper").read_bytes(), run.head("paper").read_bytes()) == whole
+    assert (run.rows("paper").read_bytes(), run.manifest("paper").read_bytes()) == whole
     assert len(judged_tasks()) == 3
-    assert json.loads(run.head("paper").read_text())["tasks"] is None
+    assert json.loads(run.manifest("paper").read_text())["tasks"] is None
 
 
 def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
@@ -396,10 +396,10 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
 def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", ["def task_program(): pass\n"])
     judged(run, paper)
-    run.head("paper").unlink()
+    run.manifest("paper").unlink()
     with pytest.raises(UserError, match="--redo") as error:
         judged(run, paper)
-    assert error.value.file == run.head("paper")
+    assert error.value.file == run.manifest("paper")
 
 
 def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(

@@ -58,7 +58,7 @@ def run(finished: RunFolder, tmp_path: Path) -> RunFolder:
 
 
 def head(run: RunFolder) -> dict[str, Any]:
-    return json.loads(run.head("paper").read_text())  # type: ignore[no-any-return]  # JSON
+    return json.loads(run.manifest("paper").read_text())  # type: ignore[no-any-return]  # JSON
 
 
 def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: RunFolder) -> None:
@@ -118,12 +118,12 @@ def test_rows_that_are_missing_or_too_many_are_noticed(run: RunFolder) -> None:
 
 
 def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: RunFolder, paper: Suite) -> None:
-    sealed = run.head("paper").read_bytes()
+    sealed = run.manifest("paper").read_bytes()
     unseal(run.path)
     assert len(read(run).places) == 3
     assert read(run, faults=[]).faults == ()
     judged(run, paper)
-    assert run.head("paper").read_bytes() == sealed
+    assert run.manifest("paper").read_bytes() == sealed
 
 
 def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: RunFolder, paper: Suite) -> None:
