@@ -20,7 +20,7 @@ from roboeval.cli.options import (
     RunArgument,
     SuiteOption,
     WorkersOption,
-    path_argument,
+    path_to,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
@@ -35,7 +35,7 @@ def compare(
     runs: Annotated[
         list[Path],
         typer.Argument(
-            help="Two runs that were judged; with --suites, one or more.", parser=path_argument("a run")
+            help="Two runs that were judged; with --suites, one or more.", parser=path_to("a run")
         ),
     ],
     suite: SuiteOption = "paper",

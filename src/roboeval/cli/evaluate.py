@@ -29,7 +29,7 @@ from roboeval.cli.options import (
     WorkersOption,
     WorldSeedOption,
     WorldsOption,
-    path_argument,
+    path_to,
 )
 from roboeval.cli.output import fail, note, progress_meter, show_progress
 from roboeval.cli.show import house_of, print_summary
@@ -183,7 +183,7 @@ def import_(
     ],
     out: Annotated[
         Path,
-        typer.Option(help="The run folder to create, or for answers theirs.", parser=path_argument("a run")),
+        typer.Option(help="The run folder to create, or for answers theirs.", parser=path_to("a run")),
     ],
     suite: SuiteOption = "paper",
 ) -> None:

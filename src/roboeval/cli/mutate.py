@@ -12,7 +12,7 @@ import typer
 
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import load
-from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, path_argument
+from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, path_to
 from roboeval.cli.output import note, print_rich, show_progress
 
 if TYPE_CHECKING:
@@ -53,9 +53,7 @@ def mutate(
     ] = 400,
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="Keep scores, mutants and survivors in this folder.", parser=path_argument("a folder")
-        ),
+        typer.Option(help="Keep scores, mutants and survivors in this folder.", parser=path_to("a folder")),
     ] = None,
     brief: Annotated[bool, typer.Option("--brief", help="Only the tables, without the survivors.")] = False,
     at_least: Annotated[

@@ -9,7 +9,7 @@ import typer
 
 from roboeval.cli.compare import check_run
 from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
-from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, path_argument
+from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, path_to
 from roboeval.cli.output import fail, note, show_progress
 
 if TYPE_CHECKING:
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(help="Runs that were judged.", parser=path_argument("a run"))],
-    out: Annotated[Path, typer.Option(help="The folder to write to.", parser=path_argument("a folder"))],
+    runs: Annotated[list[Path], typer.Argument(help="Runs that were judged.", parser=path_to("a run"))],
+    out: Annotated[Path, typer.Option(help="The folder to write to.", parser=path_to("a folder"))],
     suite: SuiteOption = "paper",
     published: Annotated[
         bool, typer.Option("--published", help="Add the paper's published causes of failures.")

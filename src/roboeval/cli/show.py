@@ -32,7 +32,7 @@ from roboeval.cli.options import (
     JsonOption,
     RunArgument,
     SuiteOption,
-    path_argument,
+    path_to,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich
 
@@ -194,7 +194,7 @@ def export(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The file; by default beside the verdicts.", parser=path_argument("a file")),
+        typer.Option(help="The file; by default beside the verdicts.", parser=path_to("a file")),
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,

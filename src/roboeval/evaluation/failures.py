@@ -1,4 +1,4 @@
-"""Why completions fail: no program, or one of the classes of the paper (section V.B), each with kinds."""
+"""Classes of failures: those of the paper (section V.B) and replies without a program."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class FailureClass:
     name: str  # in rows
     label: str  # for people
     plural: str
-    kinds: tuple[str, ...]  # those that tables always show; others appear as they come
-    ending: str = ""  # how a program ends by it, for people; by default "in a" with the label
-    is_always_shown: bool = True  # to people; of the others, only those that happened
+    kinds: tuple[str, ...]  # tables always show them; other kinds only if they happened
+    ending: str = ""  # how a program ends, for people; by default "in a" and the label
+    is_always_shown: bool = True  # other classes only if they happened
 
 
 FAILURE_CLASSES: Mapping[str, FailureClass] = {
@@ -80,48 +80,43 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
 
 
 def label_of(name: str) -> str:
-    """The label of a class; of an unknown one its name."""
+    """Return the label of a class, or its name if it is unknown."""
     return FAILURE_CLASSES[name].label if name in FAILURE_CLASSES else name
 
 
 def plural_of(name: str) -> str:
-    """The plural label of a class; of an unknown one its name."""
+    """Return the plural label of a class, or its name if it is unknown."""
     return FAILURE_CLASSES[name].plural if name in FAILURE_CLASSES else name
 
 
 def ending_of(name: str) -> str:
-    """How programs end that fail by a class, such as `in a Python error`."""
+    """Return how programs of a class end, such as `in a Python error`."""
     return (FAILURE_CLASSES[name].ending if name in FAILURE_CLASSES else "") or f"in a {label_of(name)}"
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:
-    """The classes that people are shown, given those by which something failed.
-
-    The paper's three are always shown, so that runs can be compared; `NoProgram` only where it happened.
-    """
+    """Return the classes to show: the paper's three, so that runs can be compared, and those that happened."""
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
-def no_program_sentence(failure_of_verdicts: Mapping[str, Any]) -> str | None:
-    """Why a reply held no program, in a sentence, from the failure of a row; None if it fails otherwise."""
-    if failure_of_verdicts["class"] != NO_PROGRAM_CLASS:
+def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
+    """Explain in a sentence why a reply held no program; None for other failures."""
+    if failure["class"] != NO_PROGRAM_CLASS:
         return None
-    return next(
-        (words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure_of_verdicts["kind"]), ""
-    )
+    return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a program did in one world."""
+    """The judgement on a program in one world."""
 
-    world: str  # what the world is about
+    world: str  # its description
     outcome: Outcome
     failed: tuple[Requirement, ...]  # in the task's order
     satisfied: bool
 
     def on(self, prompt: int) -> Verdict:
-        """The verdict on the program as one that was written for a prompt."""
+        """Return the verdict for one prompt, which may ask for less."""
         asked = tuple(requirement for requirement in self.failed if requirement.is_asked_by(prompt))
         if len(asked) == len(self.failed):
             return self
@@ -129,10 +124,10 @@ class Verdict:
 
 
 def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
-    """The failure of a completion: the first unsatisfied world decides; None if all are satisfied.
+    """Return the failure of a completion, which the first unsatisfied world decides; None if it passes.
 
-    Within that world the error decides, else the first failed check. Where a world may wait for ever,
-    reaching a limit is no error, so there the checks decide.
+    Within that world the error decides, or else the first failed check. In a world that may wait for ever,
+    reaching a limit is no error.
     """
     for index, verdict in enumerate(verdicts):
         if not verdict.satisfied:

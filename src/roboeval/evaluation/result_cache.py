@@ -1,4 +1,4 @@
-"""Results of runs that were judged before."""
+"""A cache of judgements on runs."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ MAX_RESULTS, MAX_RESULT_EVENTS = 2_048, 128  # results, and events of all runs o
 
 
 class ResultCache(Generic[CachedResult]):
-    """Results for runs: many programs do the same in the same world, and in worlds that are alike."""
+    """Cache of results for runs: many programs do the same in a world, and in similar worlds."""
 
     def __init__(self) -> None:
-        # An entry keeps the objects alive whose ids are in its key, so that no other object gets these ids.
+        # Keys hold ids, so an entry keeps these objects alive: no other object may get their ids.
         self._known: dict[tuple[object, ...], tuple[CachedResult, object]] = {}
 
     def of(
