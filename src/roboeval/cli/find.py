@@ -68,17 +68,15 @@ def find(
     together = group_failures(failed, results.programs)
     shown = together if json else together[:most]
     clusters = list(show_progress(describe_groups(shown, results), "comparing", len(shown)))
-    undecided = [one for one in every if one.undecided]
-    if cut := sum(bool(one.cut) for one in every):
-        note(f"undecided, since their traces were too long to keep: {how_many(cut)}")
-    if earlier := sum(bool(one.earlier) for one in every):
-        note(f"undecided, since an earlier version kept no places: {how_many(earlier)}; evaluate with --redo")
+    undecided = [one for one in every if one.cut]
+    if undecided:
+        note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")
     total, passed = count_searched(results.table, task), {*results.passed}
     if json:
         data = {
             "looked_at": total,
             "found": [found_data(one, one.worlds, passed) for one in found],
-            "undecided": [found_data(one, one.undecided, passed) for one in undecided],
+            "undecided": [found_data(one, one.cut, passed) for one in undecided],
         }
         print_json({**data, "groups": list(map(cluster_data, clusters))})
     else:

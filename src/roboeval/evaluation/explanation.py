@@ -15,14 +15,13 @@ from roboeval.evaluation.failures import no_program_sentence
 from roboeval.evaluation.remarks import remarks_on
 from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.evaluation.runs.replies import reply_data
-from roboeval.evaluation.runs.traces import can_judge, has_circumstances, trace_of
+from roboeval.evaluation.runs.traces import trace_of
 from roboeval.suites.load import Scenario, Suite
 
 INSTRUCTION_NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "this is the suite's text of the prompt:"
 PROGRAM_GONE = "the judged program is no longer in this run"
 SUITE_CHANGED = "the suite has changed since this was judged"
-PLACES_MISSING = "judged by an earlier version, which kept no places; evaluate again with --redo"
 TRACE_CUT = "the trace was too long to keep, so this cannot be explained"
 TRACES_TOO_LONG = "the traces of this program are too long to explain this as well"
 
@@ -113,7 +112,7 @@ def _world_data(
     world, rules = None if scenario is None else scenario.world, None if suite is None else suite.rules
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
-        "steps": steps_of(trace, has_places=has_circumstances(verdict)),
+        "steps": steps_of(trace, has_places=True),
         **({} if cut is None else {"cut": cut}),
         "remarks": remarks_on(verdict, trace, world, rules),
         "failed_checks": [
@@ -133,8 +132,6 @@ def _explained(
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
         return {"explanation": f"{SUITE_CHANGED} and no longer requires this here", "step": None}
-    if not can_judge(requirement.formula, verdict):
-        return {"explanation": PLACES_MISSING, "step": None}
     if not patience.reaches_for(trace):
         return {"explanation": TRACES_TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)

@@ -25,13 +25,13 @@ class ResultCache(Generic[CachedResult]):
         key: tuple[object, ...],
         keep_alive: object,
         runs: Iterable[Outcome],
-        found: Callable[[], CachedResult],
+        compute: Callable[[], CachedResult],
     ) -> CachedResult:
         """Return the result for runs, computed if the key is new; the entry keeps an object alive."""
         known = self._known.get(key)  # another thread may clear it at any moment
         if known is not None:
             return known[0]
-        value = found()
+        value = compute()
         if len(self._known) >= MAX_RESULTS:
             self._known.clear()
         if sum(len(outcome.trace) for outcome in runs) <= MAX_RESULT_EVENTS:

@@ -53,15 +53,11 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 def report_back_sentences(table: Sheet) -> list[str]:
     """Sentences about tasks that end with a report."""
     return [
-        f"{name}: of {failed:,} failures in tasks that end with a report, {_count_or_unknown(away)} never "
+        f"{name}: of {failed:,} failures in tasks that end with a report, {away:,} never "
         f"returned and {lost:,} went to a room that does not exist."
         for name, tasks, _, _, failed, away, _, lost, _ in table.rows[:MOST_SENTENCES]
         if tasks == WITH_REPORT and failed
     ]
-
-
-def _count_or_unknown(count: int | None) -> str:
-    return "an unknown number (judged by an earlier version)" if count is None else f"{count:,}"
 
 
 # --- phrasing

@@ -32,6 +32,7 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
         "line": None,
         "failed_checks": [check],
         "trace": [["goto", "hall"]],
+        "places": [],
     }
     why: Failure = {"class": "TaskCompletionError", "kind": "Location", "world": 1, "check": check}
     first: WorldVerdict = {**verdict, "satisfied": True, "failed_checks": [], "trace": [["say", "x"]]}

@@ -50,9 +50,9 @@ Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_le
 
 
 class WorldVerdict(TypedDict):
-    """What a row says of one world; the last five entries are about the events of `trace`.
+    """The judgement in one world; the last five entries are about the events of `trace`.
 
-    Rows of earlier versions have no `places`. A trace too long for its row ends early, with a `cut`.
+    A trace too long for its row ends early, with a `cut`.
     """
 
     world: str
@@ -62,7 +62,7 @@ class WorldVerdict(TypedDict):
     line: int | None
     failed_checks: list[str]
     trace: list[list[Any]]
-    places: NotRequired[Numbered]
+    places: Numbered
     holding: NotRequired[Numbered]
     to: NotRequired[Numbered]
     destinations: NotRequired[Numbered]

@@ -7,8 +7,6 @@ from typing import Any
 
 from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Trace, trace_from
-from codebotler.rtl import Formula
-from codebotler.rtl.reasoning.alphabet import elements
 
 CIRCUMSTANCES = ("places", "holding", "to", "destinations")
 
@@ -73,14 +71,11 @@ def without_trace(verdict: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def trace_of(verdict: Mapping[str, Any]) -> Trace:
-    """The trace of a verdict as a row has it, with all that formulas compare, if the row keeps that."""
-    trace = trace_from(verdict["trace"])
-    if not has_circumstances(verdict):
-        return trace
+    """Restore the trace of a verdict in a row, with all that formulas compare."""
     places, holding, to, destinations = (dict(verdict.get(name, ())) for name in CIRCUMSTANCES)
     here, held, events = "", "", []
     asked: dict[str, str | None] = {}  # by the kind of event
-    for number, event in enumerate(trace, 1):
+    for number, event in enumerate(trace_from(verdict["trace"]), 1):
         here, held = places.get(number, here), holding.get(number, held)
         if number in to:
             asked[event.kind] = to[number]
@@ -90,15 +85,3 @@ def trace_of(verdict: Mapping[str, Any]) -> Trace:
             led = destinations.get(number, places.get(number + 1, here))
         events.append(Event(*seen, here, 0.0, held, asked.get(event.kind), event.more, led))
     return tuple(events)
-
-
-def has_circumstances(verdict: Mapping[str, Any]) -> bool:
-    """Whether a row says where events happened; those of earlier versions do not."""
-    return "places" in verdict
-
-
-def can_judge(formula: Formula, verdict: Mapping[str, Any]) -> bool:
-    """Whether the row of a verdict keeps all that a formula compares."""
-    return has_circumstances(verdict) or all(
-        (one.place, one.holding, one.to) == (None, None, None) for one in elements(formula)
-    )
