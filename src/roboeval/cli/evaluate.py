@@ -1,10 +1,10 @@
-"""Commands that judge completions, and make a run of those from elsewhere: evaluate, import."""
+"""The commands evaluate, which judges completions, and import, which makes a run of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -71,6 +71,7 @@ def evaluate(
         from roboeval.evaluation.runs.completions import how_many
         from roboeval.evaluation.runs.folder import RunFolder, about_of, tasks_to_judge
         from roboeval.evaluation.runs.scope import JudgingScope
+        from roboeval.evaluation.runs.source import open_source
 
         judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
@@ -81,12 +82,12 @@ def evaluate(
         tally, table, is_started = Tally(), None if rules is None else _new_table(), False
         run = None if out is None else RunFolder(out)
         try:
-            opened = open_named_source(source, judged_by)
+            opened = open_source(source, judged_by)
             run = run or opened.run
             about = {} if opened.run is None else about_of(opened.run)
             scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
-                fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
+                fail(f"{source}: contains no completion of {tasks or 'a task with an ablation'}")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
                 run.keep(opened.completions)
             running = engine_for(scope.total)
@@ -105,26 +106,20 @@ def evaluate(
         if run is not None:
             _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
         if (left_out := scope.total - judged_count(counted.prompts)) > 0:
-            _fail_with_some_left(how_many(left_out), scope.total, is_kept=run is not None)
+            again = "the others are judged" if run is None else "the same command tries again"
+            note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
+            raise SystemExit(1)
 
 
 def _new_table() -> TableBuilder:
-    from roboeval.evaluation.runs.table import TableBuilder  # with polars, which takes a tenth of a second
+    from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which is slow
 
     return TableBuilder()
-
-
-def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoReturn:
-    """End with status 1, since some completions have no verdict."""
-    again = "the same command tries again" if is_kept else "the others are judged"
-    note(f"roboeval: not judged: {left_out} of {total:,}; {again}")
-    raise SystemExit(1)
 
 
 def _name_next_command(
     run: RunFolder, failed: CompletionKey | None, *, suite: str, ablated: bool, rules: Path | None
 ) -> None:
-    """Note where verdicts are kept, and the command that shows the first failure."""
     from roboeval.evaluation.runs.completions import name_of
 
     shown = [] if failed is None else [name_of(failed)]
@@ -133,18 +128,8 @@ def _name_next_command(
     note(f"verdicts are in {run.path}; `{again}` {does}")
 
 
-def open_named_source(text: str, suite: Suite) -> Source:
-    """Completions that a user names; note which files were left aside."""
-    from roboeval.evaluation.runs.source import open_source
-
-    source = open_source(text, suite)
-    if source.left_aside is not None:
-        note(source.left_aside)
-    return source
-
-
 def stop_sentence(*, is_kept: bool, is_started: bool, redo: bool) -> str:
-    """What Ctrl-C leaves behind, and how to go on."""
+    """Say what Ctrl-C leaves behind, and how to continue."""
     if not is_kept:
         return "stopped; nothing is kept (add --out RUN to keep verdicts)"
     if not is_started:
@@ -162,7 +147,6 @@ def _judged(
     redo: bool,
     engine: OpenEngine,
 ) -> Iterator[Row]:
-    """Judge completions, in a run if there is one to keep the rows."""
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import judgements
     from roboeval.evaluation.runs.rows import decode_row
@@ -193,12 +177,12 @@ def import_(
     """
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import RunFolder
-    from roboeval.evaluation.runs.source import is_answers
+    from roboeval.evaluation.runs.source import is_answers, open_source
 
     if is_answers(Path(path)):
         import_batch(Path(path), out, suite)
         return
-    completions = open_named_source(path, load(suite)).completions
+    completions = open_source(path, load(suite)).completions
     RunFolder(out).keep(completions)
     count = len(completions)
     again = command("evaluate", out, suite=suite)
@@ -226,12 +210,12 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     for sentence in missing_sentences(found):
         note(sentence)
     if missing:
-        note(f"roboeval: {how_many(missing)} missing; `roboeval generate --requests` asks for them again")
+        note(f"roboeval: {how_many(missing)} missing; `roboeval generate --requests` requests them again")
         raise SystemExit(1)
 
 
 def missing_sentences(found: ImportResult) -> Iterator[str]:
-    """For each error, how many requests ended with it, and which; then those without an answer."""
+    """Yield a sentence for each error with its requests, then one for requests without an answer."""
     by_error: dict[str, list[CompletionKey]] = {}
     for key, error in found.failed.items():
         by_error.setdefault(error, []).append(key)
@@ -241,11 +225,11 @@ def missing_sentences(found: ImportResult) -> Iterator[str]:
         yield f"{counted(len(found.unanswered), 'request')} without an answer: {_named(found.unanswered)}"
 
 
-SHOWN = 10  # names of requests in a sentence
+MAX_NAMED_REQUESTS = 10  # in a sentence
 
 
 def _named(keys: Sequence[CompletionKey]) -> str:
     from roboeval.evaluation.runs.completions import name_of
 
-    more = len(keys) - SHOWN
-    return ", ".join(map(name_of, keys[:SHOWN])) + (f" and {more:,} more" if more > 0 else "")
+    more = len(keys) - MAX_NAMED_REQUESTS
+    return ", ".join(map(name_of, keys[:MAX_NAMED_REQUESTS])) + (f" and {more:,} more" if more > 0 else "")

@@ -222,7 +222,7 @@ def run(
     suite, plan, model = what.suite, what.plan, what.open()
     note_unsent(what.settings, model)
     first = what.run_of(model)
-    expect_same_judge(first, plan.suite)  # before anything is paid for
+    expect_same_judge(first, plan.suite, ablated=False)  # before anything is paid for
     path = complete_run(first, plan, model, what.pace)
     evaluate(
         str(path),
