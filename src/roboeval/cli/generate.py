@@ -272,7 +272,7 @@ class GenerationMeter(ExitStack):
                 note(f"{progress.found:,} of {counted(progress.total, 'completion')} were there already")
             if progress.interrupted:
                 note(
-                    f"{requests_under_way(progress.interrupted)} when this was interrupted, which may be paid twice"
+                    f"{requests_under_way(progress.interrupted)} at the interruption; these may be paid twice"
                 )
             self._draw = self.enter_context(progress_meter("generating", progress.total, progress.found))
         else:

@@ -95,7 +95,7 @@ def ending_of(name: str) -> str:
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:
-    """Return the classes to show: the paper's three, so that runs can be compared, and those that happened."""
+    """Return the paper's three classes, so that runs can be compared, and those that happened."""
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 

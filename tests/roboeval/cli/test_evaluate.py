@@ -232,8 +232,8 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
 def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     script = (
-        "import pathlib, sys\nfrom roboeval.evaluation.runs.folder import Run\n"
-        f"with Run(pathlib.Path({str(tmp_path / 'run')!r})).writing():\n"
+        "import pathlib, sys\nfrom roboeval.evaluation.runs.folder import RunFolder\n"
+        f"with RunFolder(pathlib.Path({str(tmp_path / 'run')!r})).writing():\n"
         "    print('on', flush=True)\n    sys.stdin.read()\n"
     )
     with subprocess.Popen(

@@ -389,13 +389,13 @@ sys.path.insert(0, {tests!r})
 from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import Pace, generate_run
 from roboeval.evaluation.requests import GenerationPlan
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import load_suite
 from scripted_model import Scripted
 print("on", flush=True)
 {before}
 generate_run(
-    Run(pathlib.Path({run!r})), GenerationPlan(load_suite(), {tasks!r}, {count}),
+    RunFolder(pathlib.Path({run!r})), GenerationPlan(load_suite(), {tasks!r}, {count}),
     Scripted(seconds={seconds}, log=pathlib.Path({log!r})), Pace(concurrency=5),
 )
 """

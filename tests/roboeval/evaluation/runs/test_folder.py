@@ -106,9 +106,9 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
         script = (
             "import sys, pathlib\n"
             "from roboeval.evaluation.evaluate import evaluate_run\n"
-            "from roboeval.evaluation.runs.folder import Run\n"
+            "from roboeval.evaluation.runs.folder import RunFolder\n"
             "from roboeval.suites.load import load_suite\n"
-            f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+            f"run = RunFolder(pathlib.Path({str(run.path)!r}))\n"
             "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, "
             f"workers={workers}): pass\n"
         )
@@ -127,9 +127,9 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     script = (
         "import pathlib\n"
         "from roboeval.evaluation.evaluate import evaluate_run\n"
-        "from roboeval.evaluation.runs.folder import Run\n"
+        "from roboeval.evaluation.runs.folder import RunFolder\n"
         "from roboeval.suites.load import load_suite\n"
-        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        f"run = RunFolder(pathlib.Path({str(run.path)!r}))\n"
         "print('on', flush=True)\n"
         "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=2): pass\n"
     )
@@ -213,8 +213,8 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
     run = a_run(tmp_path / "run", [GREETS])
     script = (
         "import pathlib, sys, time\n"
-        "from roboeval.evaluation.runs.folder import Run\n"
-        f"with Run(pathlib.Path({str(run.path)!r})).writing():\n"
+        "from roboeval.evaluation.runs.folder import RunFolder\n"
+        f"with RunFolder(pathlib.Path({str(run.path)!r})).writing():\n"
         "    print('on', flush=True)\n"
         "    sys.stdin.read()\n"
     )
@@ -368,9 +368,9 @@ def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> Non
     script = (
         "import pathlib, resource, signal\n"
         "from roboeval.evaluation.evaluate import evaluate_run\n"
-        "from roboeval.evaluation.runs.folder import Run\n"
+        "from roboeval.evaluation.runs.folder import RunFolder\n"
         "from roboeval.suites.load import load_suite\n"
-        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        f"run = RunFolder(pathlib.Path({str(run.path)!r}))\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "rows = evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=1)\n"
         "next(rows)\n"
