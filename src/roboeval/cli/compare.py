@@ -1,4 +1,4 @@
-"""The commands compare and resample: two runs or suites, and the effect of checking programs before a run."""
+"""The commands compare, for two runs or suites, and resample, for the effect of rejection sampling."""
 
 from __future__ import annotations
 
@@ -58,10 +58,7 @@ def compare(
     elif len(runs) == _PAIR:
         compare_runs(runs, suite, ablated=ablation, as_json=json)
     else:
-        fail(
-            f"a comparison takes two runs, and {len(runs)} {'is' if len(runs) == 1 else 'are'} named; "
-            "with --suites it takes any number"
-        )
+        fail(f"name two runs rather than {len(runs)}; with --suites, any number")
 
 
 _PAIR = 2
@@ -152,7 +149,7 @@ def resample(
 
 
 def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
-    """The table of a run with the answers of the check to each program; the run keeps the answers."""
+    """Check the programs of a run, save the results in the run, and return its table with them."""
     from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 

@@ -62,7 +62,7 @@ def find(
     expect_query(query, known, ablated=ablation)
     lines: list[bytes] = []
     results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
-    every = list(show_progress(search(lines, query, workers=workers or cores()), "looking", len(lines)))
+    every = list(show_progress(search(lines, query, workers=workers or cores()), "searching", len(lines)))
     found = [one for one in every if one.worlds]
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = group_failures(failed, results.programs)
@@ -86,7 +86,7 @@ def find(
 
 
 def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
-    """Refuse a wrong formula, and a world that no task has."""
+    """Raise UserError for an invalid formula or a world that no task has."""
     from codebotler.core.errors import UserError
     from codebotler.rtl import RtlSyntaxError, parse
 
@@ -109,7 +109,7 @@ def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
 def found_data(
     one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[CompletionKey]
 ) -> dict[str, Any]:
-    """A completion and the worlds in which it was found, as JSON."""
+    """Return a completion and the worlds in which it was found as JSON data."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {

@@ -1,4 +1,4 @@
-"""The commands generate and run; run evaluates and reports as well."""
+"""The commands generate, and run, which also evaluates and reports."""
 
 from __future__ import annotations
 
@@ -13,10 +13,7 @@ import typer
 
 from codebotler.cli.ending import STOPPED
 from codebotler.cli.model_options import inherit_options, model_settings, note_unsent
-from codebotler.cli.options import (
-    BaseUrlOption,
-    ModelOption,
-)
+from codebotler.cli.options import BaseUrlOption, ModelOption
 from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
 from roboeval.cli.engine_choice import engine_named
@@ -55,17 +52,17 @@ MAX_BATCH_REQUESTS = 50_000
 
 @dataclass(frozen=True)
 class GenerationRequest:
-    """What a command requests: of which model, and for which run."""
+    """The completions that a command requests, of a model and for a run."""
 
     name: str  # of the model
     settings: SamplingSettings
     plan: GenerationPlan
     pace: Pace
-    suite: str  # as --suite takes it
+    suite: str  # the value of --suite
     out: Path | None
 
     def run_of(self, model: Model | BatchModel) -> RunFolder:
-        """The run that is named, or else that of the model."""
+        """Return the run of --out, by default one named after the model."""
         from roboeval.evaluation.runs.folder import RunFolder
 
         folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
@@ -73,7 +70,7 @@ class GenerationRequest:
         return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
     def open(self) -> Model:
-        """Open the model that is asked."""
+        """Open the model."""
         from codebotler.models.open import open_model
         from codebotler.models.recorded import is_recorded
         from roboeval.evaluation.runs.source import recorded_model_for
@@ -98,7 +95,7 @@ def read_options(
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
-    """What options request."""
+    """Interpret the options that `generate` and `run` share."""
     from codebotler.models.chosen import choose_model
     from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
@@ -116,19 +113,19 @@ def read_options(
 
 
 def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
-    """The name of the suite that families make of a seed, which stands in the place of --suite."""
+    """Return the name of the suite of families, which replaces --suite."""
     from roboeval.suites.families.suite import FamilyTasks
     from roboeval.suites.families.tasks import family_names
 
     if families is None:
         fail("--num-tasks needs --families; add it")
     if suite != "paper":
-        fail("--families makes a suite of its own; leave out --suite")
+        fail("--families creates its own suite; leave out --suite")
     return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
 def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
-    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
+    """Generate the missing completions of a run; exit with status 1 if some are still missing."""
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
@@ -137,7 +134,7 @@ def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace)
         with meter:
             progress = generate_run(run, plan, model, pace, on_progress=meter.show)
     except KeyboardInterrupt:
-        note(f"roboeval: {meter.after_a_stop()}")
+        note(f"roboeval: {meter.stop_sentence()}")
         raise SystemExit(STOPPED) from None
     if progress.missing is not None:
         note(f"roboeval: {progress.missing}; the same command continues where it stopped")
@@ -168,7 +165,7 @@ def generate(
 
 
 def write_batch(what: GenerationRequest, path: Path) -> None:
-    """Write the requests of a run to a file, and note how to go on."""
+    """Write the requests of a run to a file, and note how to continue."""
     with installed():
         from codebotler.models.batch import BatchModel
     from roboeval.evaluation.batches import write_requests
@@ -213,7 +210,7 @@ def run(
     if repair and retries:
         fail("--repair and --retries exclude each other; give one of them")
     if json and (repair or retries):
-        fail("--json prints the first programs only; leave it out, and evaluate each round's folder with it")
+        fail("--json excludes --repair and --retries; evaluate each round's folder with it instead")
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
@@ -249,7 +246,7 @@ def run(
 
 
 def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
-    """Write the report of a run and its rounds to the folder of the run."""
+    """Write the report of a run and its rounds into the folder of the run."""
     folder = paths[0] / "report"
     try:
         report(paths, folder, suite=suite, workers=workers)
@@ -265,7 +262,7 @@ class GenerationMeter(ExitStack):
     progress: GenerationProgress | None = None
 
     def show(self, progress: GenerationProgress) -> None:
-        """Draw the bar; start it first, and note what was done before."""
+        """Update the progress bar; first start it, and note the completions there are."""
         if self.progress is None:
             self.progress = progress
             if progress.found:
@@ -280,8 +277,8 @@ class GenerationMeter(ExitStack):
             rate = f"{progress.rate:.1f} a second"
             self._draw(progress.done, f"{rate}, {tokens:,} tokens" if tokens else rate)
 
-    def after_a_stop(self) -> str:
-        """What Ctrl-C leaves behind, and how to go on."""
+    def stop_sentence(self) -> str:
+        """Say what Ctrl-C leaves behind, and how to continue."""
         if self.progress is None:
             return "stopped before the first request; run the same command again"
         kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are kept"
@@ -291,5 +288,5 @@ class GenerationMeter(ExitStack):
 
 
 def requests_under_way(requests: int) -> str:
-    """Such as `1 request was under way`."""
+    """Format the number of pending requests, such as `1 request was under way`."""
     return f"{counted(requests, 'request')} {'was' if requests == 1 else 'were'} under way"

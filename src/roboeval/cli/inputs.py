@@ -1,4 +1,4 @@
-"""The suites and judged runs that command lines name."""
+"""The suites and judged runs of command lines."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
-    """Read a suite by name or folder, files of further skills, and the rules of a house."""
+    """Read a suite by name or folder, with files of further skills and of house rules."""
     from codebotler.checking.evasions import evasions
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
@@ -27,14 +27,12 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
 
     read = load_suite(suite, skills=skills_from(*(skills or ())))
     if rules is not None and read.house is not None:
-        raise UserError(
-            f'the suite "{read.name}" has house rules of its own, which would not count; leave out --rules'
-        )
+        raise UserError(f'the suite "{read.name}" has its own house rules; leave out --rules')
     if rules is None:
         return read
     rooms = rooms_in(read.tasks.values())
     house = HouseRules.read(rules, read.skills, rooms)
-    for sentence in evasions(house.rules, rooms, SKILLS):  # in simulation, rules see inside own skills
+    for sentence in evasions(house.rules, rooms, SKILLS):  # simulated rules look into users' skills
         note(sentence)
     return read.with_house_rules(house)
 
@@ -42,7 +40,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
 def command(
     verb: str, *arguments: object, suite: str, ablated: bool = False, rules: Path | None = None
 ) -> str:
-    """A command line to paste."""
+    """Return a command line to paste."""
     words = ["roboeval", verb, *map(str, arguments)]
     words += [] if suite == "paper" else ["--suite", suite]
     words += ["--ablation"] if ablated else []
@@ -51,14 +49,14 @@ def command(
 
 
 class Opened(NamedTuple):
-    """A judged run that a user names."""
+    """A judged run."""
 
     results: Results
-    again: str  # the command that goes on with judging it
+    again: str  # the command that continues its evaluation
 
 
 def note_houses(runs: Iterable[RunFolder], suite: str) -> None:
-    """Say that runs were judged with house rules, too, which are not shown unless they are named."""
+    """Note that runs were also judged with house rules, and which option shows that."""
     if houses := dict.fromkeys(house for run in runs for house in run.houses(suite)):
         files = " or ".join(f"--rules {house}.yaml" for house in houses)
         note(f"judged with house rules, too; {files} shows that")
@@ -133,10 +131,7 @@ def open_current(
     reuse_from: Results | None = None,
     on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run of which every verdict counts, as `open_run` does.
-
-    Raises UserError if there is none, or if the programs were changed since.
-    """
+    """Read a judged run with `open_run`; raise UserError if it has no verdicts, or outdated ones."""
     from codebotler.core.errors import UserError
 
     opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from, on_line=on_line)
@@ -150,7 +145,7 @@ def open_current(
 
 
 def stale_sentence(results: Results) -> str | None:
-    """A sentence about rows whose programs are no longer in the run; None without such rows."""
+    """Return a sentence about rows whose programs are no longer in the run, if there are any."""
     from roboeval.evaluation.runs.completions import name_of
 
     if not (stale := results.stale):
@@ -161,7 +156,7 @@ def stale_sentence(results: Results) -> str | None:
 
 
 def unfinished_sentence(results: Results) -> str | None:
-    """A clause about completions that are not judged yet; None without such completions."""
+    """Return a clause about completions that are not judged yet, if there are any."""
     from roboeval.evaluation.runs.completions import how_many
 
     count, total = len(results.places), results.scope.total
@@ -169,7 +164,6 @@ def unfinished_sentence(results: Results) -> str | None:
 
 
 def _continue_options(results: Results, suite: Suite) -> list[str]:
-    """Options with which a command goes on with an evaluation."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
     words = []

@@ -1,4 +1,4 @@
-"""The command for mutation testing of a suite."""
+"""The command mutate, which tests a suite by mutation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def mutate(
     also: Annotated[
         list[str] | None,
         typer.Option(
-            help="Mutate the right ones of these programs, too: a run, or anything else that "
+            help="Mutate the right ones of these programs, too: a run, or another source that "
             "`roboeval evaluate` reads; may be given several times."
         ),
     ] = None,
@@ -85,13 +85,13 @@ def mutate(
 
 
 def select_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
-    """The tasks that a user names, also with commas, as other commands take them after --tasks."""
+    """Return the tasks with these names, which may be separated by commas."""
     names = [name for word in words or suite.tasks for name in word.split(",")]
     return [suite.task(name) for name in dict.fromkeys(names)]
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """The programs of a user's sources by task, with repetitions."""
+    """Read the programs of sources, by task and with repetitions."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original
@@ -105,7 +105,7 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
 
 
 def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> None:
-    """Print the tables and the survivors, and note what makes a score doubtful."""
+    """Print the tables and the survivors, and note warnings."""
     from rich.console import Group
     from rich.text import Text
 

@@ -19,7 +19,7 @@ from roboeval.cli.output import fail
 
 
 def path_to(what: str) -> Callable[[str], Path]:
-    """A reader of paths that refuses the empty one, which would be the current folder."""
+    """Return a parser of paths that refuses an empty string, which would be the current folder."""
 
     def path(text: str) -> Path:
         return Path(text) if text else fail(f"the argument is empty; name {what}")

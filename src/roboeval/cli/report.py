@@ -1,4 +1,4 @@
-"""The command report, which draws figures and a page about runs."""
+"""The command report, which writes figures and a page about runs."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ def report(
     import atexit
     import gc
 
-    gc.disable()  # a fifth of the time would go into looking for cycles among all that a report holds,
-    atexit.register(gc.freeze)  # for the last time when Python ends
+    gc.disable()  # garbage collection would take a fifth of the time,
+    atexit.register(gc.freeze)  # also when Python exits
     from codebotler.core.terminal import busy
     from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines import Local
@@ -90,9 +90,9 @@ def report(
 def judged_run(
     results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
 ) -> JudgedRun:
-    """A run with its ablation, if that was judged, and its verdicts by the suite `beside` and with rules.
+    """Read a run with its ablation, if that was judged, its verdicts by another suite and with house rules.
 
-    Programs are checked on `engine`; without one, earlier answers of the check are left out, too.
+    The engine checks programs; without one, earlier results of the check are left out, too.
     """
     import polars as pl
 

@@ -1,4 +1,4 @@
-"""Further rounds of `roboeval run`: rejected programs are requested again or repaired, and all are judged."""
+"""Further rounds of `roboeval run`, which request rejected programs again and judge all programs."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ def further_rounds(
     engine: Callable[[], OpenEngine],
     complete: Callable[[RunFolder, GenerationPlan], Path],
 ) -> list[Path]:
-    """Request rejected programs again, round by round, judge all, and print what that brings.
+    """Request rejected programs again, in at most `most` rounds, and print the results of each round.
 
-    Returns:
-        the folders of the rounds, of which there are fewer once the check accepts all programs.
+    Returns the folders of the rounds, which end when the check accepts all programs.
     """
     from roboeval.cli.views.rounds import rounds_view
     from roboeval.evaluation.rounds import RoundPlan

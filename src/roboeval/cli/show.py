@@ -1,4 +1,4 @@
-"""The commands show, export and serve, which show what was judged."""
+"""The commands show, export and serve, which present judged runs."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def show(
 
 
 def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
-    """How a run did by the rules of a house, beside its evaluation without them if there is one."""
+    """Count broken house rules, and compare with the evaluation without rules if there is one."""
     from roboeval.analysis.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.evaluation.runs.results import read_results
@@ -165,7 +165,7 @@ def show_completion(
     with_reply: bool,
     as_json: bool,
 ) -> None:
-    """Print a completion, and the command that shows the program nearest to one that fails."""
+    """Print a completion, and for one that fails the command that shows the nearest program that passes."""
     from codebotler.core.words import counted
     from roboeval.analysis.cluster import nearest_fix
     from roboeval.cli.views.completions import completion_view
@@ -246,8 +246,8 @@ def serve(
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.asked_for(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
-        raise UserError("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
+        raise UserError("there is no such folder; `roboeval run` creates it with the first run", file=runs)
     suites = [load(each) for each in suite or ()]
     if not RunStore(runs).names():
-        note(f"{runs} has no runs yet; new ones will be shown")
+        note(f"{runs} has no runs yet; new ones will appear")
     server.serve(None, place, access, (pages(suites),), runs)

@@ -124,7 +124,6 @@ def _world_data(
 def _explained(
     check: str, scenario: Scenario | None, verdict: Mapping[str, Any], trace: Trace, budget: ExplanationBudget
 ) -> dict[str, Any]:
-    """Why a check fails, and the number of the step, from 1, that makes it fail, if it is one."""
     if "cut" in verdict:
         return {"explanation": TRACE_CUT, "step": None}
     require = () if scenario is None else scenario.require

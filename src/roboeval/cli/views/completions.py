@@ -1,4 +1,4 @@
-"""Views of a prompt's programs, each with the reason why it fails, and of one program with all it did."""
+"""Views of a prompt's programs, with reasons why they fail, and of one completion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from roboeval.evaluation.runs.completions import name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, world_title
 
-EXPLANATION = 2_000
+MAX_EXPLANATION = 2_000  # characters
 ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
 SHOW_REPLY = "--reply shows them."
@@ -35,7 +35,7 @@ SHOWN_REPLY_CHARACTERS = 100_000  # characters of a text of a reply
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
-    """A prompt, program by program; the data is that of `prompt_data`."""
+    """Show the programs of a prompt, given `prompt_data`."""
     table = grid("right", "left")
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _program_line(program))
@@ -59,19 +59,16 @@ def _program_line(program: Mapping[str, Any]) -> Text:
         why = shortened(error_sentence(program))
     else:
         label = visible(check_label(program["failure"]["check"]))
-        why = f"{label}: {shortened(program['explanation'], EXPLANATION)}"
+        why = f"{label}: {shortened(program['explanation'], MAX_EXPLANATION)}"
     return text.append(f"\n{why}" if why else "")
 
 
 def completion_view(
     data: Mapping[str, Any], *, in_full: bool = False, with_reply: bool = False
 ) -> RenderableType:
-    """One completion, as `completion_data` says: its program, and what the robot did in each world.
+    """Show a completion, given `completion_data`: its program, and what the robot did in each world.
 
-    Args:
-        data: the completion.
-        in_full: whether satisfied worlds are more than a line each.
-        with_reply: whether to show the reasoning and the reply as they came.
+    `in_full` also shows satisfied worlds in full, `with_reply` the unchanged reasoning and reply.
     """
     failure = data["failure"]
     why_none = None if failure is None else no_program_sentence(failure)
@@ -112,7 +109,6 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
 
 
 def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[RenderableType]:
-    """How a reply ended, and its texts or how long they are."""
     if reply is None:
         return []
     parts: list[RenderableType] = [Text()]
@@ -158,15 +154,14 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
         text = Text.assemble(
             ("failed ", "red"),
             visible(check_label(check["check"])),
-            f": {shortened(check['explanation'], EXPLANATION)}",
+            f": {shortened(check['explanation'], MAX_EXPLANATION)}",
         )
         parts.append(Padding(text, (0, 0, 0, 2)))
-    parts += [Padding(Text(shortened(one, EXPLANATION)), (0, 0, 0, 2)) for one in world["remarks"]]
+    parts += [Padding(Text(shortened(one, MAX_EXPLANATION)), (0, 0, 0, 2)) for one in world["remarks"]]
     return parts
 
 
 def _satisfied(world: Mapping[str, Any], title: Text) -> Text:
-    """A world that is satisfied, in one line."""
     ending = f", {world['status']} (allowed here)" if world["error"] else ""
     steps = len(world["steps"]) + world.get("cut", {}).get("events", 0)
     return Text.assemble(title, "  ", ("satisfied", "green"), f"{ending}, {counted(steps, 'step')}")
@@ -178,12 +173,12 @@ def _ending(world: Mapping[str, Any]) -> Text:
     if world["error"] is None:
         return text
     allowed = " (allowed here)" if world["satisfied"] else ""
-    told = ", ".join(filter(None, [visible(world["error"]["kind"]), shortened(error_sentence(world))]))
-    return text.append(f"{allowed}: {told}")
+    error = ", ".join(filter(None, [visible(world["error"]["kind"]), shortened(error_sentence(world))]))
+    return text.append(f"{allowed}: {error}")
 
 
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
-    """The head of a prompt: its score, and its instruction."""
+    """Show the score and the instruction of a prompt."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
     if (prompt["requested"] or 0) > prompt["completions"]:
         score += f"; {prompt['requested']:,} were requested"
@@ -199,5 +194,5 @@ def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
 
 
 def kind_view(failure: Mapping[str, Any]) -> Text:
-    """A failure's class and kind."""
+    """Show the class and the kind of a failure."""
     return Text.assemble((f"{visible(label_of(failure['class']))}: {visible(failure['kind'])}", "red"))

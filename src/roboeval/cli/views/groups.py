@@ -29,12 +29,12 @@ def found_view(
     found: Sequence[TraceMatch],
     counts: pl.DataFrame,
     total: int,
-    told: Sequence[Cluster],
+    shown: Sequence[Cluster],
     *,
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Some groups of failures; if something was looked for, below the completions found, task by task."""
+    """Show groups of failures, after a search below the completions found in each task."""
     failed = len(found) - int(counts["passed"].sum())
     parts: list[RenderableType] = []
     if is_search:
@@ -43,11 +43,11 @@ def found_view(
     if failed or not is_search:
         of = "these" if is_search else f"{total:,}"
         grouped = f", in {counted(groups, 'group')}" * (groups > 0)
-        parts.append(Text(f"{how_many(failed)} of {of} failed{grouped}{':' * bool(told)}", "bold"))
-    if told:
-        parts += [Text(), *map(cluster_view, told)]
-        if groups > len(told):
-            parts.append(Text(f"{groups - len(told):,} more groups; --groups shows more of them", "dim"))
+        parts.append(Text(f"{how_many(failed)} of {of} failed{grouped}{':' * bool(shown)}", "bold"))
+    if shown:
+        parts += [Text(), *map(cluster_view, shown)]
+        if groups > len(shown):
+            parts.append(Text(f"{groups - len(shown):,} more groups; --groups shows more of them", "dim"))
     return Group(*parts)
 
 
@@ -62,7 +62,7 @@ def _by_task(found: Sequence[TraceMatch], counts: pl.DataFrame) -> Table:
 
 
 def cluster_view(cluster: Cluster) -> RenderableType:
-    """A group of failures: their number, the reason, and the nearest program that passes."""
+    """Show a group of failures: their number, the reason, and the nearest program that passes."""
     size = how_many(len(cluster.members))
     name = visible(name_of(cluster.representative))
     head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
@@ -86,7 +86,7 @@ def cluster_view(cluster: Cluster) -> RenderableType:
 def resample_view(
     prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str, coverage: Coverage
 ) -> RenderableType:
-    """The results of asking again, by limit of retries."""
+    """Show the results of rejection sampling, by limit of retries."""
     reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
     table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
     for limit in (resample(prompts, retries) for retries in limits):

@@ -31,24 +31,23 @@ def load_results(
     ablation: bool = False,
     price: tuple[float, float] | None = None,
 ) -> pl.DataFrame:
-    """The verdicts of a judged run as one table, with a row for each completion and world.
+    """Read the verdicts of a judged run as one table, with a row for each completion and world.
 
     Args:
         run: the folder of the run.
-        suite: by which it was judged: a name, or a folder.
-        ablation: whether to take the verdicts on common sense only.
-        price: of a million tokens of input and of output, from which `cost` is reckoned.
+        suite: the name or folder of the suite that judged it.
+        ablation: whether to read the verdicts on common sense only.
+        price: the cost of a million tokens of input and of output, for the column `cost`.
 
     Returns:
-        a table in the order of the completions and of the worlds of their tasks. `task`, `prompt`, `index`,
-        `model`, `program_sha256`, `passed`, the failure (`failure_class`, `failure_kind`, `failure_world`,
-        `failure_check`: the first failure of the completion), `stale` (whether another program stands in the
-        run by now; then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
+        a table in the order of completions and worlds. These columns are the same for all worlds: `task`,
+        `prompt`, `index`, `model`, `program_sha256`, `passed`, the first failure (`failure_class`,
+        `failure_kind`, `failure_world`, `failure_check`), `stale` (whether the run now has another program;
+        then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
         `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost` and `accepted` (whether the
-        check found no problem; null where nobody checked) are the same in all rows of a completion;
-        `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`,
-        `failed_checks` (joined by "; "), `category` (of the first failed check) and `events` are about the
-        world. Numbers count from 0.
+        check found no problem; null if it was not checked). `world_number`, `world`, `satisfied`, `status`,
+        `error_kind`, `error_message`, `line`, `failed_checks` (joined by "; "), `category` (of the first
+        failed check) and `events` are about the world. Numbers count from 0.
 
     Raises:
         UserError: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
@@ -64,28 +63,28 @@ class Results:
 
     run: RunFolder
     key: str | None
-    suite: Suite | None  # None if it is not at hand
-    manifest: Mapping[str, Any]  # KEY.json: by what was judged
-    about: Mapping[str, Any]  # run.json: how the completions were asked for
+    suite: Suite | None  # None if it is not available
+    manifest: Mapping[str, Any]  # KEY.json
+    about: Mapping[str, Any]  # run.json
     completions: Mapping[CompletionKey, Completion]  # those in the run now, in order
     places: Mapping[CompletionKey, tuple[int, int]] = field(
         repr=False
     )  # first byte and size of each row in the file
     passed: Sequence[CompletionKey] = field(repr=False)
-    stale: Sequence[CompletionKey]  # whose verdicts are on other programs than stand in the run now
+    stale: Sequence[CompletionKey]  # their programs have changed since
     table: pl.DataFrame  # as `load_results` gives it
     failed: Mapping[CompletionKey, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
     faults: tuple[UserError, ...] = ()
 
     @property
     def known_suite(self) -> Suite:
-        """Its suite, where it was read with one."""
-        assert self.suite is not None, "only pages show runs whose suite is not at hand"
+        """Its suite, if it was read with one."""
+        assert self.suite is not None, "only pages show runs without their suite"
         return self.suite
 
     @property
     def tasks(self) -> frozenset[str] | None:
-        """The tasks that were selected, and those that were requested since; None for all."""
+        """The tasks that were selected or requested since; None for all."""
         selected, requested = selected_tasks(self.manifest), requested_tasks(self.about)
         if self.is_ablated or selected is None:
             return selected
@@ -93,22 +92,22 @@ class Results:
 
     @property
     def scope(self) -> JudgingScope:
-        """What there is to judge."""
+        """The completions to judge."""
         return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
 
     @property
     def is_ablated(self) -> bool:
-        """Whether common sense only was required."""
+        """Whether it required common sense only."""
         return (self.key or "").endswith(ABLATED)
 
     @property
     def programs(self) -> Mapping[CompletionKey, str]:
-        """The programs that were judged, but those that have changed or are gone since."""
+        """The judged programs that are still in the run."""
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
     def row(self, key: CompletionKey) -> Row:
-        """Read a row again, with all its traces; raises UserError if the file was written anew."""
+        """Read a row again, with all its traces; raise UserError if the file was replaced."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
         try:
@@ -122,7 +121,7 @@ class Results:
         raise UserError("was replaced meanwhile; try again", file=path)
 
     def failed_row(self, key: CompletionKey) -> Row:
-        """The row of a completion that failed, without traces of worlds that did not decide."""
+        """Return the row of a completion that failed, with the trace of the deciding world only."""
         row: Row = json.loads(self.failed[key])
         return row
 
@@ -194,7 +193,7 @@ def read_results(
 
 
 def without_other_traces(row: Row, world: int) -> bytes:
-    """A row as JSON, with the trace of one world only: a run may fail often, with long traces."""
+    """Encode a row with the trace of one world only, to save memory."""
     verdicts = [
         verdict if number == world else without_trace(verdict)
         for number, verdict in enumerate(row["verdicts"])
@@ -203,7 +202,6 @@ def without_other_traces(row: Row, world: int) -> bytes:
 
 
 def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
-    """The category of each requirement, by its task and its text."""
     tasks = () if suite is None else suite.tasks.values()
     return {
         (task.name, requirement.text): requirement.category
@@ -216,7 +214,6 @@ def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
 def _accepted(
     run: RunFolder, key: str | None, faults: list[UserError] | None
 ) -> Mapping[tuple[str, str], bool]:
-    """Whether the check found no problem, by task and hash of the program, where it was asked."""
     path = run.checks((key or "").removesuffix(ABLATED))
     accepted: dict[tuple[str, str], bool] = {}
     if not path.is_file():
@@ -231,7 +228,7 @@ def _accepted(
 def read_written(
     run: RunFolder, faults: list[UserError] | None
 ) -> tuple[Mapping[str, Any], Mapping[CompletionKey, Completion]]:
-    """How a run's completions were asked for, and they themselves."""
+    """Read the run.json and the completions of a run."""
     about = _load_or_add_fault(run.about, faults) if run.about.exists() else {}
     completions = read_completions(run.completions, growing=True, faults=faults)
     return about, {(sys.intern(one.task), one.prompt, one.index): one for one in completions}

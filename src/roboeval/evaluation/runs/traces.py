@@ -1,4 +1,4 @@
-"""Under which circumstances events happened: how rows keep that beside a trace, and how it is read back."""
+"""The circumstances of events, such as the room, which rows store separately from a trace."""
 
 from __future__ import annotations
 
@@ -12,20 +12,19 @@ CIRCUMSTANCES = ("places", "holding", "to", "destinations")
 
 
 def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
-    """Where events happened and what else formulas compare, as far as it changes; numbers count from 1.
+    """Return the changes of the circumstances that formulas compare; events count from 1.
 
-    `places` is always there, the others only where they hold something:
+    `places` is always present, the others only if they are not empty:
 
-    - `places`: `[number, room]`, from which event on the robot is in which room; the number of the last entry
-      may be one more than there are events.
-    - `holding`: `[number, thing]`, from which event on it holds what; nothing at first, and where the thing
-      is empty.
-    - `to`: `[number, person]`, whom a question is for, and those of its kind from then on; null for nobody.
-    - `destinations`: `[number, room]`, where a drive led, if not to the place of the next event; null if it
-      failed.
+    - `places`: `[number, room]`, the room from that event on; the last number may be one more than there
+      are events.
+    - `holding`: `[number, thing]`, what the robot holds from that event on; empty for nothing, as at first.
+    - `to`: `[number, person]`, who is asked by events of this kind from that one on; null for nobody.
+    - `destinations`: `[number, room]`, the goal of a drive, if it is not the place of the next event; null
+      if the drive failed.
     """
     places = [event.place for event in trace]
-    places += [event.destination or event.place for event in trace[-1:]]  # where the robot is at the end
+    places += [event.destination or event.place for event in trace[-1:]]  # the robot's last room
     drives = [number for number, event in enumerate(trace, 1) if event.kind == GOTO]
     led = [(number, trace[number - 1].destination) for number in drives]
     found = {
@@ -38,13 +37,11 @@ def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
 
 
 def _changes(values: Sequence[str], first: str | None) -> list[list[Any]]:
-    """The values that are others than the one before, with their numbers."""
     changes = enumerate(zip([first, *values], values, strict=False), 1)
     return [[number, new] for number, (old, new) in changes if new != old]
 
 
 def _changes_by_kind(trace: Trace) -> list[list[Any]]:
-    """Whom questions are for, where it is somebody else than for the last event of the same kind."""
     kinds = {event.kind for event in trace if event.to is not None}
     last: dict[str, str | None] = {}
     changes: list[list[Any]] = []
@@ -56,7 +53,7 @@ def _changes_by_kind(trace: Trace) -> list[list[Any]]:
 
 
 def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
-    """The data of a verdict with so many events; of the places, those after the last of them are kept."""
+    """Cut the data of a verdict to a number of events, but keep the place after the last one."""
     known = {name: verdict[name] for name in CIRCUMSTANCES if name in verdict}
     kept = {
         name: [entry for entry in entries if entry[0] <= count + (name == "places")]
@@ -66,7 +63,7 @@ def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
 
 
 def without_trace(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a verdict with no events."""
+    """Remove the events from the data of a verdict."""
     return {name: value for name, value in verdict.items() if name not in CIRCUMSTANCES} | {"trace": []}
 
 
