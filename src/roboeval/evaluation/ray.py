@@ -22,8 +22,8 @@ VERSIONS = f"codebotler {__version__} with Python {PYTHON_VERSION}"
 
 SHARDS_PER_CORE = 2  # submitted shards, so that no core waits for this process
 RETRIES = 20  # of a shard whose machine was lost
-POLL_SECONDS = 10  # between checks whether the cluster still has cores
-CONNECT_SECONDS = 5
+RAY_POLL_SECONDS = 10  # between checks whether the cluster still has cores
+RAY_CONNECT_SECONDS = 5
 
 
 class RayCluster:
@@ -96,7 +96,7 @@ class RayCluster:
         return int(self._ray.cluster_resources().get("CPU", 0))
 
     def _wait_for_some(self, shards: Iterable[Any]) -> Iterator[tuple[Any, list[Any]]]:
-        ended, _ = self._ray.wait(list(shards), timeout=POLL_SECONDS)
+        ended, _ = self._ray.wait(list(shards), timeout=RAY_POLL_SECONDS)
         if not ended and not self._cores():
             raise EngineError("the Ray cluster has no free core; start another node and try again")
         for shard in ended:
@@ -115,7 +115,7 @@ class RayCluster:
         # Ray itself would try for half a minute.
         host, _, port = self._address.rpartition(":")
         try:
-            socket.create_connection((host.strip("[]"), int(port)), CONNECT_SECONDS).close()
+            socket.create_connection((host.strip("[]"), int(port)), RAY_CONNECT_SECONDS).close()
         except (OSError, ValueError, OverflowError) as error:
             raise self._no_cluster(str(error)) from None
 

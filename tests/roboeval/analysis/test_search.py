@@ -99,16 +99,16 @@ def test_the_command(runs: Path) -> None:
     assert made.out.startswith("found ")
     assert "GrilledCheese" not in made.out
     of_the_task = json.loads(roboeval("find", runs, "--task", "SayGoodDay", "--json").out)
-    assert of_the_task["count_searched"] == len(of_the_task["found"]) > 0
-    assert f" of {of_the_task['count_searched']} completions" in made.out
+    assert of_the_task["looked_at"] == len(of_the_task["found"]) > 0
+    assert f" of {of_the_task['looked_at']} completions" in made.out
     assert " passes, and differs in " in made.out
     data = json.loads(roboeval("find", runs, "--json").out)
-    assert data["count_searched"] == len(data["found"])
+    assert data["looked_at"] == len(data["found"])
     failed = sum(not one["passed"] for one in data["found"])
     assert sum(group["size"] for group in data["groups"]) == failed > 0
     assert all(group["why"] for group in data["groups"])
     every = roboeval("find", runs).out
-    assert every.startswith(f"{failed} completions of {data['count_searched']} failed, in ")
+    assert every.startswith(f"{failed} completions of {data['looked_at']} failed, in ")
     assert "passed" not in every.splitlines()[2]
     there = json.loads(roboeval("find", runs, 'tr.Exists(goto("lab"))', "--json").out)["found"]
     said = roboeval("find", runs, 'tr.Exists(goto("lab"))').out.partition("failed, in")[0]

@@ -738,7 +738,7 @@ def test_tasks_are_listed_and_shown() -> None:
 def test_accepted_findings_are_shown_with_their_reasons() -> None:
     linted = roboeval("tasks", "HalloweenShopping", "--lint")
     assert linted.status == 0
-    assert re.search(r"\b1 finding\b.* --accepted\b", linted.out)
+    assert re.search(r"\b1 accepted finding\b.* --accepted\b", linted.out)
     shown = roboeval("tasks", "HalloweenShopping", "--lint", "--accepted")
     assert shown.status == 0
     assert re.search(r"HalloweenShopping.yaml:\d+: accepted: .* \[same-worlds: 4 and 5\]: \w+", shown.out)

@@ -166,7 +166,7 @@ not satisfied, finished
   6  office → lab  (asked for "the lab, please")
   7      picked up "mug"
   8      put down "mug"
-  9      wave "amy"
+  9      did wave "amy"
   failed greets("amy"): the robot"""
     assert story in text
 

@@ -90,7 +90,7 @@ def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.M
     def broken(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rollouts, "_judged", broken)
+    monkeypatch.setattr(rollouts, "_judge_batch", broken)
     with pytest.raises(EngineError, match="no process"):
         judge([saying("never judged before")])
 
