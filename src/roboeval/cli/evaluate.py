@@ -199,8 +199,8 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
 
     with path.open("rb") as file:
         count = sum(1 for _ in file)
-    with progress_meter("reading", count) as tell:
-        found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: tell(done, ""))
+    with progress_meter("reading", count) as update:
+        found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: update(done, ""))
     missing = len(found.failed) + len(found.unanswered)
     again = command("evaluate", out, suite=suite)
     note(

@@ -173,8 +173,8 @@ def write_batch(what: GenerationRequest, path: Path) -> None:
     with closing(BatchModel(what.name, what.settings)) as model:
         note_unsent(what.settings, model)
         run = what.run_of(model)
-        with progress_meter("writing", len(what.plan.keys())) as tell:
-            count = write_requests(run, what.plan, model, path, progress=lambda done: tell(done, ""))
+        with progress_meter("writing", len(what.plan.keys())) as update:
+            count = write_requests(run, what.plan, model, path, progress=lambda done: update(done, ""))
     again = command("import", "ANSWERS.jsonl", "--out", run.path, suite=what.suite)
     note(
         f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` takes the answers"

@@ -60,7 +60,7 @@ HouseRulesOption = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="A file of house rules; a program is stopped where it breaks one, and has failed.",
+        help="A file of house rules; a program that breaks one is stopped and fails.",
         parser=path_to("a file of rules"),
     ),
 ]

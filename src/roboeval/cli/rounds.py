@@ -36,7 +36,8 @@ def further_rounds(
     found: list[Round] = []
     runs = [run]
     while True:
-        completions = {one.key: one for one in runs[-1].read(plan.suite) if _is_of(one.key, plan)}
+        planned = {*plan.keys()}
+        completions = {one.key: one for one in runs[-1].read(plan.suite) if one.key in planned}
         problems = dict(_rejected(runs[-1], plan, completions, engine()))
         found.append(_round(runs[-1], plan, completions, problems, len(found), engine()))
         if not problems or len(found) > most:
@@ -54,10 +55,6 @@ def further_rounds(
         runs.append(following.folder(run))
     print_rich(rounds_view(found, repairs=repairs))
     return [one.path for one in runs[1:]]
-
-
-def _is_of(key: CompletionKey, plan: GenerationPlan) -> bool:
-    return (plan.tasks is None or key[0] in plan.tasks) and key[2] < plan.num_completions
 
 
 def _rejected(

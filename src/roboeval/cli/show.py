@@ -194,7 +194,7 @@ def export(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The file; by default beside the verdicts.", parser=path_to("a file")),
+        typer.Option(help="The file; by default next to the verdicts.", parser=path_to("a file")),
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,

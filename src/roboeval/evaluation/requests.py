@@ -91,12 +91,16 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 
 def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
     """Return the content of run.json; raise UserError if the run's completions were generated otherwise."""
+    suite = plan.suite
     fixed = {
         "model": model.name,
         "settings": _recorded(model.settings),
-        "template": template_hash(plan.suite.skills),
-        "suite": plan.suite.name,
+        "template": template_hash(suite.skills),
+        "suite": suite.name,
     }
+    families = {}
+    if suite.families is not None:
+        families["families"] = {**suite.families, "version": suite.version, "digest": suite.digest}
     earlier: dict[str, Any] = {}
     if run.about.exists():
         earlier = load_json_object(run.about)
@@ -108,7 +112,7 @@ def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel
         raise UserError(f"{why}; name another folder", file=run.about)
     return {
         **fixed,
-        **_families(plan.suite),
+        **families,
         "batches": batches(earlier),
         "usage": no_usage(),
         "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
@@ -145,12 +149,6 @@ def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the request batches of a run.json, in order."""
     found = metadata.get("batches")
     return [dict(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
-
-
-def _families(suite: Suite) -> dict[str, Any]:
-    if suite.families is None:
-        return {}
-    return {"families": {**suite.families, "version": suite.version, "digest": suite.digest}}
 
 
 def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
