@@ -24,7 +24,8 @@ def remarks_on(
     """Return sentences that explain a run in addition to its failed checks."""
     remarks = []
     if verdict["status"] == Status.TIMEOUT and (cycle := cycle_at_end(trace)) is not None:
-        remarks.append(cycle.sentence if verdict.get("cut") is None else cycle.sentence_at_least)
+        more = " times: " if verdict.get("cut") is None else " times or more: "
+        remarks.append(cycle.sentence.replace(" times: ", more, 1))
     if not verdict["satisfied"] and world is not None and rules is not None:
         remarks += misplaced_questions(trace, world, rules)
     return remarks
@@ -47,11 +48,6 @@ class Cycle:
         those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
         deeds = ", ".join(few([*(phrase(step, "base") for step in self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
-
-    @property
-    def sentence_at_least(self) -> str:
-        """The sentence for a trace of which only the first part was kept."""
-        return self.sentence.replace(" times: ", " times or more: ", 1)
 
 
 def cycle_at_end(trace: Trace) -> Cycle | None:
