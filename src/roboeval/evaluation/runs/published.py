@@ -54,8 +54,10 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
 def _by_key(files: Iterator[File], path: Path) -> dict[CompletionKey, File]:
     by_key: dict[CompletionKey, File] = {}
     for file in files:
-        match = PROGRAM_FILE_NAME.fullmatch(PurePosixPath(file[0]).name)
-        if match is None:
+        name = PurePosixPath(file[0]).name
+        if name.startswith("."):  # macOS adds such files to zips
+            continue
+        if (match := PROGRAM_FILE_NAME.fullmatch(name)) is None:
             raise UserError(f"a completion is named {NAMED}; rename or remove this file", file=file[0])
         key = match["task"], int(match["prompt"]), int(match["index"])
         if key in by_key:
@@ -100,7 +102,7 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
         return text_of(data, name, limit=MAX_ROW)
 
     for member in archive.infolist():
-        if member.filename.endswith(".py") and not PurePosixPath(member.filename).name.startswith("."):
+        if member.filename.endswith(".py"):
             name = f"{path}/{member.filename}"
             yield name, partial(read, member, name)
 
