@@ -94,8 +94,8 @@ def test_retries_as_they_are_elsewhere() -> None:
 
 
 def paper_run(name: str, **changes: Any) -> JudgedRun:  # noqa: ANN401 - of a made up run
-    head = {"suite": "paper", "digest": "0", **changes.pop("head", {})}
-    return made_up(name, {"CountSavory": (5,) * 5}, head=head, **changes)
+    manifest = {"suite": "paper", "digest": "0", **changes.pop("manifest", {})}
+    return made_up(name, {"CountSavory": (5,) * 5}, manifest=manifest, **changes)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def paper_run(name: str, **changes: Any) -> JudgedRun:  # noqa: ANN401 - of a ma
 )
 def test_names_of_the_papers_models(name: str, model: str | None) -> None:
     assert paper.model_of(paper_run(name)) == model
-    assert paper.model_of(paper_run(name, head={"suite": "mine"})) is None
+    assert paper.model_of(paper_run(name, manifest={"suite": "mine"})) is None
 
 
 def test_a_folder_names_a_model_only_where_nobody_else_does() -> None:
