@@ -174,7 +174,7 @@ def test_a_program_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, program=["x"]))
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
-    for said in ("program", "['x']", "a text"):
+    for said in ("program", "['x']", "a string"):
         assert said in refusal.sentence
 
 
