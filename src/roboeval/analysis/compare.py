@@ -141,7 +141,9 @@ def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
 def other_differences(first: Results, second: Results) -> list[str]:
     """Differences between two runs, other than the model, that may explain their results."""
     judged_with = ("python", "codebotler")  # run.json has the versions used for generation
-    runs = [{**one.about, **{name: one.head.get(name) for name in judged_with}} for one in (first, second)]
+    runs = [
+        {**one.about, **{name: one.manifest.get(name) for name in judged_with}} for one in (first, second)
+    ]
     found = []
     for name, words in COMPARED_SETTINGS.items():
         a, b = (run.get(name) for run in runs)

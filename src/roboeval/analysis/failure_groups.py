@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK_FUNCTION, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
-from roboeval.evaluation.failures import NO_PROGRAM
-from roboeval.evaluation.runs.completions import Key, name_of
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS
+from roboeval.evaluation.runs.completions import CompletionKey, name_of
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of, key_of
 
@@ -42,8 +42,8 @@ class FailureGroup:
 
     task: str
     failure: Mapping[str, Any]  # the failure of the representative
-    members: tuple[Key, ...]
-    representative: Key  # the first completion with the most frequent program
+    members: tuple[CompletionKey, ...]
+    representative: CompletionKey  # the first completion with the most frequent program
     program: str | None  # the program of the representative; None if it was removed
     reason: Mapping[str, Any]  # why the representative fails, in which world and line
     fix: Fix | None  # None if there is no program, or none that passes
@@ -51,7 +51,7 @@ class FailureGroup:
     @property
     def has_no_program(self) -> bool:
         """Whether the replies contained no program."""
-        return str(self.failure["class"]) == NO_PROGRAM
+        return str(self.failure["class"]) == NO_PROGRAM_CLASS
 
     @property
     def why(self) -> str:
@@ -66,7 +66,7 @@ class FailureGroup:
         return sorted({prompt for _, prompt, _ in self.members})
 
 
-def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]]:
+def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str]) -> list[list[Row]]:
     """Group failing completions, the largest groups first; groups of one size take turns by task.
 
     Replies without a program form one group for each task and kind.
@@ -92,7 +92,7 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
         most = max(often.values())
         row = next(row for row in rows if often[programs.get(key_of(row))] == most)
         program = programs.get(key_of(row))
-        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM
+        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM_CLASS
         yield FailureGroup(
             task=row["task"],
             failure=failure_of(row),
@@ -104,7 +104,7 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
         )
 
 
-def nearest_fix(results: Results, key: Key) -> Fix | None:
+def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
     """Find the smallest fix of a completion; None if its program was removed or none passes."""
     program = results.programs.get(key)
     return None if program is None else shortest_fix(program, _passing_of_task(results, key[0]))
@@ -117,9 +117,9 @@ def _passing_of_task(results: Results, task: str) -> list[PassingProgram]:
 
 
 def _group_similar(
-    rows: Sequence[Row], programs: Mapping[Key, str], shape_of: Callable[[str], ProgramLines]
+    rows: Sequence[Row], programs: Mapping[CompletionKey, str], shape_of: Callable[[str], ProgramLines]
 ) -> Iterator[list[Row]]:
-    if failure_of(rows[0])["class"] == NO_PROGRAM:
+    if failure_of(rows[0])["class"] == NO_PROGRAM_CLASS:
         yield sorted(rows, key=key_of)
         return
     of_shape: defaultdict[ProgramLines, list[Row]] = defaultdict(list)

@@ -16,7 +16,7 @@ from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
 from codebotler.rtl.wording import is_clear
 from codebotler.simulator.settings import whole_words
-from roboeval.evaluation.failures import failure
+from roboeval.evaluation.failures import failure_of_verdicts
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of
 from roboeval.linting.findings import Finding
@@ -120,7 +120,9 @@ def _why(failed: Failure, judged: Verdicts) -> str:
 
 def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
     """The failure of a program; None if it satisfies at least one prompt."""
-    failures = [failure([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)]
+    failures = [
+        failure_of_verdicts([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)
+    ]
     return None if None in failures else failures[0]
 
 

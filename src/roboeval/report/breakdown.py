@@ -10,7 +10,7 @@ import polars as pl
 
 from roboeval.analysis.breakdown import by_ability, compare_phrasings, compare_report_back, spread_by_task
 from roboeval.analysis.counts import prompt_scores
-from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.failures import FAILURE_CLASSES
 from roboeval.report.runs import JudgedRun, tasks_of
 from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet
 
@@ -33,8 +33,10 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows: list[list[Cell]] = []
     for ability, name in sorted(found, key=lambda key: order.index(key[0])):
         tasks, at, failed = found[ability, name]
-        rows.append([ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in CLASSES)])
-    return sheet("abilities", rows, shares=[one.plural for one in CLASSES.values()])
+        rows.append(
+            [ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in FAILURE_CLASSES)]
+        )
+    return sheet("abilities", rows, shares=[one.plural for one in FAILURE_CLASSES.values()])
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -52,7 +54,7 @@ def report_back_sentences(table: Sheet) -> list[str]:
     """Sentences about tasks that end with a report."""
     return [
         f"{name}: of {failed:,} failures in tasks that end with a report, "
-        f"{UNKNOWN_COUNT if away is None else format(away, ',')} never returned and {lost:,} went to a room "
+        f"{away:,} never returned and {lost:,} went to a room "
         "that does not exist."
         for name, tasks, _, _, failed, away, _, lost, _ in table.rows
         if tasks == REPORTING_TASKS and failed

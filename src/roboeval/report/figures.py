@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 
 from roboeval.analysis.metrics import TaskScore, overall, percent
 from roboeval.analysis.summary import ALL, PASSED, Causes, kinds_in_order
-from roboeval.evaluation.failures import CLASSES, NO_PROGRAM, plural_of, shown_classes
+from roboeval.evaluation.failures import FAILURE_CLASSES, NO_PROGRAM_CLASS, classes_to_show, plural_of
 from roboeval.report.drawing import (
     BACKGROUND,
     COLOURS,
@@ -203,7 +203,7 @@ def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequen
 def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
     """Draw the outcomes of completions by class, and the kinds of each class."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
-    shown = shown_classes(happened)
+    shown = classes_to_show(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}
     tallest = max(3, *map(len, kinds.values()))
     many = len(found) > MAX_NUMBERED_CELLS
@@ -248,12 +248,12 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]], shown: Sequence[st
 
 def _looks() -> dict[str, tuple[str, str]]:
     """The colour and the hatch of each outcome; the paper's classes always have the same ones."""
-    others = [name for name in CLASSES if name != NO_PROGRAM]
+    others = [name for name in FAILURE_CLASSES if name != NO_PROGRAM_CLASS]
     colours = cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5))
     hatches = cycle(("", "////", "\\\\\\\\", "....", ""))
     of_others = {one: look for one, *look in zip(others, colours, hatches, strict=False)}
     looks = {name: (colour, hatch) for name, (colour, hatch) in of_others.items()}
-    return {PASSED: (PALE, ""), NO_PROGRAM: (MUTED, ""), **looks}
+    return {PASSED: (PALE, ""), NO_PROGRAM_CLASS: (MUTED, ""), **looks}
 
 
 def _kinds(

@@ -110,7 +110,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """How each run was generated and judged."""
     rows: list[list[Cell]] = []
     for run in runs:
-        about, head = run.results.about, run.results.head
+        about, head = run.results.about, run.results.manifest
         settings = about.get("settings")
         shown = None
         if isinstance(settings, dict):
@@ -127,7 +127,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
     """Sentences about the suite and its rules."""
-    head = runs[0].results.head
+    head = runs[0].results.manifest
     version, digest = head.get("version"), head.get("digest")
     return (
         f'Judged with the suite "{runs[0].suite.name}", version {version}, hash {digest}.',

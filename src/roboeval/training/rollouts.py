@@ -12,7 +12,7 @@ from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import shared_pool
 from roboeval.evaluation.judge import are_met, may_satisfy, robot_in
-from roboeval.evaluation.rewards import Remembered, Share, asked_in, total
+from roboeval.evaluation.rewards import RewardCache, Share, requirements_of, total
 from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.suites.task import Scenario
@@ -95,7 +95,7 @@ def judge(
     return [known[names[one]] for one in rollouts]
 
 
-COMPONENT_CACHE: Remembered[Components] = Remembered()
+COMPONENT_CACHE: RewardCache[Components] = RewardCache()
 
 
 def _key(one: Rollout, worlds: int, house: HouseRules | None) -> bytes:
@@ -109,7 +109,7 @@ def _judge_batch(worlds: int, house: HouseRules | None, batch: Sequence[Rollout]
     task = trained_task(first.family, first.seed, worlds=worlds)
     task.expect_prompt(first.prompt_index)
     suite = task.suite.with_house_rules(house)
-    asked = asked_in(task.suite, task.name, first.prompt_index)
+    asked = requirements_of(task.suite, task.name, first.prompt_index)
     robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     worker = shared_pool().here()
     ran = worker.run_all([(one.program, robots) for one in batch])

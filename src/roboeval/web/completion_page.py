@@ -19,14 +19,14 @@ from codebotler.web.frame import PlainText, outside
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.failure_groups import Fix, nearest_fix
 from roboeval.evaluation.explanation import (
-    LOWERED,
+    LOWERCASED_NOTE,
     cut_sentence,
     error_sentence,
     failing_first,
     instruction_shown,
 )
 from roboeval.evaluation.failures import label_of, no_program_sentence
-from roboeval.evaluation.runs.completions import Key, by_hand, name_of
+from roboeval.evaluation.runs.completions import CompletionKey, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_person, world_title
 from roboeval.web.heat_map import MAX_NAME, run_address
@@ -65,7 +65,7 @@ def _read(
     if row is None:
         raise MissingError(f'this run has no completion "{shortened(name, MAX_NAME)}"')
     data = completion_details(snapshot, row)
-    key: Key = data["task"], data["prompt"], data["index"]
+    key: CompletionKey = data["task"], data["prompt"], data["index"]
     has_failed = data["passed"] is False and _no_program_sentence(data) is None
     fix = nearest_fix(snapshot.results, key) if has_failed else None
     return snapshot, data, fix
@@ -82,7 +82,7 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
 def _draw_head(
     run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: CompletionFilter, query: str
 ) -> None:
-    key: Key = data["task"], data["prompt"], data["index"]
+    key: CompletionKey = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
         html.a(
             shortened(run.name, MAX_NAME), href=outside(f"{run_address(run.name)}{query}#completions")
@@ -100,7 +100,7 @@ def _draw_head(
             verdict = shortened(f"{label_of(why['class'])}: {why['kind']}")
         PlainText("small", verdict, f"state state-{state}")
         if data["model"] is not None:
-            PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
+            PlainText("span", f"written by {shortened(data['model'], 200)}{recorded_suffix([data['model']])}")
         if fix is not None:
             text = f"Most similar program that passes: {counted(fix.changed, 'line')} changed"
             html.a(text, href=outside(f"{run_address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
@@ -157,7 +157,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
             PlainText("p", sentence, "trouble")
             return
         if completion["lowered"] and judged:
-            PlainText("p", LOWERED, "quiet")
+            PlainText("p", LOWERCASED_NOTE, "quiet")
         if not judged:
             PlainText("p", "This completion has not been judged yet.", "quiet")
         for number, data in failing_first(judged):

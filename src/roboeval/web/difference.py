@@ -14,7 +14,7 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.compare import compare_scores, comparison_sentence, pairs_to_compare
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
-from roboeval.evaluation.runs.completions import KEY, Key, name_of
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
 from roboeval.web.widgets import interval_text
@@ -33,7 +33,7 @@ class TaskRow:
     task: str
     shares: tuple[float, float]  # mean pass@1 over common prompts
     difference: Estimate  # second minus first; the interval is over prompts, for all tasks over tasks
-    differing: tuple[tuple[Key, bool], ...]  # passed in one run only; True: in the second run
+    differing: tuple[tuple[CompletionKey, bool], ...]  # passed in one run only; True: in the second run
 
 
 def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
@@ -56,10 +56,10 @@ def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
     return sorted(rows, key=lambda row: (-abs(row.difference.mean), row.task))
 
 
-def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[Key, bool]]]:
+def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[CompletionKey, bool]]]:
     judged = [run.completions.drop_nulls("passed").select(*KEY, "passed") for run in (first, second)]
     both = judged[0].join(judged[1], on=KEY, how="inner", suffix="_second", maintain_order="left")
-    found: dict[str, list[tuple[Key, bool]]] = {}
+    found: dict[str, list[tuple[CompletionKey, bool]]] = {}
     for task, prompt, index, _, passed in both.filter(
         pl.col("passed") != pl.col("passed_second")
     ).iter_rows():

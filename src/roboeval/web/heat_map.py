@@ -10,8 +10,8 @@ from urllib.parse import quote
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import mean_of, percent
 from roboeval.analysis.summary import Failures
-from roboeval.evaluation.failures import NO_PROGRAM, ending_of, plural_of
-from roboeval.evaluation.runs.completions import by_hand
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS, ending_of, plural_of
+from roboeval.evaluation.runs.completions import recorded_suffix
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
 SHADE_STEPS = 10
@@ -43,14 +43,14 @@ def models_of(run: Snapshot) -> str:
     """Format the models of a run."""
     if not run.models:
         return "model not recorded"
-    return shortened(", ".join(run.models), MAX_MODELS_TEXT) + by_hand(run.models)
+    return shortened(", ".join(run.models), MAX_MODELS_TEXT) + recorded_suffix(run.models)
 
 
 def failure_text(chosen: CompletionFilter) -> str | None:
     """Describe the failure that a filter selects, such as `in NameError`; None if it selects no failure."""
     kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MAX_NAME)
-    if chosen.failure_class == NO_PROGRAM:
-        return ending_of(NO_PROGRAM) + ("" if kind is None else f" ({kind})")
+    if chosen.failure_class == NO_PROGRAM_CLASS:
+        return ending_of(NO_PROGRAM_CLASS) + ("" if kind is None else f" ({kind})")
     if kind is not None:
         return f"in {kind}"
     return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MAX_NAME)

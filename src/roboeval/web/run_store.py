@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.suites.load import ABLATED, Suite, has_suite, load_suite
 from roboeval.web.snapshot import Snapshot
@@ -85,7 +85,7 @@ class RunStore:
 
     def _folders(self) -> dict[str, Path]:
         """The folder if it is a run itself, otherwise its entries, by name."""
-        if Run(self.folder).completions.is_file():
+        if RunFolder(self.folder).completions.is_file():
             return {self.folder.resolve().name: self.folder.resolve()}
         try:
             return {path.name: path for path in self.folder.iterdir()}
@@ -100,7 +100,7 @@ class RunStore:
             raise MissingError(f'this folder has no run "{shortened(name)}"; it may have been deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):
             raise UserError(f'"{shortened(name)}" {OUTSIDE_FOLDER}')
-        run = Run(path)
+        run = RunFolder(path)
         keys = (path.stem for path in run.rows("").parent.glob("*.jsonl"))
         known = tuple(sorted(keys, key=lambda one: (one.endswith(ABLATED), one)))
         if key is not None and key not in known:
@@ -113,7 +113,7 @@ class RunStore:
 class _Reader:
     """Reads one evaluation of a run, again when one of its files changes."""
 
-    def __init__(self, store: RunStore, run: Run, key: str | None) -> None:
+    def __init__(self, store: RunStore, run: RunFolder, key: str | None) -> None:
         self._store, self._run, self._key = store, run, key
         self.evaluations: tuple[str, ...] = ()
         self._lock = threading.Lock()
@@ -156,14 +156,14 @@ class _Reader:
         run, key = self._run, self._key or ""
         checks = run.checks(key.removesuffix(ABLATED))
         within = self._store.folder.resolve()
-        paths = (run.completions, run.about, run.rows(key), run.head(key), checks)
+        paths = (run.completions, run.about, run.rows(key), run.manifest(key), checks)
         return tuple(_stamp(path, within) for path in paths)
 
     def _read_files(self) -> Results:
         faults: list[UserError] = []
         results = read_results(self._run, self._key, keep_failed=False, faults=faults)
         existing = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
-        name = results.head.get("suite") or results.about.get("suite")
+        name = results.manifest.get("suite") or results.about.get("suite")
         suite = self._store.suite(name if isinstance(name, str) else "paper")
         return replace(results, suite=suite, faults=existing)
 
@@ -184,6 +184,6 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
 
 def _is_run(path: Path) -> bool:
     """Whether a folder looks like a run, even before its first completion."""
-    run = Run(path)
+    run = RunFolder(path)
     is_named = path.name.isprintable() and not path.name.startswith(".")
     return is_named and (run.completions.exists() or run.about.exists())

@@ -14,9 +14,9 @@ from typing import Any
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
-from roboeval.evaluation.explanation import GONE, completion_data, suite_instruction
+from roboeval.evaluation.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.requests import batches
-from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, name_of
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
@@ -61,8 +61,8 @@ def run_data(run: Snapshot) -> dict[str, Any]:
     return {
         "run": run.name,
         "models": run.models,
-        "by_hand": bool(by_hand(run.models)),
-        "suite": (results.head if results.key else results.about).get("suite"),
+        "by_hand": bool(recorded_suffix(run.models)),
+        "suite": (results.manifest if results.key else results.about).get("suite"),
         "evaluation": results.key,
         "evaluations": list(run.evaluations),
         "state": state_of(run),
@@ -113,12 +113,12 @@ def notes(run: Snapshot) -> list[str]:
     if stale:
         found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
-        name = shortened(str(results.head.get("suite")), MAX_SUITE_NAME)
+        name = shortened(str(results.manifest.get("suite")), MAX_SUITE_NAME)
         found.append(
             f'The suite "{name}" was not found, so failed checks are not explained; '
             "use `roboeval serve --suite FOLDER`."
         )
-    elif run.judged and run.suite is not None and results.head.get("digest") != run.suite.digest:
+    elif run.judged and run.suite is not None and results.manifest.get("digest") != run.suite.digest:
         found.append("The suite has changed since this run was judged; explanations may be missing.")
     return found
 
@@ -195,9 +195,9 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
 def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     """A completion with its program, and the steps, failed checks and explanations of each world."""
     results = run.results
-    key: Key = row["task"], row["prompt"], row["index"]
+    key: CompletionKey = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)
-    more = {"evaluation": results.key, "stale": row["stale"], "note": GONE if row["stale"] else None}
+    more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}
     if row["passed"] is None:
         known: dict[str, Any] = {
             name: getattr(completion, name, None) for name in ("model", "instruction", "program")

@@ -16,15 +16,15 @@ from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
 from roboeval.analysis.summary import Failures, cut_off_replies, failures
 from roboeval.analysis.tasks import prompt_counts
-from roboeval.evaluation.failures import NO_PROGRAM
-from roboeval.evaluation.runs.completions import KEY, Key
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS
+from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
 
-HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM)
+HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM_CLASS)
 # The result of a program in a world: + satisfied, - not satisfied, ! error.
 WORLD_SIGN = (
     pl.when("satisfied")
@@ -137,7 +137,9 @@ class Snapshot:
         """Select completions, in order."""
         return self.completions.filter(chosen.condition)
 
-    def neighbours(self, key: Key, chosen: CompletionFilter) -> tuple[Key | None, Key | None]:
+    def neighbours(
+        self, key: CompletionKey, chosen: CompletionFilter
+    ) -> tuple[CompletionKey | None, CompletionKey | None]:
         """The completions before and after one in the filtered list; None at an end."""
         keys = [None, *self.select(chosen).select(KEY).iter_rows(), None]
         at = keys.index(key) if key in keys else None

@@ -16,7 +16,7 @@ from codebotler.core.skills.declaration import all_names
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame, PlainText, outside
 from roboeval.analysis.metrics import Estimate
-from roboeval.evaluation.explanation import shown_lines
+from roboeval.evaluation.explanation import first_lines
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.web.heat_map import MISSING
 from roboeval.web.run_store import MissingError
@@ -80,7 +80,7 @@ class ProgramView(Element, component="static/code.js"):
 
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()
-        shown, self.left_out = shown_lines(program)
+        shown, self.left_out = first_lines(program)
         self._props.update(program=shown, marked=sorted(set(marked)), keywords=kwlist, skills=all_names())
 
 

@@ -23,7 +23,7 @@ from roboeval.analysis.compare import (
 )
 from roboeval.cli.inputs import Opened, expect_same_suite
 from roboeval.cli.views.comparison import comparison_view
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
@@ -151,7 +151,7 @@ def test_what_is_unlike() -> None:
 
 def test_other_suites_are_refused() -> None:
     def opened(name: str, digest: str) -> Opened:
-        results = replace(a_run({}, {"digest": digest}), run=Run(Path(name)))
+        results = replace(a_run({}, {"digest": digest}), run=RunFolder(Path(name)))
         return Opened(results, f"roboeval evaluate {name} --suite mine")
 
     expect_same_suite([opened("a", "1"), opened("b", "1")])

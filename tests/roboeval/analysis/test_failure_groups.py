@@ -7,7 +7,7 @@ from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from made_results import results_of
 from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures, nearest_fix
 from roboeval.cli.views.groups import failure_group_view
-from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
@@ -32,6 +32,7 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
         "line": None,
         "failed_checks": [check],
         "trace": [["goto", "hall"]],
+        "places": [],
     }
     why: Failure = {"class": "TaskCompletionError", "kind": "Location", "world": 1, "check": check}
     first: WorldVerdict = {**verdict, "satisfied": True, "failed_checks": [], "trace": [["say", "x"]]}
@@ -48,7 +49,7 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
 
 def test_same_task_same_check_similar_program() -> None:
     rows = [failed(0, 0), failed(0, 1), failed(1, 0), failed(0, 2), failed(0, 3, check="other()")]
-    programs: dict[Key, str] = {
+    programs: dict[CompletionKey, str] = {
         ("Visit", 0, 0): GOES.format("lab"),
         ("Visit", 0, 1): GOES.format("lab").replace("here", "there"),
         ("Visit", 1, 0): GOES.format("room"),
@@ -74,7 +75,10 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     ran = {"world": "w", "satisfied": False, "status": "python-error", "line": None}
     ran |= {"error": {"kind": "SyntaxError", "message": "invalid syntax"}, "failed_checks": [], "trace": []}
     rows = [{**one, "verdicts": [ran]} for one in rows] + [row(1, 0)]
-    programs: dict[Key, str] = {("Visit", 0, 0): "No.", ("Visit", 0, 1): "I must not do that,\nsince ..."}
+    programs: dict[CompletionKey, str] = {
+        ("Visit", 0, 0): "No.",
+        ("Visit", 0, 1): "I must not do that,\nsince ...",
+    }
     programs |= {("Visit", 0, 2): "", ("Visit", 1, 0): RIGHT}
     results = results_of(rows, SUITE, programs)
     refused, empty = describe_groups(group_failures(cast("list[Row]", rows[:3]), programs), results)

@@ -81,7 +81,7 @@ def test_missing_isolation_is_warned_of_once_or_refused(
     result = run_shard(functions, works, VERSIONS, {})
     cluster = RayCluster()
     cluster._ray = SimpleNamespace(wait=lambda shards, **_: (shards, []), get=lambda _: result)
-    assert [values for _, values in cluster._ended(range(3))] == [[0, 1]] * 3
+    assert [values for _, values in cluster._wait_for_some(range(3))] == [[0, 1]] * 3
     (message,) = caplog.messages
     assert message.endswith(f": {NO_SECCOMP}")
 

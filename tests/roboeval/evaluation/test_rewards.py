@@ -25,7 +25,7 @@ from codebotler.simulator.process.spawn import ONE_AT_A_TIME
 from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate, is_met
-from roboeval.evaluation.rewards import Share, batches, first_alike, reward, total
+from roboeval.evaluation.rewards import Share, first_equal_prompt, reward, split_programs, total
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 from small_suite import a_suite
@@ -129,7 +129,7 @@ worlds:
         "def task_program():\n    go_to('lab')\n    say('x')\n",
     )
     assert [reward("T", prompt, [program], suite=suite) for prompt in range(3)] == [[1.0], [0.0], [1.0]]
-    assert [first_alike(suite, "T", prompt) for prompt in range(3)] == [0, 1, 0]
+    assert [first_equal_prompt(suite, "T", prompt) for prompt in range(3)] == [0, 1, 0]
 
 
 def test_it_may_be_called_from_many_threads_at_once() -> None:
@@ -166,7 +166,7 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(pool, "submit", noted)
     waited_for, given_up = distinct(8, "interrupted"), distinct(1_000, "given up")
-    few, many = (len(batches(programs, pool.workers)) for programs in (waited_for, given_up))
+    few, many = (len(split_programs(programs, pool.workers)) for programs in (waited_for, given_up))
 
     def interrupt() -> None:
         while len(futures) < few + many:

@@ -19,7 +19,7 @@ from PIL import Image
 from made_up_runs import cases, made_up
 from roboeval.analysis.metrics import overall
 from roboeval.analysis.resample import LIMITS, accepted_after
-from roboeval.evaluation.failures import CLASSES, FailureClass
+from roboeval.evaluation.failures import FAILURE_CLASSES, FailureClass
 from roboeval.report.cost import retry_curves
 from roboeval.report.curves import draw_accepted, draw_limits, draw_thresholds, most_completions
 from roboeval.report.drawing import (
@@ -118,7 +118,7 @@ def test_other_numbers_look_different() -> None:
 
 def test_a_further_class_of_failures_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     one = FailureClass("RuleError", "broken rule", "broken rules", ())
-    monkeypatch.setitem(cast("dict[str, FailureClass]", CLASSES), one.name, one)
+    monkeypatch.setitem(cast("dict[str, FailureClass]", FAILURE_CLASSES), one.name, one)
     with use_style():
         figure = DRAWINGS["causes"](cases()["usual"])
     assert [axes.get_title(loc="left") for axes in figure.axes][-1] == "(e) broken rules"

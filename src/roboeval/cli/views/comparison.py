@@ -23,11 +23,11 @@ from roboeval.analysis.statistics import MIN_CLUSTERS
 from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.failures import plural_of, shown_classes
+from roboeval.evaluation.failures import classes_to_show, plural_of
 
 
 def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun]) -> RenderableType:
-    """A comparison as text and tables."""
+    """Show a comparison of two runs."""
     names = runs[0].name, runs[1].name
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
@@ -36,12 +36,12 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
     few = "too narrow for so few tasks" * (1 < len(comparison.tasks) < MIN_CLUSTERS)
-    for name, estimate, told in (
+    for name, estimate, remark in (
         ("over tasks", comparison.over_tasks, p_text(comparison.p_tasks)),
         ("over prompts", comparison.over_prompts, p_text(comparison.p_prompts)),
         ("over tasks, by resampling (bootstrap)", comparison.bootstrap, few),
     ):
-        rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), told)
+        rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), remark)
     table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
         cells = (
@@ -62,15 +62,14 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
 
 
 def _ends(runs: tuple[ComparedRun, ComparedRun]) -> Table:
-    """How the completions of both runs fail, by class."""
     table = ruled("share that fails", *(visible(run.name) for run in runs))
-    for name in shown_classes([name for run in runs for name, share in run.classes.items() if share]):
+    for name in classes_to_show([name for run in runs for name, share in run.classes.items() if share]):
         table.add_row(plural_of(name), *(f"{run.classes.get(name, 0.0):.1%}" for run in runs))
     return table
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
-    """What a second suite changes, with at most `most` groups of programs for each run and direction."""
+    """Show what a second suite changes, with at most `most` groups for each run and direction."""
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences(found)]
     parts += [Text(), _scores(found)]
     for one in found:

@@ -17,12 +17,12 @@ from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resample
 from roboeval.analysis.search import TraceMatch
 from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.explanation import GONE
+from roboeval.evaluation.explanation import PROGRAM_GONE
 from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label
 
-MOST_LINES = 60  # of a difference between programs
+MAX_DIFF_LINES = 60  # of a difference between programs
 
 
 def found_view(
@@ -34,7 +34,7 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Some groups of failures; if something was looked for, below the completions found, task by task."""
+    """Show groups of failures, after a search below the completions found in each task."""
     failed = len(found) - int(counts["passed"].sum())
     parts: list[RenderableType] = []
     if is_search:
@@ -71,14 +71,14 @@ def failure_group_view(group: FailureGroup) -> RenderableType:
     check = group.failure["check"]
     lines.append(Text(shortened(f"{check_label(check)}: {group.why}" if check else group.why)))
     if group.program is None:
-        lines.append(Text(GONE, "yellow"))
+        lines.append(Text(PROGRAM_GONE, "yellow"))
     if (fix := group.fix) is not None:
         changed = f"{fix.changed} line{'s' * (fix.changed != 1)}"
         lines.append(Text(f"{visible(fix.name)} passes, and differs in {changed}:", "dim"))
-        for sign, line in fix.changes[:MOST_LINES]:
+        for sign, line in fix.changes[:MAX_DIFF_LINES]:
             style = {"-": "red", "+": "green"}.get(sign, "dim")
             lines.append(Text(f"{sign} {shortened(line.expandtabs(4))}", style))
-        if (left := len(fix.changes) - MOST_LINES) > 0:
+        if (left := len(fix.changes) - MAX_DIFF_LINES) > 0:
             lines.append(Text(f"... {left} more lines", "dim"))
     return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
 
@@ -86,7 +86,7 @@ def failure_group_view(group: FailureGroup) -> RenderableType:
 def resample_view(
     prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str, coverage: Coverage
 ) -> RenderableType:
-    """The results of asking again, by limit of retries."""
+    """Show the results of rejection sampling, by limit of retries."""
     reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
     table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
     for limit in (resample(prompts, retries) for retries in limits):
