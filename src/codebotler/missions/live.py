@@ -16,7 +16,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
 from codebotler.core.world import Point
-from codebotler.missions.progress import AT
+from codebotler.missions.progress import POSITION_FEEDBACK
 from codebotler.missions.stop import StopButton
 from codebotler.robots import base
 from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
@@ -119,7 +119,7 @@ class LiveRobot:
         if event and row.recording and row.recording.when_tried:
             self._events.append(event)
         try:
-            result = self._logged(row, [_text(argument) for argument in arguments], event)
+            result = self._logged(row, [_plain_argument(argument) for argument in arguments], event)
         except RobotError:
             if event and row.recording and row.recording.when_tried:
                 self._happened(event, room, is_drive=is_drive, failed=True)
@@ -128,7 +128,7 @@ class LiveRobot:
             return result
         if row.recording.when_tried:
             self._events.pop()
-        chosen = _position(result, event) if event.options else None
+        chosen = _chosen_option(result, event) if event.options else None
         answer = None if chosen is None else event.options[chosen].text
         found = result if isinstance(result, bool) else None
         self._events.append(replace(event, answer=answer, found=found))
@@ -247,7 +247,7 @@ class LiveRobot:
             return None
         self._has_asked = True
         try:
-            here = str(answered(self.skills[ROOM_SKILL], self.robot.perform(ROOM_SKILL, ()))).strip()
+            here = str(check_answer(self.skills[ROOM_SKILL], self.robot.perform(ROOM_SKILL, ()))).strip()
         except (RobotError, CancelledError):
             return None
         listed = (here,) if self._room_map is None else self._room_map.rooms
@@ -266,7 +266,7 @@ class LiveRobot:
         try:
             result = self._done(skill, given, event)
             if event is not None and event.options:
-                _position(result, event)
+                _chosen_option(result, event)
         except RobotError as error:
             self._note("error", **which, kind=error.kind, message=str(error))
             self._check_end()
@@ -287,7 +287,7 @@ class LiveRobot:
                 if isinstance(what, CameraPicture):
                     self._note("picture", **which, picture=what.data)
                 else:
-                    if not self._is_watched and (found := AT.fullmatch(what)):
+                    if not self._is_watched and (found := POSITION_FEEDBACK.fullmatch(what)):
                         self._moved((float(found[1]), float(found[2])))
                     self._note("feedback", **which, text=what)
             except OSError as error:  # on a thread of the robot, where it would be lost
@@ -296,7 +296,7 @@ class LiveRobot:
 
         if event is not None and skill.recording and skill.recording.options and not event.options:
             raise RobotError("AskEmptyOptions", f'the question "{event.text}" offers no options')
-        return answered(skill, self.robot.perform(skill.name, given, told))
+        return check_answer(skill, self.robot.perform(skill.name, given, told))
 
     def _check_end(self) -> None:
         """Raise what ends the program, if anything does."""
@@ -311,7 +311,7 @@ class LiveRobot:
             raise StoppedError
 
 
-def answered(skill: Skill, result: base.RobotResult) -> base.RobotResult:
+def check_answer(skill: Skill, result: base.RobotResult) -> base.RobotResult:
     """A robot's answer; raises RobotLostError if it does not fit the skill."""
     if not skill.returns.fits(result):
         expected = skill.returns.annotation
@@ -329,13 +329,13 @@ def _rule_entry(broken: RuleViolationError) -> dict[str, object]:
     return {"rule": rule.name, "says": rule.says, "formula": str(rule.formula), **what, **why}
 
 
-def _text(argument: Argument) -> base.RobotArgument:
+def _plain_argument(argument: Argument) -> base.RobotArgument:
     if not isinstance(argument, tuple):
         return argument
     return tuple(each.text if isinstance(each, Option) else each for each in argument)
 
 
-def _position(result: base.RobotResult, event: Event) -> int:
+def _chosen_option(result: base.RobotResult, event: Event) -> int:
     """The number of the chosen option; its case and blanks may differ. Raises RobotError if it is none."""
     heard = str(result)
     for same in (str, lambda text: text.strip().casefold()):

@@ -15,13 +15,13 @@ from typing import Any, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 
-EVENTS, SUMMARY = "events.jsonl", "mission.json"
+EVENTS_FILE, SUMMARY_FILE = "events.jsonl", "mission.json"
 
-Line: TypeAlias = dict[str, Any]
+LogLine: TypeAlias = dict[str, Any]
 """An event: `time` (seconds since 1970), `clock` (the robot's, in seconds), `event` (what kind), and more."""
 
-TEXTS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")  # of a summary
-HAS: Mapping[str, frozenset[str]] = {
+_TEXT_FIELDS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")  # of a summary
+_REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "state": frozenset({"state"}),
     "skill": frozenset({"number", "skill", "arguments"}),
     "feedback": frozenset({"number", "skill", "text"}),
@@ -37,7 +37,7 @@ HAS: Mapping[str, frozenset[str]] = {
 """What belongs to each kind of event."""
 
 
-class State(StrEnum):
+class MissionState(StrEnum):
     """The states of a mission."""
 
     DRAFTING = "drafting"
@@ -53,37 +53,45 @@ class State(StrEnum):
     @property
     def is_open(self) -> bool:
         """Whether the program can still be replaced."""
-        return self in {State.DRAFTING, State.CHECKED}
+        return self in {MissionState.DRAFTING, MissionState.CHECKED}
 
     @property
     def is_moving(self) -> bool:
         """Whether the robot works, or ends what it did."""
-        return self in {State.RUNNING, State.STOPPING}
+        return self in {MissionState.RUNNING, MissionState.STOPPING}
 
     @property
     def is_final(self) -> bool:
         """Whether no other state follows."""
-        return self not in TRANSITIONS
+        return self not in NEXT_STATES
 
 
-TRANSITIONS: dict[State, frozenset[State]] = {
-    State.DRAFTING: frozenset({State.DRAFTING, State.CHECKED, State.FAILED, State.STOPPED}),
-    State.CHECKED: frozenset(
-        {State.DRAFTING, State.CHECKED, State.APPROVED, State.FAILED, State.STOPPED},
+NEXT_STATES: dict[MissionState, frozenset[MissionState]] = {
+    MissionState.DRAFTING: frozenset(
+        {MissionState.DRAFTING, MissionState.CHECKED, MissionState.FAILED, MissionState.STOPPED}
     ),
-    State.APPROVED: frozenset({State.RUNNING, State.FAILED, State.STOPPED}),
-    State.RUNNING: frozenset({State.DONE, State.FAILED, State.STOPPING}),
-    State.STOPPING: frozenset({State.STOPPED, State.FAILED}),
+    MissionState.CHECKED: frozenset(
+        {
+            MissionState.DRAFTING,
+            MissionState.CHECKED,
+            MissionState.APPROVED,
+            MissionState.FAILED,
+            MissionState.STOPPED,
+        }
+    ),
+    MissionState.APPROVED: frozenset({MissionState.RUNNING, MissionState.FAILED, MissionState.STOPPED}),
+    MissionState.RUNNING: frozenset({MissionState.DONE, MissionState.FAILED, MissionState.STOPPING}),
+    MissionState.STOPPING: frozenset({MissionState.STOPPED, MissionState.FAILED}),
 }
 """The states that may follow each state; the others are final. A tool that dies leaves it interrupted."""
 
 
 @dataclass
-class Summary:
+class MissionSummary:
     """A mission in short."""
 
     id: str  # by which it is found
-    state: State
+    state: MissionState
     robot: str  # its kind
     created: float  # seconds since 1970
     instruction: str = ""  # empty if the program did not come from one
@@ -101,39 +109,39 @@ class Summary:
         return self.state.is_final
 
     @classmethod
-    def read(cls, folder: Path) -> Summary:
+    def read(cls, folder: Path) -> MissionSummary:
         """The summary of a mission, or a UserError."""
-        path = folder / SUMMARY
+        path = folder / SUMMARY_FILE
         try:
             data = json.loads(path.read_bytes())
             summary = cls(**{field.name: data[field.name] for field in fields(cls) if field.name in data})
-            summary.state, summary.problems = State(summary.state), tuple(summary.problems)
+            summary.state, summary.problems = MissionState(summary.state), tuple(summary.problems)
             datetime.fromtimestamp(summary.created, UTC)
-            "".join((*summary.problems, *(getattr(summary, name) for name in TEXTS)))
+            "".join((*summary.problems, *(getattr(summary, name) for name in _TEXT_FIELDS)))
         except (ValueError, TypeError, OverflowError, RecursionError):
             raise UserError("this is not the summary of a mission; remove its folder", file=path) from None
         return summary
 
     def write(self, folder: Path) -> None:
         """Write it whole, or leave what was there."""
-        write_whole(folder / SUMMARY, json.dumps(asdict(self), indent=1).encode())
+        write_whole(folder / SUMMARY_FILE, json.dumps(asdict(self), indent=1).encode())
 
 
-def log_of(folder: Path) -> Appender:
+def open_log(folder: Path) -> Appender:
     """The log of a mission, locked until it is closed; BlockingIOError if another process has it open."""
-    return Appender(folder / EVENTS, exclusive=True)
+    return Appender(folder / EVENTS_FILE, exclusive=True)
 
 
-def add_event(log: Appender, event: str, clock: float, **data: object) -> Line:
+def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLine:
     """Write an event at this moment, and return it."""
     line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
     log.append(to_line(line))
     return line
 
 
-def events_of(folder: Path) -> list[Line]:
+def read_events(folder: Path) -> list[LogLine]:
     """The events of a mission, without a torn last line; UserError if a line is something else."""
-    path, events = folder / EVENTS, []
+    path, events = folder / EVENTS_FILE, []
     for number, line in read_rows(path, growing=True):
         if not _is_event(line):
             raise UserError("this is not an event of a mission; remove the line", file=path, line=number)
@@ -141,24 +149,24 @@ def events_of(folder: Path) -> list[Line]:
     return events
 
 
-def _is_event(line: Line) -> bool:
+def _is_event(line: LogLine) -> bool:
     try:
         kind, is_moment = line["event"], 0 <= line["time"] + line["clock"] < math.inf
     except (KeyError, TypeError):
         return False
-    return is_moment and isinstance(kind, str) and HAS.get(kind, frozenset()) <= line.keys()
+    return is_moment and isinstance(kind, str) and _REQUIRED_KEYS.get(kind, frozenset()) <= line.keys()
 
 
-SKILL_ENDS = frozenset({"result", "error", "cancelled", "late"})
+SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
 """The events with which a skill ends."""
 
 
-def doing(events: Iterable[Line]) -> Line | None:
+def find_unfinished_skill(events: Iterable[LogLine]) -> LogLine | None:
     """The skill that went on when the events broke off, if one did."""
-    going: Line | None = None
+    going: LogLine | None = None
     for line in events:
         if line["event"] == "skill":
             going = line
-        elif line["event"] in SKILL_ENDS:
+        elif line["event"] in SKILL_END_EVENTS:
             going = None
     return going

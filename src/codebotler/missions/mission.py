@@ -16,9 +16,9 @@ from codebotler.core.terminal import visible
 from codebotler.core.trace import RunError, Status, Trace
 from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event, log_of
+from codebotler.missions.log import NEXT_STATES, LogLine, MissionState, MissionSummary, add_event, open_log
 from codebotler.missions.map_event import map_data
-from codebotler.missions.pictures import Pictures
+from codebotler.missions.pictures import PictureStore
 from codebotler.missions.stop import StopButton
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
@@ -28,13 +28,13 @@ from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
-GRACE = 10.0
+STOP_GRACE_SECONDS = 10.0
 """Real seconds that a robot has to confirm a stop."""
 
-SHUTTING_DOWN = "CodeBotler, shutting down"
+BY_SHUTDOWN = "CodeBotler, shutting down"
 """Who stops a mission that is still going on when the program ends."""
 
-UNCONFIRMED = (
+UNCONFIRMED_STOP = (
     "the robot has not confirmed the stop; check it now, and press its emergency stop if it still moves"
 )
 
@@ -48,7 +48,7 @@ class MissionError(Exception):
         return str(self)
 
 
-EventListener: TypeAlias = Callable[[Line], None]
+EventListener: TypeAlias = Callable[[LogLine], None]
 """Called with each event after it was written, one at a time, from any thread."""
 
 
@@ -74,9 +74,9 @@ class Mission:
         on_event: EventListener = lambda _: None,
         stop_button: StopButton | None = None,
     ) -> None:
-        self.folder = _new_folder(home / "missions")
-        self._log: Appender | None = log_of(self.folder)
-        self._pictures = Pictures(self.folder)
+        self.folder = _make_mission_folder(home / "missions")
+        self._log: Appender | None = open_log(self.folder)
+        self._pictures = PictureStore(self.folder)
         self.on_event = on_event
         self.stop_button = stop_button or StopButton()
         self._writing = threading.RLock()  # held while an event is written; a stop waits for it last
@@ -86,8 +86,10 @@ class Mission:
         self._is_over = threading.Event()
         self._fault: Exception | None = None
         self.trace: Trace = ()
-        self.summary = Summary(self.folder.name, State.DRAFTING, robot, time.time(), instruction)
-        self._write("state", state=State.DRAFTING)
+        self.summary = MissionSummary(
+            self.folder.name, MissionState.DRAFTING, robot, time.time(), instruction
+        )
+        self._write("state", state=MissionState.DRAFTING)
         self.stop_button.on_press(self._log_stop)
 
     def __enter__(self) -> Self:
@@ -109,7 +111,7 @@ class Mission:
         return self.summary.id
 
     @property
-    def state(self) -> State:
+    def state(self) -> MissionState:
         """Its state."""
         return self.summary.state
 
@@ -129,7 +131,9 @@ class Mission:
             MissionError: it is too late for that.
         """
         with self._writing:
-            self._step(State.DRAFTING, "take another program", program=program, model=model, problems=())
+            self._step(
+                MissionState.DRAFTING, "take another program", program=program, model=model, problems=()
+            )
             self._has_program = True
 
     def check(self, problems: Sequence[str]) -> None:
@@ -141,7 +145,7 @@ class Mission:
         with self._writing:
             if not self._has_program:
                 raise MissionError(f"mission {self.id} has no program to check")
-            self._step(State.CHECKED, "be checked", problems=tuple(problems))
+            self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
         """Take a person's approval of the program.
@@ -153,11 +157,11 @@ class Mission:
             MissionError: the program was not checked, or has problems.
         """
         with self._writing:
-            if self.state is State.CHECKED and self.summary.problems and not despite_problems:
+            if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(
                     f"the program of mission {self.id} has problems; approve it despite them, or change it"
                 )
-            self._step(State.APPROVED, "be approved")
+            self._step(MissionState.APPROVED, "be approved")
 
     def fail(self, reason: str) -> None:
         """Fail before running.
@@ -168,7 +172,7 @@ class Mission:
         with self._writing:
             if self.state.is_moving:
                 raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
-            self._step(State.FAILED, "fail", reason=reason)
+            self._step(MissionState.FAILED, "fail", reason=reason)
 
     def note(self, text: str) -> None:
         """Log a sentence."""
@@ -191,7 +195,7 @@ class Mission:
         """
         had_ended = self.has_ended
         self.stop_button.press(by)
-        if had_ended or self.state not in {State.STOPPING, State.STOPPED}:
+        if had_ended or self.state not in {MissionState.STOPPING, MissionState.STOPPED}:
             raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
 
     def run(
@@ -201,7 +205,7 @@ class Mission:
         *,
         rules: Sequence[Rule] = (),
         room_map: RoomMap | None = None,
-    ) -> State:
+    ) -> MissionState:
         """Run the program on a robot, and return when all has ended.
 
         If a robot that was stopped does not confirm it within `GRACE` seconds, the mission fails.
@@ -225,20 +229,20 @@ class Mission:
             reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
         )
         with self._writing:
-            if self.state is State.APPROVED:
+            if self.state is MissionState.APPROVED:
                 reserved.use()
                 self._live, self.stop_button.robot = live, reserved.robot
-            self._step(State.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
+            self._step(MissionState.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
         threading.Thread(target=self._execute, args=(live,), name=self.id, daemon=True).start()
         try:
             self.stop_button.ended.wait()
         except BaseException:
             with suppress(MissionError):
-                self.stop(SHUTTING_DOWN)
+                self.stop(BY_SHUTDOWN)
             raise
         finally:
-            if not self._is_over.wait(GRACE):
-                self._end(live, State.FAILED, UNCONFIRMED, None, is_lost=True)
+            if not self._is_over.wait(STOP_GRACE_SECONDS):
+                self._end(live, MissionState.FAILED, UNCONFIRMED_STOP, None, is_lost=True)
         if self._fault is not None:
             raise self._fault
         return self.state
@@ -255,14 +259,18 @@ class Mission:
             try:
                 live.stop()
             finally:
-                self._end(live, State.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError))
+                self._end(
+                    live, MissionState.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError)
+                )
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
             reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"
-            self._end(live, State.DONE if done else State.FAILED, reason, outcome.line, is_lost=False)
+            self._end(
+                live, MissionState.DONE if done else MissionState.FAILED, reason, outcome.line, is_lost=False
+            )
 
-    def _end(self, live: LiveRobot, state: State, reason: str, line: object, *, is_lost: bool) -> None:
+    def _end(self, live: LiveRobot, state: MissionState, reason: str, line: object, *, is_lost: bool) -> None:
         """End, unless it has ended; a mission that ends after a stop is stopped, if the robot is not lost."""
         why = "" if is_lost else self.stop_button.why_unstopped()
         try:
@@ -271,10 +279,14 @@ class Mission:
                     return
                 self.trace = live.trace
                 self._log_stop()
-                if self.state is State.STOPPING and why:
-                    state, reason = State.FAILED, why
-                elif self.state is State.STOPPING and not is_lost:
-                    state, reason, line = State.STOPPED, self.summary.reason, live.broken_rule.get("line")
+                if self.state is MissionState.STOPPING and why:
+                    state, reason = MissionState.FAILED, why
+                elif self.state is MissionState.STOPPING and not is_lost:
+                    state, reason, line = (
+                        MissionState.STOPPED,
+                        self.summary.reason,
+                        live.broken_rule.get("line"),
+                    )
                 self._step(state, "end", reason=reason, line=line)
         except Exception as error:  # noqa: BLE001 - raised by `run`
             self._fault = error
@@ -286,12 +298,12 @@ class Mission:
         """Log who stopped it and which rule was broken, each once: after the stop, and before the end."""
         with self._writing:
             by = self.stop_button.by
-            if by is not None and self.state is State.RUNNING:
+            if by is not None and self.state is MissionState.RUNNING:
                 seconds = round(self.stop_button.seconds, 6)
                 self._write("stop", by=by, seconds_to_cancel=seconds)
-                self._step(State.STOPPING, "be stopped", reason=stop_text(by))
+                self._step(MissionState.STOPPING, "be stopped", reason=stop_text(by))
             elif by is not None and not (self.state.is_moving or self.has_ended):
-                self._step(State.STOPPED, "be stopped", reason=f"{stop_text(by)} before it ran")
+                self._step(MissionState.STOPPED, "be stopped", reason=f"{stop_text(by)} before it ran")
             rule = {} if self._live is None else self._live.broken_rule
             if rule != self._logged_rule:
                 self._logged_rule = rule
@@ -299,15 +311,15 @@ class Mission:
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state.is_moving:
-            self.stop(SHUTTING_DOWN)
+            self.stop(BY_SHUTDOWN)
         elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
             self.stop("CodeBotler")
         else:
             self.fail(visible(str(error)) or type(error).__name__)
 
-    def _step(self, to: State, what: str, **changes: object) -> None:
+    def _step(self, to: MissionState, what: str, **changes: object) -> None:
         """Go to a state and log it; the caller has the lock."""
-        if to not in TRANSITIONS.get(self.state, ()):
+        if to not in NEXT_STATES.get(self.state, ()):
             raise MissionError(f"mission {self.id} cannot {what}: its state is {self.state}")
         self.summary.state = to
         for name, value in changes.items():
@@ -346,7 +358,7 @@ def _reason(error: BaseException) -> str:
     return sentence if isinstance(error, EngineError) else f"{type(error).__name__}: {sentence}"
 
 
-def _new_folder(missions: Path) -> Path:
+def _make_mission_folder(missions: Path) -> Path:
     """A new folder, named by the time."""
     make_folder(missions)
     name = f"{datetime.now().astimezone():%Y%m%d-%H%M%S}"

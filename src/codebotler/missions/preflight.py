@@ -12,17 +12,17 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.world import Room, World, laid_out
-from codebotler.missions.live import answered
+from codebotler.missions.live import check_answer
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
-MOST_ROOMS = 1_000
+MAX_CHECKED_ROOMS = 1_000
 """Of a robot, for a check, which compares each drive with all of them."""
 
 
-def preflight(
+def ask_rooms(
     robot: Robot, remark: Callable[[str], None], world: World | None = None
 ) -> tuple[RoomMap | None, str]:
     """Ask a connected robot for its rooms, which a map may place, and for its own; mistakes are remarks.
@@ -39,7 +39,7 @@ def preflight(
         if skill not in can:
             return None
         try:
-            return answered(robot.skills[skill], robot.perform(skill, ()))
+            return check_answer(robot.skills[skill], robot.perform(skill, ()))
         except RobotError as error:
             remark(f"the robot did not report {what}: {visible(str(error))}")
             return None
@@ -82,12 +82,12 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
             raise NotReadyError(f'the rule "{rule.name}" needs {what}')
 
 
-def rooms_to_check(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
+def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
     """The rooms for a check; None, with a remark, if there are too many."""
-    if room_map is None or len(room_map.rooms) <= MOST_ROOMS:
+    if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(
-        f"the robot lists {len(room_map.rooms):,} rooms, more than the {MOST_ROOMS:,} that a check supports; "
+        f"the robot lists {len(room_map.rooms):,} rooms, more than the {MAX_CHECKED_ROOMS:,} that a check supports; "
         "it uses only the rooms that the program names"
     )
     return None

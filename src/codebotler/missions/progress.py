@@ -11,16 +11,16 @@ from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.table import Recording
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point, World, laid_out
-from codebotler.missions.log import SKILL_ENDS, Line, State
+from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
 from codebotler.missions.wording import activity, event_text, stop_text
 from codebotler.simulator.sampled_robot import RoomMap
 
-AT = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
-MOST, MOST_STEPS = 200, 60  # moments, and drives, looks and finds, that are kept
-NEAR = 0.05  # metres; a robot that moves less stays where it is
+POSITION_FEEDBACK = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
+_MAX_MOMENTS, _MAX_STEPS = 200, 60  # moments, and drives, looks and finds, that are kept
+_MIN_MOVE_METRES = 0.05  # metres; a robot that moves less stays where it is
 ANSWER = "answer"  # the kind of moment at which the robot hears something
-STOPS = frozenset(
-    {State.STOPPING, State.STOPPED}
+_STOP_STATES = frozenset(
+    {MissionState.STOPPING, MissionState.STOPPED}
 )  # which the tool notes some time after the robot has stopped
 
 
@@ -65,20 +65,20 @@ class Progress:
     held: str = ""  # what the robot holds
     moments: tuple[Moment, ...] = ()  # the last 200
 
-    def after(self, line: Line) -> Progress:
+    def after(self, line: LogLine) -> Progress:
         """The progress after one more event."""
         event = line["event"]
         if event == "state":
-            return self.with_state(State(line["state"]), line["clock"])
+            return self.with_state(MissionState(line["state"]), line["clock"])
         now = replace(self, clock=max(self.clock, line["clock"]))
         if event == "feedback":
-            place = AT.search(line["text"])
+            place = POSITION_FEEDBACK.search(line["text"])
             return now.moved((float(place[1]), float(place[2]))) if place else now
         if event == "skill":
             now = now.with_skill(line)
         elif event == "sleep" and line["seconds"]:
             now = replace(now, doing=event_text(line), activity=activity(line), line=line.get("line"))
-        elif event in SKILL_ENDS:
+        elif event in SKILL_END_EVENTS:
             now = now.with_result(line["result"]) if event == "result" else now.with_failure(event)
             still = self.activity if event == "cancelled" else ""
             now = replace(now, doing="", skill="", line=None, is_driving=False, activity=still)
@@ -87,14 +87,14 @@ class Progress:
             text = stop_text(line["by"], self.activity)
         if not text or (event == "sleep" and not line["seconds"]):
             return now
-        return replace(now, moments=(*now.moments, _moment(line, text))[-MOST:])
+        return replace(now, moments=(*now.moments, _moment(line, text))[-_MAX_MOMENTS:])
 
-    def with_state(self, state: State, clock: float) -> Progress:
+    def with_state(self, state: MissionState, clock: float) -> Progress:
         """The progress when the mission comes to a state."""
-        clock = self.clock if state in STOPS else max(self.clock, clock)
-        return replace(self, clock=clock, has_begun=self.has_begun or state is State.RUNNING)
+        clock = self.clock if state in _STOP_STATES else max(self.clock, clock)
+        return replace(self, clock=clock, has_begun=self.has_begun or state is MissionState.RUNNING)
 
-    def with_skill(self, line: Line) -> Progress:
+    def with_skill(self, line: LogLine) -> Progress:
         """The progress when a skill begins."""
         name = line["skill"]
         recording = _recording(name)
@@ -114,9 +114,9 @@ class Progress:
     def moved(self, at: Point) -> Progress:
         """The progress when the robot is somewhere."""
         now = replace(self, at=at, is_between=self.is_between or self.is_driving)
-        if self.trail and math.dist(self.trail[-1], at) < NEAR:
+        if self.trail and math.dist(self.trail[-1], at) < _MIN_MOVE_METRES:
             return now
-        return replace(now, trail=(*self.trail, at)[-MOST:])
+        return replace(now, trail=(*self.trail, at)[-_MAX_MOMENTS:])
 
     def with_result(self, result: object) -> Progress:
         """The progress when the skill under way has ended well."""
@@ -124,7 +124,7 @@ class Progress:
         now = self
         match recording and recording.kind:
             case kinds.GOTO:
-                visited = (*self.visited, self.subject)[:MOST_STEPS]
+                visited = (*self.visited, self.subject)[:_MAX_STEPS]
                 now = replace(self, visited=visited, is_between=False)
             case kinds.PICK:
                 now = replace(self, held=self.subject)
@@ -132,10 +132,10 @@ class Progress:
                 now = replace(self, held="")
             case kinds.CHECK:
                 now = self._found(Find(self.room, self.subject)) if result is True else self
-                now = replace(now, looks=(*self.looks, (self.subject, result is True))[:MOST_STEPS])
+                now = replace(now, looks=(*self.looks, (self.subject, result is True))[:_MAX_STEPS])
             case kinds.ASK:
                 now = self._found(Find(self.room, self.subject)) if self.subject else self
-                now = replace(now, answers=(*now.answers, str(result))[:MOST_STEPS])
+                now = replace(now, answers=(*now.answers, str(result))[:_MAX_STEPS])
         return now
 
     def with_failure(self, event: str) -> Progress:
@@ -144,15 +144,15 @@ class Progress:
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")
         if recording is not None and recording.options and event == "error":
-            return replace(self, answers=(*self.answers, None)[:MOST_STEPS])
+            return replace(self, answers=(*self.answers, None)[:_MAX_STEPS])
         return self
 
     def _found(self, find: Find) -> Progress:
         known = [one for one in self.finds if (one.room, one.name) != (find.room, find.name)]
-        return replace(self, finds=(*known, find)[-MOST_STEPS:])
+        return replace(self, finds=(*known, find)[-_MAX_STEPS:])
 
 
-def position(progress: Progress, world: World, room_map: RoomMap | None) -> Point | None:
+def position_on_map(progress: Progress, world: World, room_map: RoomMap | None) -> Point | None:
     """Where the robot is on a map, in metres; None if that is not known.
 
     Until the robot reports a position, it is where robots stop in its room.
@@ -171,7 +171,7 @@ def _recording(name: str) -> Recording | None:
     return None if skill is None else skill.recording
 
 
-def _moment(line: Line, words: str) -> Moment:
+def _moment(line: LogLine, words: str) -> Moment:
     event, clock = line["event"], line["clock"]
     recording = _recording(line.get("skill", ""))
     spoken = recording if recording is not None and recording.is_spoken else None

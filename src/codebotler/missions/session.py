@@ -21,18 +21,18 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
-from codebotler.missions.log import Line, State
+from codebotler.missions.log import LogLine, MissionState
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
+    ask_rooms,
     expect_poses,
+    limit_rooms,
     missing_skills,
-    preflight,
-    rooms_to_check,
     unknown_rooms,
     with_closest_here,
 )
 from codebotler.missions.stop import StopButton
-from codebotler.missions.view import CHECKING, Order, SessionView, digest
+from codebotler.missions.view import CHECKING, MissionOrder, SessionView, program_digest
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.robots.base import CancelledError, NotReadyError, Robot
@@ -41,8 +41,8 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError
 
-LOG = logging.getLogger("codebotler.missions")
-EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
+_log = logging.getLogger("codebotler.missions")
+_EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
 
 
 class MissionSession:
@@ -56,7 +56,7 @@ class MissionSession:
         self,
         robot: Robot,
         home: Path,
-        order: Order,
+        order: MissionOrder,
         *,
         open_model: Callable[[str], Model],
         check: Callable[[str, RoomMap | None, tuple[Rule, ...]], Check],
@@ -82,7 +82,7 @@ class MissionSession:
             rules=rules,
             is_over=False,
         )
-        self._events: list[Line] = []
+        self._events: list[LogLine] = []
         self._mission: Mission | None = None
         self._wish: Callable[[Mission], None] | None = (  # of a person, for the session's own thread
             partial(self._take, program=order.program)
@@ -91,7 +91,7 @@ class MissionSession:
         )
         self._stop_button.on_press(self._end_waiting)
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
-        self.on_event: Callable[[Line], None] = lambda _: None  # what it raises stops the robot
+        self.on_event: Callable[[LogLine], None] = lambda _: None  # what it raises stops the robot
         self.error: Exception | None = None  # that ended it, once it is over
 
     def start(self) -> None:
@@ -113,7 +113,7 @@ class MissionSession:
         """The current view."""
         return self._view
 
-    def events(self, start: int = 0) -> list[Line]:
+    def events(self, start: int = 0) -> list[LogLine]:
         """The events of the mission, from one on."""
         return self._events[start:]
 
@@ -123,7 +123,7 @@ class MissionSession:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._wish = partial(self._take, program=program)
-            self._change(program=program, author="", disabled_rules=(), **UNCHECKED)
+            self._change(program=program, author="", disabled_rules=(), **_UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
         """Leave out a rule for this program in this mission only, and check it again.
@@ -143,7 +143,7 @@ class MissionSession:
             mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             with self._lock:
                 self._wish = partial(self._take, program=view.program)
-                self._change(disabled_rules=(*view.disabled_rules, name), **UNCHECKED)
+                self._change(disabled_rules=(*view.disabled_rules, name), **_UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
         """Have the model write another program.
@@ -165,7 +165,7 @@ class MissionSession:
             view, mission = self._view, self._mission
             if mission is None or view.busy:
                 raise MissionError("the program has not been checked yet")
-            if seen != view.digest or seen != digest(mission.summary.program):
+            if seen != view.digest or seen != program_digest(mission.summary.program):
                 raise MissionError("the program has changed; look at it again")
             mission.approve(despite_problems=despite_problems)
 
@@ -203,8 +203,8 @@ class MissionSession:
             self.error = with_closest_here(error, self._view.room_map)
             self._show(error=_sentence(error), suggestions=self.error.closest)
         except Exception as error:
-            if not isinstance(error, EXPECTED):
-                LOG.exception("a mission failed unexpectedly")
+            if not isinstance(error, _EXPECTED_ERRORS):
+                _log.exception("a mission failed unexpectedly")
             if isinstance(error, NotReadyError) and self._is_stopped:
                 return  # the robot gives no answers any more
             self.error = error
@@ -223,13 +223,13 @@ class MissionSession:
                     mission.show_map(self._world)
                 room_map, place = self._look_around()
                 self._get_approved(mission)
-                if mission.state is State.APPROVED:
+                if mission.state is MissionState.APPROVED:
                     self._run_approved(mission, reserved, place, room_map)
 
     def _look_around(self) -> tuple[RoomMap | None, str]:
         """Ask the robot for its rooms and where it is, and refuse rules that it cannot keep to."""
-        room_map, place = preflight(self._robot, self._remark, self._world)
-        self._show(room_map=rooms_to_check(room_map, self._remark))
+        room_map, place = ask_rooms(self._robot, self._remark, self._world)
+        self._show(room_map=limit_rooms(room_map, self._remark))
         rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
         regexes = () if room_map is None or room_map.plain else rooms
         expect_rooms(rules, rooms)
@@ -268,7 +268,7 @@ class MissionSession:
         """Have the model write a program, and take it; without one, go on as before."""
         before = self._view
         writing = {"busy": f"asking {before.model}", "is_written": True}
-        self._show(**UNCHECKED | writing, program="", reply="", error="")
+        self._show(**_UNCHECKED | writing, program="", reply="", error="")
         try:
             prompt = prompt_of(before, self._robot, repair=repair)
             author, made = self._author.write(prompt, self._add_to_reply)
@@ -293,7 +293,7 @@ class MissionSession:
 
     def _restore(self, before: SessionView) -> None:
         """Show what was there before: no other program was written."""
-        kept = {name: getattr(before, name) for name in (*UNCHECKED, "program", "author")}
+        kept = {name: getattr(before, name) for name in (*_UNCHECKED, "program", "author")}
         self._show(**kept | {"busy": ""}, is_written=False, reply="")
 
     def _add_to_reply(self, piece: str) -> None:
@@ -305,7 +305,7 @@ class MissionSession:
         with self._lock:
             if self._wish is not None:
                 return
-            self._change(program=program, error="", reply="", **UNCHECKED)
+            self._change(program=program, error="", reply="", **_UNCHECKED)
             view = self._view
         try:
             mission.draft(program, view.author)
@@ -330,7 +330,7 @@ class MissionSession:
         self._mission.note(sentence)
         self._show(remarks=(*self._view.remarks, sentence))
 
-    def _note(self, line: Line) -> None:
+    def _note(self, line: LogLine) -> None:
         """Take an event of the mission, which holds its lock meanwhile."""
         with self._lock:
             self._events.append(line)
@@ -353,7 +353,7 @@ class MissionSession:
         self._changed()
 
 
-UNCHECKED: dict[str, object] = {
+_UNCHECKED: dict[str, object] = {
     "check": None,
     "missing_skills": (),
     "unknown_rooms": (),
@@ -369,4 +369,4 @@ def _sentence(error: Exception) -> str:
     if isinstance(error, OSError) and error.filename is not None:
         return system_sentence(error)
     sentence = visible(str(error))
-    return sentence if isinstance(error, EXPECTED) else f"{type(error).__name__}: {sentence}"
+    return sentence if isinstance(error, _EXPECTED_ERRORS) else f"{type(error).__name__}: {sentence}"

@@ -10,7 +10,7 @@ from contextlib import ExitStack
 
 from codebotler.robots.base import Robot
 
-CONFIRMS = 6.0
+STOP_REQUEST_SECONDS = 6.0
 """Seconds that a request to stop may take to reach a robot, before its answer is read."""
 
 
@@ -80,5 +80,5 @@ class StopButton:
     def why_unstopped(self) -> str:
         """Return why the robot could not be stopped after a request; empty if it was, as far as it knows."""
         if self.ended.is_set():
-            self._has_reached.wait(CONFIRMS)
+            self._has_reached.wait(STOP_REQUEST_SECONDS)
         return str(getattr(self.robot, "failed_stop", ""))  # which some robots have

@@ -11,32 +11,43 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.skills.values import written_call
 from codebotler.core.terminal import note, system_sentence, visible
-from codebotler.missions.log import SUMMARY, Line, State, Summary, add_event, doing, events_of, log_of
+from codebotler.missions.log import (
+    SUMMARY_FILE,
+    LogLine,
+    MissionState,
+    MissionSummary,
+    add_event,
+    find_unfinished_skill,
+    open_log,
+    read_events,
+)
 
-ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
+_MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
 
-def missions(home: Path) -> list[Summary]:
+def read_missions(home: Path) -> list[MissionSummary]:
     """All missions, oldest first; raises UserError if one cannot be read."""
-    return sorted(map(Summary.read, _folders(home)), key=lambda summary: (summary.created, summary.id))
+    return sorted(
+        map(MissionSummary.read, _mission_folders(home)), key=lambda summary: (summary.created, summary.id)
+    )
 
 
-def find(home: Path, name: str) -> Path:
+def find_mission(home: Path, name: str) -> Path:
     """The folder of a mission, by its name or `last`; raises UserError if there is none."""
-    if name == "last" and (known := missions(home)):
+    if name == "last" and (known := read_missions(home)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
-    if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
+    if not _MISSION_ID.fullmatch(name) or not (folder / SUMMARY_FILE).is_file():
         raise UserError(f'there is no mission "{name}"; `codebotler missions` lists them')
     return folder
 
 
-def recover(home: Path) -> list[Summary]:
+def recover_missions(home: Path) -> list[MissionSummary]:
     """Close and note the missions that were interrupted because the tool died; unreadable ones are left."""
-    found: list[Summary] = []
-    for folder in _folders(home):
+    found: list[MissionSummary] = []
+    for folder in _mission_folders(home):
         try:
-            found += _interrupted(folder)
+            found += _close_interrupted(folder)
         except UserError:
             continue
         except OSError as error:  # such as a full disk, which stops no robot
@@ -47,7 +58,7 @@ def recover(home: Path) -> list[Summary]:
     return found
 
 
-def _folders(home: Path) -> list[Path]:
+def _mission_folders(home: Path) -> list[Path]:
     """The folders of missions."""
     folder = home / "missions"
     try:
@@ -58,38 +69,38 @@ def _folders(home: Path) -> list[Path]:
         raise UserError(
             "this is a file, not a folder of missions; set CODEBOTLER_HOME to another folder", file=folder
         ) from None
-    return [path for path in found if os.path.exists(path / SUMMARY)]  # noqa: PTH110 - raises nothing
+    return [path for path in found if os.path.exists(path / SUMMARY_FILE)]  # noqa: PTH110 - raises nothing
 
 
-def _interrupted(folder: Path) -> list[Summary]:
+def _close_interrupted(folder: Path) -> list[MissionSummary]:
     """The mission, if it was interrupted and not closed."""
-    if Summary.read(folder).has_ended:
+    if MissionSummary.read(folder).has_ended:
         return []
     try:
-        log = log_of(folder)
+        log = open_log(folder)
     except BlockingIOError:
         return []  # another tool is on it
     with closing(log):
-        summary, events = Summary.read(folder), events_of(folder)
+        summary, events = MissionSummary.read(folder), read_events(folder)
         if summary.has_ended:
             return []
         last = next((line for line in reversed(events) if line["event"] == "state"), None)
-        if last is not None and State(last["state"]).is_final:
-            summary.state, summary.reason = State(last["state"]), last.get("reason", "")
+        if last is not None and MissionState(last["state"]).is_final:
+            summary.state, summary.reason = MissionState(last["state"]), last.get("reason", "")
             summary.ended = last["time"]
             summary.write(folder)
             return []
-        summary.reason, clock = _how(summary, events), events[-1]["clock"] if events else 0.0
-        summary.state, summary.ended = State.INTERRUPTED, time.time()
+        summary.reason, clock = _interruption_reason(summary, events), events[-1]["clock"] if events else 0.0
+        summary.state, summary.ended = MissionState.INTERRUPTED, time.time()
         add_event(log, "state", clock, state=summary.state, reason=summary.reason)
         summary.write(folder)
         return [summary]
 
 
-def _how(summary: Summary, events: list[Line]) -> str:
+def _interruption_reason(summary: MissionSummary, events: list[LogLine]) -> str:
     if not summary.state.is_moving:
         return f"CodeBotler ended unexpectedly while the mission was {summary.state}; the robot had not moved"
-    skill = doing(events)
+    skill = find_unfinished_skill(events)
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"
     going = written_call(skill["skill"], list(skill["arguments"].values()))

@@ -9,22 +9,22 @@ from typing import Literal, TypeAlias
 from codebotler.checking.problems import Check
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
-from codebotler.missions.log import State
+from codebotler.missions.log import MissionState
 from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
-UNREADABLE = frozenset({"SyntaxError", "IndentationError", "TabError"})
+_SYNTAX_ERRORS = frozenset({"SyntaxError", "IndentationError", "TabError"})
 """Problems with which a program never begins."""
 
 CHECKING = "checking"  # what a session is busy with
 
-Phase: TypeAlias = State | Literal["", "starting", "writing", "checking", "no-program"]
+Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking", "no-program"]
 
 
 @dataclass(frozen=True)
-class Order:
+class MissionOrder:
     """What a person asks for: an instruction and the model that writes the program, or a program.
 
     Raises:
@@ -52,7 +52,7 @@ class SessionView:
 
     number: int = 0  # of the session, from 1; 0 before the first
     id: str = ""  # of the mission; empty until it exists
-    state: State | None = None  # of the mission
+    state: MissionState | None = None  # of the mission
     reason: str = ""  # why it came to that state
     line: int | None = None  # of the program, where it failed
     busy: str = ""  # what goes on before the robot moves, such as `checking`
@@ -89,7 +89,7 @@ class SessionView:
     @property
     def can_run(self) -> bool:
         """Whether the program, right or wrong, can run at all."""
-        return self.check is None or not any(one.kind in UNREADABLE for one in self.check.problems)
+        return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
     def arriving(self) -> PartialReply:
@@ -99,7 +99,7 @@ class SessionView:
     @property
     def digest(self) -> str:
         """Names this program and no other, for those who approve it."""
-        return digest(self.program)
+        return program_digest(self.program)
 
     @property
     def phase(self) -> Phase:
@@ -122,12 +122,12 @@ class SessionView:
     @property
     def may_be_approved(self) -> bool:
         """Whether the program can be approved as it stands."""
-        return self.state is State.CHECKED and not self.is_over and not self.busy
+        return self.state is MissionState.CHECKED and not self.is_over and not self.busy
 
     @property
     def waits_for_program(self) -> bool:
         """Whether a person has to go on, since a model has replied without a program."""
-        is_open = self.state is State.DRAFTING and not self.is_over and not self.busy
+        is_open = self.state is MissionState.DRAFTING and not self.is_over and not self.busy
         return is_open and self.programless is not None
 
     @property
@@ -145,6 +145,6 @@ class SessionView:
         return waits or (self.state is not None and self.state.is_open)
 
 
-def digest(program: str) -> str:
+def program_digest(program: str) -> str:
     """A short name of a program, by its content."""
     return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()[:16]

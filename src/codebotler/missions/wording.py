@@ -13,27 +13,27 @@ from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import attempted, options_of, trace_from
 from codebotler.core.words import brief
-from codebotler.missions.log import Line, Summary
+from codebotler.missions.log import LogLine, MissionSummary
 
-PAGE = "the page"  # as whoever presses STOP there is logged
-FIRST_CALLS = 2  # of a program, in the title of its mission
-MOST_ACTIVITY = 100  # characters of each text
+BY_PAGE = "the page"  # as whoever presses STOP there is logged
+_TITLE_CALLS = 2  # of a program, in the title of its mission
+_MAX_ACTIVITY_CHARACTERS = 100  # characters of each text
 
 
-def event_text(line: Line) -> str:
+def event_text(line: LogLine) -> str:
     """An event as people read it, such as `drives to "kitchen"`; empty if there is nothing to read."""
-    words = EVENTS.get(line["event"])
+    words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
 
-def activity(line: Line) -> str:
+def activity(line: LogLine) -> str:
     """What a robot does during a skill or a pause of the program, such as `going to "supply room"`."""
     if line["event"] == "sleep":
         return f"waiting for {line['seconds']:g} s"
-    return skill_text(line, "ing", MOST_ACTIVITY) or f"executing {visible(line['skill'])}"
+    return skill_text(line, "ing", _MAX_ACTIVITY_CHARACTERS) or f"executing {visible(line['skill'])}"
 
 
-def skill_text(line: Line, form: VerbForm, most: int = 500) -> str:
+def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
     """The call of a skill in words; empty for a skill that has none in this process."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
@@ -49,7 +49,7 @@ def skill_text(line: Line, form: VerbForm, most: int = 500) -> str:
 def stop_text(by: str, doing: str = "") -> str:
     """A stop in words, and what it interrupted, such as `driving to supply room`, if anything."""
     during = f" while {doing}" if doing else ""
-    return f"stopped {'from' if by == PAGE else 'by'} {visible(by)}{during}"
+    return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}{during}"
 
 
 def state_text(state: str, reason: str) -> str:
@@ -64,7 +64,7 @@ def reason_text(reason: str, line: int | None) -> str:
     return reason if line is None else f"line {line}: {reason}"
 
 
-def title(summary: Summary) -> str:
+def title(summary: MissionSummary) -> str:
     """The instruction of a mission, or else the first skills that its program calls."""
     if summary.instruction:
         return summary.instruction
@@ -74,17 +74,17 @@ def title(summary: Summary) -> str:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and by_name(node.func.id)
     ]
     calls.sort(key=lambda call: (call.lineno, call.col_offset))
-    shown = [brief(ast.get_source_segment(summary.program, call) or "") for call in calls[:FIRST_CALLS]]
-    more = ["…"] * (len(calls) > FIRST_CALLS)
+    shown = [brief(ast.get_source_segment(summary.program, call) or "") for call in calls[:_TITLE_CALLS]]
+    more = ["…"] * (len(calls) > _TITLE_CALLS)
     return f"typed: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
 
 
-def _skill(line: Line) -> str:
+def _skill(line: LogLine) -> str:
     arguments = list(line["arguments"].values())
     return skill_text(line, "third") or shortened(written_call(line["skill"], arguments))
 
 
-def _result(line: Line) -> str:
+def _result(line: LogLine) -> str:
     match line["result"]:
         case None:
             return ""
@@ -97,7 +97,7 @@ def _result(line: Line) -> str:
             return f"→ {shortened(str(result))}"
 
 
-def _rule(line: Line) -> str:
+def _rule(line: LogLine) -> str:
     """A rule that was enforced, broken, or not kept at the end."""
     rule, says = f'the rule "{visible(str(line["rule"]))}"', shortened(str(line["says"]))
     if "what" not in line:
@@ -108,7 +108,7 @@ def _rule(line: Line) -> str:
     return f"{rule} prevented {what}: {says}" if line.get("prevented") else f"{what} broke {rule}: {says}"
 
 
-EVENTS: Mapping[str, Callable[[Line], str]] = {
+_EVENT_WORDERS: Mapping[str, Callable[[LogLine], str]] = {
     "skill": _skill,
     "result": _result,
     "state": lambda line: state_text(line["state"], line.get("reason", "")),

@@ -15,16 +15,16 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from codebotler.core.errors import UserError
-from codebotler.web.proxy import OuterAddress, by_host
+from codebotler.web.proxy import OuterAddress, addresses_by_host
 
-TRIES, WINDOW = 10, 60.0
+MAX_WRONG_TOKENS, WRONG_TOKEN_SECONDS = 10, 60.0
 """How many wrong tokens may come from an address in so many seconds."""
 
-MOST_ADDRESSES = 10_000
-SHORTEST_TOKEN = 16
-LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
-PORTS = range(8080, 8100)
-QUEUE = 128  # connections that wait to be accepted
+MAX_ADDRESSES = 10_000
+MIN_TOKEN_LENGTH = 16
+LOOPBACK_HOSTS = frozenset({"localhost", "127.0.0.1", "::1"})
+DEFAULT_PORTS = range(8080, 8100)
+_LISTEN_BACKLOG = 128  # connections that wait to be accepted
 
 
 class Role(StrEnum):
@@ -61,8 +61,8 @@ class Access:
         if open_to_all and (operator or face or not is_private):
             others = "--host, --behind-proxy and all tokens"
             raise UserError(f"--no-token works on this machine only; leave out {others}")
-        if any(token is not None and len(token) < SHORTEST_TOKEN for token in (operator, face)):
-            raise UserError(f"this token is too short; use {SHORTEST_TOKEN} characters or more, or none")
+        if any(token is not None and len(token) < MIN_TOKEN_LENGTH for token in (operator, face)):
+            raise UserError(f"this token is too short; use {MIN_TOKEN_LENGTH} characters or more, or none")
         if operator is not None and operator == face:
             raise UserError("the face's token would open the operator's page; choose another one")
         made = {Role.OPERATOR: operator is None, Role.FACE: face is None}
@@ -74,24 +74,24 @@ class Access:
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
-        wrong = self._wrong.get(address, deque(maxlen=TRIES))
-        while wrong and wrong[0] <= self.now() - WINDOW:
+        wrong = self._wrong.get(address, deque(maxlen=MAX_WRONG_TOKENS))
+        while wrong and wrong[0] <= self.now() - WRONG_TOKEN_SECONDS:
             wrong.popleft()
-        if len(wrong) >= TRIES:
+        if len(wrong) >= MAX_WRONG_TOKENS:
             raise TooManyTriesError
         if role is None:
-            if address not in self._wrong and len(self._wrong) >= MOST_ADDRESSES:
+            if address not in self._wrong and len(self._wrong) >= MAX_ADDRESSES:
                 self._wrong.pop(next(iter(self._wrong)))
             self._wrong.setdefault(address, wrong).append(self.now())
         return role
 
     def of_cookie(self, value: str) -> Role | None:
         """The role that a cookie gives; None for a wrong one."""
-        return self._of(value, _in_cookie)
+        return self._of(value, _cookie_value)
 
     def cookie(self, role: Role) -> str:
         """The value of a role's cookie: not the token itself, which opens other browsers."""
-        return _in_cookie(self.face if role is Role.FACE else self.operator or "")
+        return _cookie_value(self.face if role is Role.FACE else self.operator or "")
 
     def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:
         for role, token in ((Role.OPERATOR, self.operator), (Role.FACE, self.face)):
@@ -100,7 +100,7 @@ class Access:
         return None
 
 
-def _in_cookie(token: str) -> str:
+def _cookie_value(token: str) -> str:
     return hmac.new(token.encode(), b"codebotler cookie", hashlib.sha256).hexdigest()
 
 
@@ -109,7 +109,7 @@ class GuardRules:
     """Which requests the guard lets through."""
 
     access: Access
-    hosts: frozenset[str] = LOOPBACK  # names of the page, without ports
+    hosts: frozenset[str] = LOOPBACK_HOSTS  # names of the page, without ports
     any_address: bool = False  # whether numeric addresses are accepted besides, as from other machines
     cookie: str = "codebotler"  # its name, another one for each port
     proxies: Mapping[str, OuterAddress] = field(default_factory=dict)  # in front, by what `Host` says
@@ -130,7 +130,7 @@ class PageAddress:
         try:
             return ipaddress.ip_address(self.host).is_loopback
         except ValueError:
-            return self.host in LOOPBACK
+            return self.host in LOOPBACK_HOSTS
 
     @property
     def is_private(self) -> bool:
@@ -139,7 +139,7 @@ class PageAddress:
 
     def listening(self) -> socket.socket:
         """An open socket there."""
-        ports = PORTS if self.port is None else (self.port,)
+        ports = DEFAULT_PORTS if self.port is None else (self.port,)
         for port in ports:
             try:
                 return self._bound(port)
@@ -147,7 +147,7 @@ class PageAddress:
                 if error.errno == errno.EADDRINUSE and port != ports[-1]:
                     continue
                 raise UserError(
-                    f"{_taken(ports)} already in use; choose another --port"
+                    f"{_ports_are(ports)} already in use; choose another --port"
                     if error.errno == errno.EADDRINUSE
                     else f"cannot listen on {self.host}, port {port}: {error.strerror}"
                 ) from None
@@ -161,7 +161,7 @@ class PageAddress:
         try:
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             bound.bind(address)
-            bound.listen(QUEUE)
+            bound.listen(_LISTEN_BACKLOG)
         except OSError:
             bound.close()
             raise
@@ -170,10 +170,10 @@ class PageAddress:
     def rules(self, access: Access, port: int) -> GuardRules:
         """The guard's rules for this address."""
         named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
-        hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
-        cookie, proxies = f"codebotler-{port}", by_host(self.proxies)
+        hosts = LOOPBACK_HOSTS | named | (set() if self.is_loopback else {socket.gethostname().lower()})
+        cookie, proxies = f"codebotler-{port}", addresses_by_host(self.proxies)
         return GuardRules(access, frozenset(hosts), not self.is_loopback, cookie, proxies)
 
 
-def _taken(ports: Sequence[int]) -> str:
+def _ports_are(ports: Sequence[int]) -> str:
     return f"port {ports[0]} is" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]} are"

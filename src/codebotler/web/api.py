@@ -17,18 +17,18 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import shortened
-from codebotler.missions.log import EVENTS, Line, Summary, events_of
+from codebotler.missions.log import EVENTS_FILE, LogLine, MissionSummary, read_events
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find, missions
-from codebotler.missions.view import Order, SessionView
-from codebotler.missions.wording import PAGE
-from codebotler.web.console import MOST_PROGRAM, QUIET, Console
+from codebotler.missions.store import find_mission, read_missions
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.wording import BY_PAGE
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS, MAX_WAIT_SECONDS, Console
 
-HERE = "current"
+_CURRENT = "current"
 """The current mission, in an address."""
 
-Text = Annotated[str, Field(max_length=MOST_PROGRAM)]
+_LimitedText = Annotated[str, Field(max_length=MAX_PROGRAM_CHARACTERS)]
 
 
 class _Form(BaseModel):
@@ -38,15 +38,15 @@ class _Form(BaseModel):
 class NewMission(_Form):
     """A new mission: an instruction, a program, or both; without a program, the model writes one."""
 
-    instruction: Text = ""
+    instruction: _LimitedText = ""
     model: Annotated[str, Field(max_length=200)] = Field("", description="By default, the first one.")
-    program: Text = ""
+    program: _LimitedText = ""
 
 
 class NewProgram(_Form):
     """A program to check, alone or in the place of the current one."""
 
-    program: Text
+    program: _LimitedText
 
 
 class Approval(_Form):
@@ -79,7 +79,7 @@ class AsciiJSONResponse(JSONResponse):
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
-def refused(_request: Request, error: Exception) -> AsciiJSONResponse:
+def invalid_request(_request: Request, error: Exception) -> AsciiJSONResponse:
     """Say what is wrong with a request, without sending it back."""
     assert isinstance(error, RequestValidationError), "registered for this error alone"
     told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
@@ -101,13 +101,13 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     def list_missions() -> list[dict[str, Any]]:
         """All missions, oldest first."""
         with as_http_errors():
-            return [asdict(summary) for summary in missions(console.home)]
+            return [asdict(summary) for summary in read_missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
         """Begin a mission; writing and checking go on in the background. Refused while a mission runs."""
         with as_http_errors():
-            session = console.begin(Order(new.instruction, new.model, new.program))
+            session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
         if not session.view.id:
             raise HTTPException(409, session.view.error or "the mission was stopped before it started")
@@ -117,15 +117,15 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     def show(mission: str) -> dict[str, Any]:
         """A mission: the current one with its check, or the summary of a past one."""
         view = console.view
-        if mission in {HERE, view.id}:
+        if mission in {_CURRENT, view.id}:
             return view_data(view)
-        return asdict(_past(console, mission)[0])
+        return asdict(_read_mission(console, mission)[0])
 
     @api.get("/missions/{mission}/events.jsonl")
     def jsonl(mission: str) -> Response:
         """The events as JSON lines."""
-        summary, _ = _past(console, mission)
-        data = (console.home / "missions" / summary.id / EVENTS).read_bytes()
+        summary, _ = _read_mission(console, mission)
+        data = (console.home / "missions" / summary.id / EVENTS_FILE).read_bytes()
         return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
 
     @api.get("/missions/{mission}/events.mcap")
@@ -140,7 +140,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         with as_http_errors(), installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
 
-        summary, events = _past(console, mission)
+        summary, events = _read_mission(console, mission)
         file = io.BytesIO()
         folder = console.home / "missions" / summary.id
         write_mcap(file, summary, events, folder=folder, clock=clock)
@@ -151,14 +151,14 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Replace the program; it is checked in the background."""
-        _at_hand(console, mission)
+        _current_session(console, mission)
         with as_http_errors():
             return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
         """Have the model write another program, which is then checked."""
-        session = _at_hand(console, mission)
+        session = _current_session(console, mission)
         with as_http_errors():
             session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
         return view_data(session.view)
@@ -166,7 +166,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
         """Run the program that the person saw, and no other."""
-        session = _at_hand(console, mission)
+        session = _current_session(console, mission)
         with as_http_errors():
             session.approve(approval.program, despite_problems=approval.despite_problems)
         return view_data(session.view)
@@ -174,8 +174,8 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
         """Stop the current mission; `state` says when it has stopped."""
-        _at_hand(console, mission)
-        console.stop(PAGE)
+        _current_session(console, mission)
+        console.stop(BY_PAGE)
         return view_data(console.view)
 
     @api.post("/stop", status_code=202)
@@ -183,7 +183,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         *, only_moving: Annotated[bool, Query(description="Stop only a robot that runs a program.")] = False
     ) -> dict[str, Any]:
         """Stop the current mission, or only one whose robot moves; says whether there is any."""
-        return {"stopping": console.stop(PAGE, only_moving=only_moving)}
+        return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}
 
 
 def _add_events(api: APIRouter, console: Console) -> None:
@@ -191,7 +191,7 @@ def _add_events(api: APIRouter, console: Console) -> None:
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
         """The events as they happen (server-sent), from the first one on or after `Last-Event-ID`."""
         return StreamingResponse(
-            _stream(console, _at_hand(console, mission), last_event_id),
+            _stream(console, _current_session(console, mission), last_event_id),
             media_type="text/event-stream",
             headers={"cache-control": "no-store"},
         )
@@ -245,7 +245,7 @@ async def _stream(console: Console, session: MissionSession, known: int) -> Asyn
             yield f"id: {known}\nevent: {line['event']}\ndata: {json.dumps(line)}\n\n"
         if session.view.is_over and not session.events(known):
             return
-        if not await console.notifier.until(has_more, QUIET):
+        if not await console.notifier.until(has_more, MAX_WAIT_SECONDS):
             yield ": still there\n\n"
 
 
@@ -280,27 +280,27 @@ def view_data(view: SessionView) -> dict[str, Any]:
     }
 
 
-def _at_hand(console: Console, mission: str) -> MissionSession:
+def _current_session(console: Console, mission: str) -> MissionSession:
     session = console.session
-    if session is not None and mission in {HERE, session.view.id}:
+    if session is not None and mission in {_CURRENT, session.view.id}:
         return session
-    summary, _ = _past(console, mission)
+    summary, _ = _read_mission(console, mission)
     raise HTTPException(409, f"mission {summary.id} is over; it can only be read")
 
 
-def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
-    name = console.view.id if mission == HERE else mission
+def _read_mission(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine]]:
+    name = console.view.id if mission == _CURRENT else mission
     if not name:
         none = "there is no mission yet; POST /api/missions starts one"
         raise HTTPException(404, none if console.session is None else "the current mission has not started")
     try:
-        folder = find(console.home, name)
+        folder = find_mission(console.home, name)
     except UserError:
         raise HTTPException(
             404, f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
         ) from None
     try:
-        return Summary.read(folder), events_of(folder)
+        return MissionSummary.read(folder), read_events(folder)
     except UserError as error:
         raise HTTPException(404, error.sentence) from None
 

@@ -15,11 +15,11 @@ from codebotler.checking.problems import Check
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
-from codebotler.missions.log import Summary
-from codebotler.missions.mission import GRACE, SHUTTING_DOWN, MissionError
+from codebotler.missions.log import MissionSummary
+from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import recover
-from codebotler.missions.view import Order, SessionView
+from codebotler.missions.store import recover_missions
+from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
@@ -27,10 +27,10 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
-MOST_PROGRAM = 200_000
+MAX_PROGRAM_CHARACTERS = 200_000
 """The longest program or instruction, in characters."""
 
-QUIET = 15.0
+MAX_WAIT_SECONDS = 15.0
 """Seconds after which somebody who waits for something gets an answer in any case."""
 
 
@@ -55,7 +55,7 @@ class Console:
         self.notifier, self.face, self.rules = Notifier(), face, rules
         if face is not None:
             face.changed = self.notifier.change
-        self.interrupted: tuple[Summary, ...] = ()
+        self.interrupted: tuple[MissionSummary, ...] = ()
         self._open_model = open_model
         self._lock = threading.Lock()  # held for moments
         self._session: MissionSession | None = None
@@ -64,15 +64,15 @@ class Console:
         self._pool: WorkerPool | None = None
 
     def __enter__(self) -> Self:
-        self.interrupted = tuple(recover(self.home))
+        self.interrupted = tuple(recover_missions(self.home))
         make_folder(self.home / "missions")
         return self
 
     def __exit__(self, *_: object) -> None:
         session = self._session
         if session is not None:
-            session.stop(SHUTTING_DOWN)
-            session.join(GRACE + 1)
+            session.stop(BY_SHUTDOWN)
+            session.join(STOP_GRACE_SECONDS + 1)
         with self._checking:
             self._held.close()
 
@@ -89,10 +89,10 @@ class Console:
 
     async def view_once(self, *, over: bool) -> SessionView:
         """What all viewers see once a mission is over, or goes on; at the latest after some seconds."""
-        await self.notifier.until(lambda: self.view.is_over == over, QUIET)
+        await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
-    def begin(self, order: Order) -> MissionSession:
+    def begin(self, order: MissionOrder) -> MissionSession:
         """Begin a mission, by default with the first model.
 
         One at hand that is not running makes room for it; another one raises MissionError.
@@ -130,9 +130,9 @@ class Console:
         if session is None or session.view.is_over:
             before = self.view
             if program == before.program:
-                return self.begin(Order(before.instruction, before.model, program, before.author))
+                return self.begin(MissionOrder(before.instruction, before.model, program, before.author))
             kept = before.instruction if is_version_of(before.program, program) else ""
-            return self.begin(Order(kept, before.model if kept else "", program))
+            return self.begin(MissionOrder(kept, before.model if kept else "", program))
         session.edit(program)
         return session
 
@@ -209,5 +209,7 @@ def is_version_of(program: str, changed: str) -> bool:
 
 
 def _check_length(text: str) -> None:
-    if len(text) > MOST_PROGRAM:
-        raise UserError(f"it is too long: {len(text):,} characters, and {MOST_PROGRAM:,} is the limit")
+    if len(text) > MAX_PROGRAM_CHARACTERS:
+        raise UserError(
+            f"it is too long: {len(text):,} characters, and {MAX_PROGRAM_CHARACTERS:,} is the limit"
+        )

@@ -14,23 +14,23 @@ from fastapi.responses import HTMLResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.terminal import shortened, visible_lines
-from codebotler.missions.mission import UNCONFIRMED
+from codebotler.missions.mission import UNCONFIRMED_STOP
 from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.access import Role
 from codebotler.web.console import Console
 
-PAGE = Path(__file__).with_name("static") / "face.html"
-POLICY = (
+_FACE_PAGE = Path(__file__).with_name("static") / "face.html"
+_FACE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
 """Stricter than that of other pages, since there is no NiceGUI: no script can turn a text into markup."""
 
-STOPS = "a person at the face"
-BACK = '<a id="back" href="./">Operate the robot</a>'
-PLACE_OF_BACK = "<!-- back -->"  # for those who may operate
-MOST_TEXT, MOST_OPTION, MOST_OPTIONS = 2_000, 300, 50
+BY_FACE = "a person at the face"
+_BACK_LINK = '<a id="back" href="./">Operate the robot</a>'
+_BACK_PLACEHOLDER = "<!-- back -->"  # for those who may operate
+MAX_FACE_TEXT, MAX_FACE_OPTION, MAX_FACE_OPTIONS = 2_000, 300, 50
 """Characters and options that people can read on a screen."""
 
 
@@ -48,9 +48,11 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @here.get("/face", include_in_schema=False)
     def page(request: Request) -> HTMLResponse:
-        headers = {"content-security-policy": POLICY, "cache-control": "no-store"}
+        headers = {"content-security-policy": _FACE_POLICY, "cache-control": "no-store"}
         may_operate = getattr(request.state, "role", None) is Role.OPERATOR
-        shown = PAGE.read_text(encoding="utf-8").replace(PLACE_OF_BACK, BACK if may_operate else "")
+        shown = _FACE_PAGE.read_text(encoding="utf-8").replace(
+            _BACK_PLACEHOLDER, _BACK_LINK if may_operate else ""
+        )
         return HTMLResponse(shown, headers=headers)
 
     @here.get("/api/face")
@@ -77,7 +79,7 @@ def router(console: Console, face: Face) -> APIRouter:
     @here.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a robot that runs, and nothing else; says whether there is one."""
-        return {"stopping": console.stop(STOPS, only_moving=True)}
+        return {"stopping": console.stop(BY_FACE, only_moving=True)}
 
     @here.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
@@ -114,15 +116,15 @@ def face_data(console: Console, face: Face) -> dict[str, Any]:
     doing = "asking" if question else "moving" if is_moving else "working" if view.is_running else "idle"
     return {
         "doing": doing,
-        "to": words(view.progress.room, MOST_OPTION) if is_moving else "",
-        "said": [{"number": said.number, "text": words(said.text)} for said in shown.said],
+        "to": screen_text(view.progress.room, MAX_FACE_OPTION) if is_moving else "",
+        "said": [{"number": said.number, "text": screen_text(said.text)} for said in shown.said],
         "question": None if question is None else question_data(question),
         "seconds_left": None if question is None else _seconds_left(question),
         "ended": None if shown.ended is None else _ended_data(shown.ended),
         "screens": face.screens,
         "state": view.state,
         "is_over": view.is_over,
-        "reason": UNCONFIRMED if view.reason == UNCONFIRMED else "",
+        "reason": UNCONFIRMED_STOP if view.reason == UNCONFIRMED_STOP else "",
     }
 
 
@@ -135,18 +137,18 @@ def question_data(question: FaceQuestion) -> dict[str, Any]:
     """A question as plain data."""
     return {
         "number": question.number,
-        "person": words(question.person, MOST_OPTION),
-        "text": words(question.text),
-        "options": [words(option, MOST_OPTION) for option in question.options[:MOST_OPTIONS]],
-        "more_options": max(0, len(question.options) - MOST_OPTIONS),
+        "person": screen_text(question.person, MAX_FACE_OPTION),
+        "text": screen_text(question.text),
+        "options": [screen_text(option, MAX_FACE_OPTION) for option in question.options[:MAX_FACE_OPTIONS]],
+        "more_options": max(0, len(question.options) - MAX_FACE_OPTIONS),
     }
 
 
-def words(text: str, most: int = MOST_TEXT) -> str:
+def screen_text(text: str, most: int = MAX_FACE_TEXT) -> str:
     """A text with its lines, cut after so many characters, and with hidden characters written out."""
     return shortened(text, most, visible_lines)
 
 
 def _ended_data(ended: FaceQuestion) -> dict[str, Any]:
-    answer = None if ended.answer is None else words(ended.options[ended.answer], MOST_OPTION)
+    answer = None if ended.answer is None else screen_text(ended.options[ended.answer], MAX_FACE_OPTION)
     return {"number": ended.number, "how": ended.how, "answer": answer}

@@ -15,18 +15,18 @@ from nicegui.elements.mixins.text_element import TextElement
 from codebotler.core.terminal import note, visible_lines
 from codebotler.web.proxy import prefix_of
 
-HEAD = '<link rel="stylesheet" href="{prefix}/static/page.css">'
-BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
+_STYLESHEET_HTML = '<link rel="stylesheet" href="{prefix}/static/page.css">'
+_STOP_BAR_HTML = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
 <button id="stop" type="button" aria-keyshortcuts="Escape"><b>STOP</b><small>Esc</small></button></div>
 <script src="{prefix}/static/stop.js"></script>"""
 """Both name files below the prefix of a proxy, which is empty without one."""
 
-ROBOT = (("Robot", "/"), ("Missions", "/missions"))
-FACE = ("Face", "/face")
-GROUP = "codebotler.pages"
+ROBOT_LINKS = (("Robot", "/"), ("Missions", "/missions"))
+FACE_LINK = ("Face", "/face")
+_ENTRY_POINTS = "codebotler.pages"
 """The entry points of pages."""
 
-PATIENCE = 60.0
+PAGE_BUILD_SECONDS = 60.0
 """Seconds that a page may take to build: a run is read when it is first opened."""
 
 
@@ -40,7 +40,7 @@ class Frame:
         has_robot: whether there is a robot to stop.
     """
 
-    links: tuple[tuple[str, str], ...] = ROBOT
+    links: tuple[tuple[str, str], ...] = ROBOT_LINKS
     brand: str = "CodeBotler"
     has_robot: bool = True
 
@@ -53,9 +53,9 @@ class Frame:
             parts: names and addresses within the page, for screens that show its panes one below another.
         """
         ui.page_title(f"{title} · {self.brand}")
-        ui.add_head_html(HEAD.format(prefix=outside("")))
+        ui.add_head_html(_STYLESHEET_HTML.format(prefix=outside("")))
         if self.has_robot:
-            ui.add_body_html(BAR.format(prefix=outside("")))
+            ui.add_body_html(_STOP_BAR_HTML.format(prefix=outside("")))
         with ui.element("header").classes("bar" if self.has_robot else "bar no-stop"):
             html.a(self.brand, href=outside("/")).classes("brand")
             if parts:
@@ -182,7 +182,7 @@ def installed_pages() -> tuple[Pages, ...]:
 
 
 def _loaded() -> Iterator[Pages]:
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+    for point in sorted(entry_points(group=_ENTRY_POINTS), key=lambda point: point.name):
         try:
             pages = point.load()
             if not isinstance(pages, Pages):

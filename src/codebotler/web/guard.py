@@ -20,14 +20,14 @@ from codebotler.core.terminal import note
 from codebotler.web.access import GuardRules, Role, TooManyTriesError
 from codebotler.web.proxy import OuterAddress, path_of, prefix_of
 
-MOST_BYTES = 2_000_000
+MAX_BODY_BYTES = 2_000_000
 """The largest body of a request."""
 
-CHANGES_NOTHING = frozenset({"GET", "HEAD", "OPTIONS"})
-FOR_FACES = ("/face", "/api/face", "/static", "/favicon.ico")
+_SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+_FACE_PATHS = ("/face", "/api/face", "/static", "/favicon.ico")
 """What a face may open: not NiceGUI's websocket, which takes messages for any page by its number."""
 
-POLICY = (
+_PAGE_POLICY = (
     "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
@@ -36,8 +36,8 @@ POLICY = (
 browser, Quasar and CodeMirror write styles. The guard writes a nonce into each page because NiceGUI puts the
 page's own content into inline scripts, so no hash is known beforehand, and it has no option for nonces."""
 
-PLAIN_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
-HEADERS = {
+_REFUSAL_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
+_SECURITY_HEADERS = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "x-frame-options": "DENY",
@@ -45,22 +45,22 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), geolocation=(), payment=(), usb=(), microphone=(self)",
 }
-HOST = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
+_HOST_HEADER = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
 """A name or an address and any port, since a tunnel or a proxy in front has a port of its own."""
 
-MOST_PORT = 65_535
-CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
-SCRIPT = re.compile(rb"<script(?=[\s>])")
-NO_SCRIPT = "script-src 'none'"  # in a page's own policy: no script in it is marked as ours
+_MAX_PORT = 65_535
+_CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+_SCRIPT_TAG = re.compile(rb"<script(?=[\s>])")
+_NO_SCRIPT = "script-src 'none'"  # in a page's own policy: no script in it is marked as ours
 
-NO_CONTROL = "there is no such page: addresses here have no control characters"
+_NO_CONTROL_CHARACTERS = "there is no such page: addresses here have no control characters"
 NO_PAGE = "there is no such page"
-WRONG = "this token is wrong"
-OTHER_SITE = "this request came from another site, which is not allowed"
-HOST_LOST = "the proxy in front must pass on the header Host as the browser sent it"
-TOO_LARGE = f"at most {MOST_BYTES:,} bytes are accepted"
+_WRONG_TOKEN = "this token is wrong"
+_OTHER_SITE = "this request came from another site, which is not allowed"
+_HOST_CHANGED = "the proxy in front must pass on the header Host as the browser sent it"
+_BODY_TOO_LARGE = f"at most {MAX_BODY_BYTES:,} bytes are accepted"
 
-REFUSAL = """<!doctype html><html lang="en"><meta charset="utf-8">
+_REFUSAL_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{brand}</title>
 <style>body{{font:18px/1.5 system-ui,sans-serif;color-scheme:light dark;max-width:34rem;margin:20vh auto;
 padding:0 1.5rem}}h1{{font-size:1.4rem}}</style><h1>{brand}</h1><p>{sentence}</p></html>"""
@@ -112,8 +112,10 @@ class Guard:
             await self._app(scope, receive, send)
 
     def _check_path(self, path: str) -> None:
-        if CONTROL.search(path) and not self._has_page(path):  # names that people gave may have them
-            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
+        if _CONTROL_CHARACTERS.search(path) and not self._has_page(
+            path
+        ):  # names that people gave may have them
+            raise RefusedError(HTTPStatus.BAD_REQUEST, _NO_CONTROL_CHARACTERS)
 
     def _check_host(self, request: HTTPConnection) -> None:
         """Refuse other names: a foreign page whose name leads here (DNS rebinding) calls us by that name."""
@@ -132,24 +134,24 @@ class Guard:
         host = headers.get("host", "") if proxy is None else proxy.host
         if origin is not None and not _is_same(origin, host, request.scope):
             raise RefusedError(HTTPStatus.FORBIDDEN, self._why_not(origin.lower(), request, proxy))
-        changes = is_socket or request.scope["method"] not in CHANGES_NOTHING
+        changes = is_socket or request.scope["method"] not in _SAFE_METHODS
         from_browser = "cookie" in headers or is_socket
         if changes and origin is None and from_browser and "authorization" not in headers:
             raise RefusedError(HTTPStatus.FORBIDDEN, "a browser must send the header Origin")
         navigates = headers.get("sec-fetch-mode") == "navigate"
         if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
-            raise RefusedError(HTTPStatus.FORBIDDEN, OTHER_SITE)
+            raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)
 
     def _why_not(self, origin: str, request: HTTPConnection, proxy: OuterAddress | None) -> str:
         """Say what to do about an origin that is not ours, if it is that of a proxy in front."""
         outer = OuterAddress.found_in(origin)
         is_our_page = request.headers.get("sec-fetch-site") == "same-origin"
         if outer is None or not (is_our_page or outer.name == _host(request)):
-            return OTHER_SITE
+            return _OTHER_SITE
         if proxy is not None:
             return f"open this page at {proxy.page}"
         if outer.host in self._rules.proxies:
-            return HOST_LOST
+            return _HOST_CHANGED
         sentence = (
             f"if a proxy is in front, start with --behind-proxy {outer.origin}, followed by its path if any"
         )
@@ -164,7 +166,7 @@ class Guard:
         if kind.lower() == "bearer" and given:
             role = self._of_token(given.strip(), request)
             if role is None:
-                raise RefusedError(HTTPStatus.UNAUTHORIZED, WRONG)
+                raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG_TOKEN)
             return role
         role = access.of_cookie(request.cookies.get(self._rules.cookie, ""))
         return Role.OPERATOR if role is None and access.operator is None else role
@@ -181,16 +183,18 @@ class Guard:
         """Exchange a token in the link for a cookie, so that no history keeps it."""
         role = self._of_token(token, request)
         if role is None and self._rules.access.operator is not None:
-            raise RefusedError(HTTPStatus.UNAUTHORIZED, WRONG)
+            raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG_TOKEN)
         path = "/" + path_of(request.scope).strip("/")  # two slashes would begin the name of another host
-        if CONTROL.search(path):
-            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
+        if _CONTROL_CHARACTERS.search(path):
+            raise RefusedError(HTTPStatus.BAD_REQUEST, _NO_CONTROL_CHARACTERS)
         if normpath(path) != path or not self._has_page(path):  # browsers follow ".."
             raise RefusedError(HTTPStatus.NOT_FOUND, NO_PAGE)
         rest = [(name, value) for name, value in request.query_params.multi_items() if name != "token"]
         prefix = prefix_of(request.scope)
         where = prefix + quote(path) + (f"?{urlencode(rest)}" if rest else "")
-        answer = RedirectResponse(where, HTTPStatus.SEE_OTHER, {**HEADERS, "cache-control": "no-store"})
+        answer = RedirectResponse(
+            where, HTTPStatus.SEE_OTHER, {**_SECURITY_HEADERS, "cache-control": "no-store"}
+        )
         answer.headers["location"] = where
         if role is not None:
             value = self._rules.access.cookie(role)
@@ -215,8 +219,8 @@ def _named_host(scope: Scope) -> str:
 def _host(request: HTTPConnection) -> str:
     """The name by which the page was called."""
     named = [host.lower() for host in request.headers.getlist("host")]
-    found = HOST.fullmatch(named[0]) if len(named) == 1 else None
-    if found is None or not 0 < int(found[3] or 80) <= MOST_PORT:
+    found = _HOST_HEADER.fullmatch(named[0]) if len(named) == 1 else None
+    if found is None or not 0 < int(found[3] or 80) <= _MAX_PORT:
         raise RefusedError(HTTPStatus.BAD_REQUEST, "send the header Host once, with a name and a port")
     return found[1] or found[2]
 
@@ -246,14 +250,14 @@ def _check_role(role: Role | None, path: str) -> None:
         raise RefusedError(
             HTTPStatus.UNAUTHORIZED, "open the link that was printed at the start; it contains the token"
         )
-    if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in FOR_FACES):
+    if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in _FACE_PATHS):
         raise RefusedError(HTTPStatus.FORBIDDEN, "this link opens only the robot's face")
 
 
 def _check_length(request: HTTPConnection) -> None:
     length = request.headers.get("content-length", "0")
-    if not length.isascii() or not length.isdigit() or int(length) > MOST_BYTES:
-        raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, TOO_LARGE)
+    if not length.isascii() or not length.isdigit() or int(length) > MAX_BODY_BYTES:
+        raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _BODY_TOO_LARGE)
 
 
 class _LimitedBody:
@@ -272,36 +276,36 @@ class _LimitedBody:
     async def receive(self) -> Message:
         message = await self._receive()
         self._length += len(message.get("body", b""))
-        return {"type": "http.disconnect"} if self._length > MOST_BYTES else message
+        return {"type": "http.disconnect"} if self._length > MAX_BODY_BYTES else message
 
     async def send(self, message: Message) -> None:
         if self._is_refused:
             return
         if message["type"] == "http.response.start":
-            if self._length > MOST_BYTES:
+            if self._length > MAX_BODY_BYTES:
                 self._is_refused = True
-                error = RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, TOO_LARGE)
+                error = RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _BODY_TOO_LARGE)
                 answer = _refusal(HTTPConnection(self._scope), error)
                 answer.headers["connection"] = "close"  # the rest of the body is not read
                 await answer(self._scope, self._receive, self._send)
                 return
             headers = MutableHeaders(raw=list(message["headers"]))
             own = headers.get("content-security-policy", "")
-            self._is_page = headers.get("content-type", "").startswith("text/html") and NO_SCRIPT not in own
+            self._is_page = headers.get("content-type", "").startswith("text/html") and _NO_SCRIPT not in own
             if self._is_page:
                 del headers["content-length"]
-            for name, value in HEADERS.items():
+            for name, value in _SECURITY_HEADERS.items():
                 headers[name] = value
-            headers.append("content-security-policy", POLICY.format(nonce=self._nonce))
+            headers.append("content-security-policy", _PAGE_POLICY.format(nonce=self._nonce))
             message = {**message, "headers": headers.raw}
         elif self._is_page and message["type"] == "http.response.body":
-            marked = SCRIPT.sub(f'<script nonce="{self._nonce}"'.encode(), message.get("body", b""))
+            marked = _SCRIPT_TAG.sub(f'<script nonce="{self._nonce}"'.encode(), message.get("body", b""))
             message = {**message, "body": marked}
         await self._send(message)
 
 
 def _refusal(request: HTTPConnection, error: RefusedError) -> Response:
-    headers = {**HEADERS, "content-security-policy": PLAIN_POLICY, "cache-control": "no-store"}
+    headers = {**_SECURITY_HEADERS, "content-security-policy": _REFUSAL_POLICY, "cache-control": "no-store"}
     if error.status is HTTPStatus.UNAUTHORIZED:
         headers["www-authenticate"] = "Bearer"
     if error.status is HTTPStatus.TOO_MANY_REQUESTS:
@@ -318,5 +322,5 @@ def refusal(
 ) -> Response:
     """An answer with one sentence: a page for browsers, else JSON."""
     if "text/html" in request.headers.get("accept", ""):
-        return HTMLResponse(REFUSAL.format(sentence=sentence, brand=brand), status, headers)
+        return HTMLResponse(_REFUSAL_PAGE.format(sentence=sentence, brand=brand), status, headers)
     return JSONResponse({"detail": sentence}, status, headers)

@@ -9,7 +9,7 @@ from nicegui import background_tasks, ui
 
 from codebotler.web.console import Notifier
 
-PAUSE = 0.1
+_UPDATE_PAUSE = 0.1
 """Seconds between two updates of a page, however often something changes."""
 
 
@@ -27,6 +27,6 @@ async def follow(notifier: Notifier, update: Callable[[], Awaitable[None]]) -> N
         async for _ in notifier.changes():
             with here:
                 await update()
-            await asyncio.sleep(PAUSE)
+            await asyncio.sleep(_UPDATE_PAUSE)
 
     client.on_delete(background_tasks.create(following()).cancel)

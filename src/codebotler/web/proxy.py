@@ -15,15 +15,15 @@ from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.chosen import ConfigFile
 
-ORIGIN = re.compile(
+_ADDRESS = re.compile(
     r"(?P<scheme>https?)://(?P<host>[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::0*(?P<port>[1-9]\d{0,4}))?"
     r"(?P<prefix>(?:/(?!\.{1,2}(?:/|$))[\w.~-]+)*)/?",
     re.IGNORECASE | re.ASCII,
 )
-PORTS: Mapping[str, str] = {"https": "443", "http": "80"}
-SECURE: Mapping[str, str] = {"http": "https", "ws": "wss"}
-FORWARDED_PREFIX = b"x-forwarded-prefix"  # NiceGUI would add it to the prefix, which the option names
-LONGEST = 80  # characters of a wrong address that a message quotes
+_SCHEME_PORTS: Mapping[str, str] = {"https": "443", "http": "80"}
+_SECURE_SCHEMES: Mapping[str, str] = {"http": "https", "ws": "wss"}
+_FORWARDED_PREFIX = b"x-forwarded-prefix"  # NiceGUI would add it to the prefix, which the option names
+_MAX_QUOTED = 80  # characters of a wrong address that a message quotes
 
 
 @dataclass(frozen=True)
@@ -49,24 +49,24 @@ class OuterAddress:
         """
         address = cls.found_in(text)
         if address is None:
-            quoted = f'"{both_ends(text, LONGEST)}" is no address of a proxy'
+            quoted = f'"{both_ends(text, _MAX_QUOTED)}" is no address of a proxy'
             raise UserError(f"{quoted}; write https://HOST, with :PORT and /PATH if it has them")
         return address
 
     @classmethod
     def found_in(cls, text: str) -> OuterAddress | None:
         """The address that a text names; None if it names none."""
-        found = ORIGIN.fullmatch(text)
+        found = _ADDRESS.fullmatch(text)
         if found is None:
             return None
         scheme, port = found["scheme"].lower(), found["port"]
-        suffix = "" if port in {None, PORTS[scheme]} else f":{port}"
+        suffix = "" if port in {None, _SCHEME_PORTS[scheme]} else f":{port}"
         return cls(scheme, found["host"].lower() + suffix, found["prefix"])
 
     @property
     def name(self) -> str:
         """The name of the host, or its address, without a port."""
-        return name_of(self.host)
+        return host_name(self.host)
 
     @property
     def origin(self) -> str:
@@ -88,8 +88,12 @@ class OuterAddress:
             path, raw = self.prefix + path, self.prefix.encode() + raw
         if path == self.prefix:
             path, raw = f"{path}/", raw + b"/"
-        headers = [(name, value) for name, value in scope["headers"] if name != FORWARDED_PREFIX]
-        secure = SECURE.get(scope["scheme"], scope["scheme"]) if self.scheme == "https" else scope["scheme"]
+        headers = [(name, value) for name, value in scope["headers"] if name != _FORWARDED_PREFIX]
+        secure = (
+            _SECURE_SCHEMES.get(scope["scheme"], scope["scheme"])
+            if self.scheme == "https"
+            else scope["scheme"]
+        )
         return {
             **scope,
             "path": path,
@@ -133,17 +137,17 @@ def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
         raise error if error.file else config.wrong(error.sentence, "behind_proxy") from None
 
 
-def by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
+def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
     """Addresses by what `Host` may say: some clients write the scheme's own port, too."""
     found: dict[str, OuterAddress] = {}
     for address in addresses:
         found[address.host] = address
         if ":" not in address.host.rpartition("]")[2]:
-            found[f"{address.host}:{PORTS[address.scheme]}"] = address
+            found[f"{address.host}:{_SCHEME_PORTS[address.scheme]}"] = address
     return MappingProxyType(found)
 
 
-def name_of(host: str) -> str:
+def host_name(host: str) -> str:
     """A host without its port, and without the brackets of a numeric address."""
     bare = host[: host.rindex("]") + 1] if "]" in host else host.partition(":")[0]
     return bare.strip("[]")

@@ -27,22 +27,22 @@ from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
 from codebotler.core.words import listed
-from codebotler.missions.mission import SHUTTING_DOWN
+from codebotler.missions.mission import BY_SHUTDOWN
 from codebotler.web import api, face, page
 from codebotler.web.access import Access, PageAddress, Role
 from codebotler.web.console import Console
-from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
-from codebotler.web.guard import MOST_BYTES, NO_PAGE, Guard, refusal
+from codebotler.web.frame import FACE_LINK, ROBOT_LINKS, Frame, Pages, Site
+from codebotler.web.guard import MAX_BODY_BYTES, NO_PAGE, Guard, refusal
 from codebotler.web.proxy import path_of
 
-STATIC = Path(__file__).with_name("static")
-LEAVING = "CodeBotler, since the last operator closed the page"
-RUNS = Path("runs")
-METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
-SOCKETS = "/_nicegui_ws/"
+STATIC_FOLDER = Path(__file__).with_name("static")
+BY_LEAVING = "CodeBotler, since the last operator closed the page"
+RUNS_FOLDER = Path("runs")
+_HTTP_METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
+_PAGE_SOCKETS = "/_nicegui_ws/"
 """Where the page of an operator holds a websocket open for as long as it is shown."""
 
-LINGER = 3
+_STREAM_END_SECONDS = 3
 """Seconds that streams have to end when the server stops."""
 
 
@@ -51,7 +51,7 @@ def serve(
     place: PageAddress,
     access: Access,
     further: Sequence[Pages] = (),
-    runs: Path = RUNS,
+    runs: Path = RUNS_FOLDER,
     *,
     alone_for: float | None = None,
 ) -> None:
@@ -65,7 +65,7 @@ def serve(
         _check_prefixes(pages, place)
         app: ASGIApp = pages
         if console and alone_for is not None:
-            app = Presence(app, alone_for, partial(console.stop, LEAVING, only_moving=True))
+            app = Presence(app, alone_for, partial(console.stop, BY_LEAVING, only_moving=True))
         guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
@@ -74,8 +74,8 @@ def serve(
             access_log=False,
             proxy_headers=False,
             server_header=False,
-            ws_max_size=MOST_BYTES,
-            timeout_graceful_shutdown=LINGER,
+            ws_max_size=MAX_BODY_BYTES,
+            timeout_graceful_shutdown=_STREAM_END_SECONDS,
         )
         note(_links(place, port, access, console))
         _Server(settings, console).run([bound])
@@ -113,11 +113,15 @@ def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
             )
 
 
-def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS) -> FastAPI:
+def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS_FOLDER) -> FastAPI:
     """The page and its API, without the guard."""
     links = tuple((pages.name, pages.address) for pages in further)
-    to_face = (FACE,) if console and console.face else ()
-    frame = Frame((*ROBOT, *to_face, *links)) if console else Frame(links, further[0].brand, has_robot=False)
+    to_face = (FACE_LINK,) if console and console.face else ()
+    frame = (
+        Frame((*ROBOT_LINKS, *to_face, *links))
+        if console
+        else Frame(links, further[0].brand, has_robot=False)
+    )
     app = FastAPI(
         title="CodeBotler",
         version=__version__,
@@ -133,15 +137,15 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
         page.add(console, frame)
     for pages in further:
         pages.add(Site(app, frame, runs))
-    app.add_exception_handler(RequestValidationError, api.refused)
-    app.mount("/static", StaticFiles(directory=STATIC))
+    app.add_exception_handler(RequestValidationError, api.invalid_request)
+    app.mount("/static", StaticFiles(directory=STATIC_FOLDER))
     core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard allows ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]
     nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app, frame.brand))
     ui.run_with(
         app,
         title="CodeBotler",
-        favicon=STATIC / "icon.svg",
+        favicon=STATIC_FOLDER / "icon.svg",
         dark=None,
         language="en-US",
         tailwind=False,
@@ -155,7 +159,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
 def _not_found(app: FastAPI, brand: str, request: Request, _error: Exception) -> Response:
     """404, or 405 where NiceGUI took an address that the API has for another method."""
     status, sentence, headers = HTTPStatus.NOT_FOUND, NO_PAGE, {}
-    allowed = [method for method in METHODS if _is_taken(app.routes, method, path_of(request.scope))]
+    allowed = [method for method in _HTTP_METHODS if _is_taken(app.routes, method, path_of(request.scope))]
     if allowed:
         status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address accepts only {listed(allowed)}"
         headers = {"allow": ", ".join(allowed)}
@@ -185,7 +189,7 @@ class Presence:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, and count the pages that are open."""
         is_operator = scope.get("state", {}).get("role") is Role.OPERATOR
-        if not is_operator or scope["type"] != "websocket" or not path_of(scope).startswith(SOCKETS):
+        if not is_operator or scope["type"] != "websocket" or not path_of(scope).startswith(_PAGE_SOCKETS):
             await self._app(scope, receive, send)
             return
         self._pages += 1
@@ -208,5 +212,5 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:
-            self._console.stop(SHUTTING_DOWN)
+            self._console.stop(BY_SHUTDOWN)
         super().handle_exit(sig, frame)

@@ -16,12 +16,12 @@ from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event
 from codebotler.web.frame import PlainText
 
-MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
-LEFT_OUT = "…"  # instead of a room, where steps are left out
+_MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
+_LEFT_OUT = "…"  # instead of a room, where steps are left out
 
 
 @dataclass(frozen=True)
-class Deed:
+class Action:
     """Something that the robot does in a room."""
 
     kind: str  # `say`, `ask` and `answer` for what is spoken; else the event's
@@ -34,7 +34,7 @@ class Scene:
     """A stay in a room."""
 
     room: str  # for a drive that fails, the room that was asked for
-    deeds: tuple[Deed, ...] = ()
+    deeds: tuple[Action, ...] = ()
     is_found: bool = True  # whether there is such a room
     step: int = field(default=0, compare=False)  # of the drive there, from 1; 0 where the robot started
 
@@ -50,7 +50,7 @@ class Strip:
 
 
 @dataclass(frozen=True)
-class Reached:
+class RouteProgress:
     """How far a robot has come."""
 
     visited: tuple[str, ...] = ()  # rooms
@@ -58,11 +58,11 @@ class Reached:
     answers: tuple[str | None, ...] = ()  # to its questions; None where one failed
 
 
-NOWHERE = Reached()
-NONE_FITS = "What happened fits none of the imagined worlds; they are only examples."
+NO_PROGRESS = RouteProgress()
+_NO_STRIP_FITS = "What happened fits none of the imagined worlds; they are only examples."
 
 
-def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
+def draw_strips(check: Check, reached: RouteProgress = NO_PROGRESS) -> None:
     """Draw what a robot would do, as far as a check found, and tick off the rooms that it has visited.
 
     A strip that is no longer possible is folded.
@@ -71,7 +71,7 @@ def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
     if shown and all(number is None for number in numbers):
-        PlainText("p", NONE_FITS, "quiet unsure")
+        PlainText("p", _NO_STRIP_FITS, "quiet unsure")
     for strip, number_reached, is_folded in zip(shown, numbers, folded(numbers), strict=True):
         with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:
@@ -89,16 +89,16 @@ def folded(numbers: Sequence[int | None]) -> list[bool]:
     return [is_among_them and number is None for number in numbers]
 
 
-def scenes_reached(strip: Strip, reached: Reached) -> int | None:
+def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
     """How many drives of a strip the robot has made; None if it went, found or heard something else."""
-    is_whole = all(scene.room != LEFT_OUT for scene in strip.scenes)
+    is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
     if is_whole and not (_has_seen(strip, reached.looks) and _has_heard(strip, reached.answers)):
         return None
     for number, room in enumerate(reached.visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
-        if scene is not None and scene.room == LEFT_OUT:
+        if scene is not None and scene.room == _LEFT_OUT:
             return number
-        if scene is None or scene.room != shortened(room, MOST_TEXT):
+        if scene is None or scene.room != shortened(room, _MAX_STEP_TEXT):
             return None
     return len(reached.visited)
 
@@ -109,7 +109,7 @@ def _has_seen(strip: Strip, looks: Sequence[tuple[str, bool]]) -> bool:
 
 def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
     """Robots that hear people may return an option in another case and with blanks around it."""
-    heard = [NO_ANSWER if answer is None else shortened(answer, MOST_TEXT) for answer in answers]
+    heard = [NO_ANSWER if answer is None else shortened(answer, _MAX_STEP_TEXT) for answer in answers]
     told = _texts(strip, "answer")[: len(answers)]
     return [text.strip().casefold() for text in told] == [text.strip().casefold() for text in heard]
 
@@ -154,7 +154,7 @@ def strips(check: Check) -> list[Strip]:
         strip = _strip(sample, check)
         different.setdefault((strip.scenes, strip.ending), (sample.number in check.showing, strip))
     ranked = sorted(different.values(), key=lambda each: (not each[0], not each[1].ends_well))
-    return [strip for _, strip in ranked[:MOST_STRIPS]]
+    return [strip for _, strip in ranked[:MAX_STRIPS]]
 
 
 def _strip(sample: Sample, check: Check) -> Strip:
@@ -162,10 +162,10 @@ def _strip(sample: Sample, check: Check) -> Strip:
     if sample.in_vain:
         ending = "The robot waits or searches without success, which is not counted as a problem."
     elif error is not None:
-        ending = f"Fails: {shortened(error.message, MOST_TEXT)} ({shortened(error.kind)})"
+        ending = f"Fails: {shortened(error.message, _MAX_STEP_TEXT)} ({shortened(error.kind)})"
     else:
         ending = "Done."
-    world = shortened(f"If {sample.world}", MOST_WORLD) if sample.facts else ""
+    world = shortened(f"If {sample.world}", _MAX_WORLD_TEXT) if sample.facts else ""
     shown = scenes(steps_of(sample.outcome.trace, has_places=True), check.room_map.start)
     return Strip(world, shown, ending, error is None or sample.in_vain)
 
@@ -174,29 +174,29 @@ def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
     """The scenes of a trace from its start on; of a long one its ends, and the steps that are needed."""
-    found: list[Scene] = [Scene(shortened(start, MOST_TEXT))]
+    found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in cut(steps, needed):
         if not is_shown:
-            found.append(Scene(LEFT_OUT, (Deed("more", f"{len(some):,} more steps"),)))
+            found.append(Scene(_LEFT_OUT, (Action("more", f"{len(some):,} more steps"),)))
             continue
         for step in some:
             if step["kind"] == GOTO:
                 to = step["to"]
-                room = shortened(to or step["text"], MOST_TEXT)
+                room = shortened(to or step["text"], _MAX_STEP_TEXT)
                 found.append(Scene(room, is_found=to is not None, step=step["step"]))
             else:
-                found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_deeds(step)))
+                found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_actions(step)))
     return tuple(found)
 
 
-def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
-    kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
+def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
+    kind, text, number = step["kind"], shortened(step["text"], _MAX_STEP_TEXT), step["step"]
     if not is_question(kind) and not is_spoken(kind):
-        return (Deed(kind, _phrase(event_from_step(step)), number),)
+        return (Action(kind, _phrase(event_from_step(step)), number),)
     if "answer" not in step:
-        return (Deed(kind, text, number),)
-    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
-    return (Deed(kind, text, number), Deed("answer", heard))
+        return (Action(kind, text, number),)
+    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), _MAX_STEP_TEXT)
+    return (Action(kind, text, number), Action("answer", heard))
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
@@ -205,4 +205,4 @@ def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the tra
 
 
 def _phrase(event: Event) -> str:
-    return phrase(event, "third", show=lambda text: shortened(text, MOST_TEXT), quote="")
+    return phrase(event, "third", show=lambda text: shortened(text, _MAX_STEP_TEXT), quote="")

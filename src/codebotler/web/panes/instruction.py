@@ -9,24 +9,24 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.program import called_skills, tree_of
 from codebotler.core.terminal import shortened, visible, visible_lines
-from codebotler.missions.log import Summary
+from codebotler.missions.log import MissionSummary
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import known_instructions
-from codebotler.missions.store import missions
-from codebotler.missions.view import Order, SessionView
+from codebotler.missions.store import read_missions
+from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.models.usable import MODEL_HINT
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
 
-UNKNOWN = "There is no recorded program for this instruction."
-NO_MODEL = (
+_NO_RECORDED_PROGRAM = "There is no recorded program for this instruction."
+_HOW_TO_ADD_MODEL = (
     f"For other instructions, {MODEL_HINT}, and add --model NAME to codebotler serve; "
     "codebotler models lists the names."
 )
-MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
-ABOUT_RECORDED = (
+_MAX_EXAMPLES, _MAX_RECENT, _MAX_PICK_CHARACTERS = 4, 6, 400
+_ABOUT_RECORDED = (
     "This is not a language model: its programs were written by people, so you can try everything without an "
     "API key. It knows only a few instructions, such as the examples below."
 )
@@ -54,7 +54,7 @@ class InstructionPane:
                 label="Model",
             )
             self._model.props("outlined dense").on_value_change(self._about_model)
-            self._about = PlainText("p", ABOUT_RECORDED, "quiet")
+            self._about = PlainText("p", _ABOUT_RECORDED, "quiet")
             self._write = Button("Write the program", self._ask, "primary")
             self._trouble = PlainText("p", "", "trouble").props("role=alert")
             self._alike = ui.element("div").classes("picks")
@@ -99,7 +99,7 @@ class InstructionPane:
 
     def _ask(self) -> None:
         try:
-            self._console.begin(Order(self._text.value or "", self._model.value or ""))
+            self._console.begin(MissionOrder(self._text.value or "", self._model.value or ""))
         except (MissionError, UserError) as error:
             warn(error.sentence)
         else:
@@ -111,7 +111,7 @@ class InstructionPane:
     def _unknown(self, known: tuple[str, ...]) -> str:
         choose = "Choose one below. " if known else ""
         has_other = not all(map(is_recorded, self._console.models))
-        return f"{UNKNOWN} {choose}{'You can also choose another model.' if has_other else NO_MODEL}"
+        return f"{_NO_RECORDED_PROGRAM} {choose}{'You can also choose another model.' if has_other else _HOW_TO_ADD_MODEL}"
 
     def _suggest(self, known: tuple[str, ...]) -> None:
         """Offer instructions that are alike."""
@@ -127,7 +127,7 @@ class InstructionPane:
             PlainText("h3", title)
             for text, state in texts:
                 with html.button(type="button").classes("pick").on("click", lambda t=text: self._take(t)):
-                    PlainText("span", shortened(text, MOST_TEXT))
+                    PlainText("span", shortened(text, _MAX_PICK_CHARACTERS))
                     if state:
                         PlainText("small", state, f"state state-{state}")
 
@@ -143,14 +143,14 @@ def examples(console: Console) -> list[str]:
     found: dict[frozenset[str], str] = {}
     for instruction in sorted(known, key=len):
         found.setdefault(frozenset(called_skills(tree_of(known[instruction]))), instruction)
-    return list(found.values())[:MOST_EXAMPLES]
+    return list(found.values())[:_MAX_EXAMPLES]
 
 
-def _recent(console: Console) -> list[Summary]:
+def _recent(console: Console) -> list[MissionSummary]:
     """The last different instructions."""
     try:
-        known = missions(console.home)
+        known = read_missions(console.home)
     except (UserError, OSError):
         return []
     last = {summary.instruction: summary for summary in known if summary.instruction}
-    return sorted(last.values(), key=lambda summary: -summary.created)[:MOST_BEFORE]
+    return sorted(last.values(), key=lambda summary: -summary.created)[:_MAX_RECENT]

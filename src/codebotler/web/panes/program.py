@@ -19,15 +19,15 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
-from codebotler.web.console import MOST_PROGRAM, Console
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
-from codebotler.web.storyboard import Reached, draw_strips
+from codebotler.web.storyboard import RouteProgress, draw_strips
 
-CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
-MOST_MARKS, MOST_ESCAPES = 400, 2_000
-MOST_PROBLEMS = 20
+_CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
+_MAX_MARKS, _MAX_ESCAPES = 400, 2_000
+_MAX_PROBLEMS = 20
 
 
 class ProgramPane:
@@ -77,7 +77,7 @@ class ProgramPane:
         self._instruction.say(_made_for(view) if view.program else "")
         self._rules.show(view)
         self._show_approval(view)
-        reached = reached_in(view)
+        reached = route_progress(view)
         drawn = (view.check, view.problems, view.unknown_rooms, shown, reached)
         if drawn != self._drawn:
             self._drawn = drawn
@@ -102,7 +102,7 @@ class ProgramPane:
         current = _for_editor(self._console.view.program)
         if typed is None:
             self._restore(
-                f"A program can have at most {MOST_PROGRAM:,} characters; your last edit was discarded."
+                f"A program can have at most {MAX_PROGRAM_CHARACTERS:,} characters; your last edit was discarded."
             )
         elif event.args["base"] != current:
             self._restore("Someone else changed the program; your last edit was discarded.")
@@ -198,10 +198,10 @@ class ProgramPane:
 
     # --- what was found
 
-    def _draw(self, view: SessionView, reached: Reached) -> None:
+    def _draw(self, view: SessionView, reached: RouteProgress) -> None:
         self._problems.clear()
         with self._problems:
-            for sentence in (*view.problems, *view.unknown_rooms)[:MOST_PROBLEMS]:
+            for sentence in (*view.problems, *view.unknown_rooms)[:_MAX_PROBLEMS]:
                 kind = "problem" if sentence in view.problems else "unsure"
                 PlainText("li", shortened(sentence), kind)
         self._board.clear()
@@ -210,13 +210,13 @@ class ProgramPane:
                 draw_strips(view.check, reached)
 
 
-def reached_in(view: SessionView) -> Reached:
+def route_progress(view: SessionView) -> RouteProgress:
     """How far the robot has come, with the names of rooms that the check uses."""
     named = view.room_map or (view.check and view.check.room_map)
     if not named:
-        return Reached()
+        return RouteProgress()
     visited = tuple(named.room(words) or words for words in view.progress.visited)
-    return Reached(visited, view.progress.looks, view.progress.answers)
+    return RouteProgress(visited, view.progress.looks, view.progress.answers)
 
 
 def _written_by(view: SessionView) -> str:
@@ -239,8 +239,8 @@ def _for_editor(program: str) -> str:
 
 
 def _skills(program: str) -> list[dict[str, Any]]:
-    calls = (found for found in CALL.finditer(program) if by_name(found[1]) is not None)
-    found = list(islice(calls, MOST_MARKS))
+    calls = (found for found in _CALL.finditer(program) if by_name(found[1]) is not None)
+    found = list(islice(calls, _MAX_MARKS))
     return [{"kind": "mark", "from": m.start(), "to": m.end(), "class": "skill"} for m in found]
 
 
@@ -248,7 +248,7 @@ def _escapes(program: str) -> list[dict[str, Any]]:
     """Characters that are invisible or change the direction of text, written out."""
     odd = ((at, one) for at, one in enumerate(program) if not (one.isprintable() or one in "\t\n"))
     marks: list[dict[str, Any]] = []
-    for at, one in islice(odd, MOST_ESCAPES):
+    for at, one in islice(odd, _MAX_ESCAPES):
         marks.append({"kind": "widget", "position": at, "text": visible(one), "class": "escape"})
         marks.append({"kind": "mark", "from": at, "to": at + 1, "class": "escaped"})
     return marks
@@ -268,7 +268,7 @@ def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
         return []
     lines = program.split("\n")
     marks: list[dict[str, Any]] = []
-    for problem in found.problems[:MOST_PROBLEMS]:
+    for problem in found.problems[:_MAX_PROBLEMS]:
         if problem.line is None or problem.line > len(lines):
             continue
         end = sum(len(line) + 1 for line in lines[: problem.line]) - 1

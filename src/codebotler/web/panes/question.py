@@ -10,7 +10,7 @@ from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.frame import Button, PlainText, warn
 
-MOST_OPTIONS, MOST_TEXT = 50, 200
+_MAX_OPTIONS, _MAX_OPTION_CHARACTERS = 50, 200
 
 
 class QuestionPane:
@@ -39,11 +39,13 @@ class QuestionPane:
                     self._draw(question)
 
     def _draw(self, question: FaceQuestion) -> None:
-        PlainText("p", f"Waiting for an answer from {shortened(question.person, MOST_TEXT)}:", "quiet")
+        PlainText(
+            "p", f"Waiting for an answer from {shortened(question.person, _MAX_OPTION_CHARACTERS)}:", "quiet"
+        )
         PlainText("p", shortened(question.text), "question")
         with ui.element("div").classes("word"):
-            for position, option in enumerate(question.options[:MOST_OPTIONS]):
-                words = shortened(option, MOST_TEXT).strip() or "(blank)"
+            for position, option in enumerate(question.options[:_MAX_OPTIONS]):
+                words = shortened(option, _MAX_OPTION_CHARACTERS).strip() or "(blank)"
                 Button(words, lambda at=position: self._answer(question, at), "plain")
 
     def _answer(self, question: FaceQuestion, position: int) -> None:

@@ -8,7 +8,7 @@ from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.view import SessionView
 from codebotler.web.frame import PlainText
 
-MOST_TEXT = 6_000
+_MAX_REPLY_CHARACTERS = 6_000
 """Characters of a reply that are shown: the last ones while it arrives, and then the first."""
 
 
@@ -56,8 +56,8 @@ class _Folded:
 
 
 def _start_of(text: str) -> str:
-    return text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]} …"
+    return text if len(text) <= _MAX_REPLY_CHARACTERS else f"{text[:_MAX_REPLY_CHARACTERS]} …"
 
 
 def _end_of(text: str) -> str:
-    return text if len(text) <= MOST_TEXT else f"… {text[-MOST_TEXT:]}"
+    return text if len(text) <= _MAX_REPLY_CHARACTERS else f"… {text[-_MAX_REPLY_CHARACTERS:]}"

@@ -10,8 +10,8 @@ from nicegui import ui
 from codebotler.core.skills.declaration import verb_for
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Room, World, laid_out
-from codebotler.missions.log import State, Summary
-from codebotler.missions.progress import ANSWER, Moment, position
+from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.progress import ANSWER, Moment, position_on_map
 from codebotler.missions.view import Phase, SessionView
 from codebotler.missions.wording import reason_text
 from codebotler.web.console import Console
@@ -19,15 +19,15 @@ from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText, script
 from codebotler.web.panes.question import QuestionPane
 
-HEADLINES: Mapping[Phase, str] = {
+_PHASE_HEADLINES: Mapping[Phase, str] = {
     "": "No mission yet",
     "writing": "The program is being written",
     "checking": "The program is being checked",
     "no-program": "There is no program yet",
-    State.CHECKED: "Ready: waiting for your approval",
-    State.APPROVED: "Starting",
+    MissionState.CHECKED: "Ready: waiting for your approval",
+    MissionState.APPROVED: "Starting",
 }
-MOST_MOMENTS = 60
+_MAX_LISTED_MOMENTS = 60
 
 
 class RobotPane:
@@ -50,7 +50,7 @@ class RobotPane:
             self._reason = PlainText("p", "", "reason")
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
-        self._told_interrupted: tuple[Summary, ...] = ()
+        self._told_interrupted: tuple[MissionSummary, ...] = ()
         self._gone.set_visibility(False)
 
     def show(self, view: SessionView) -> None:
@@ -90,9 +90,9 @@ class RobotPane:
         if moments == self._drawn:
             return
         known = len(self._drawn)
-        if moments[:known] != self._drawn or known > MOST_MOMENTS:
+        if moments[:known] != self._drawn or known > _MAX_LISTED_MOMENTS:
             self._log.clear()
-            known = max(0, len(moments) - MOST_MOMENTS)
+            known = max(0, len(moments) - _MAX_LISTED_MOMENTS)
         self._drawn = moments
         with self._log:
             for moment in moments[known:]:
@@ -104,7 +104,7 @@ class RobotPane:
                     PlainText("span", moment.text, "text")
         ui.run_javascript(f"moments.follow({self._log.id})")
 
-    def _tell_interrupted(self, summaries: tuple[Summary, ...]) -> None:
+    def _tell_interrupted(self, summaries: tuple[MissionSummary, ...]) -> None:
         if summaries == self._told_interrupted:
             return
         self._told_interrupted = summaries
@@ -117,9 +117,9 @@ class RobotPane:
 
 
 def _headline(view: SessionView) -> str:
-    if view.phase == State.CHECKED and view.problems:
+    if view.phase == MissionState.CHECKED and view.problems:
         return "The program has problems" if view.can_run else "The program cannot run"
-    return HEADLINES.get(view.phase) or view.phase.capitalize()
+    return _PHASE_HEADLINES.get(view.phase) or view.phase.capitalize()
 
 
 def map_state(view: SessionView, world: World) -> MapState:
@@ -132,7 +132,7 @@ def map_state(view: SessionView, world: World) -> MapState:
     room, finds = room_of(progress.room), defaultdict[str, list[str]](list)
     for find in progress.finds:
         finds[room_of(find.room)].append(find.name)
-    at = position(progress, world, view.room_map)
+    at = position_on_map(progress, world, view.room_map)
     if progress.is_between and not progress.is_driving:
         room = room_at(rooms, at) if at else ""
     return MapState(at, room, progress.is_driving, progress.trail, dict(finds), progress.held)
