@@ -314,6 +314,6 @@ def test_robot_that_drives_on_without_a_pose_is_stopped(robots: Robots, tmp_path
     connection = CONNECTION.replace("/amcl_pose", "/once")
     status, said = mission(robots, "    go_to('hall')\n    say('there')\n", connection)
     assert status == 1
-    assert "without telling where" in said
+    assert "stopped reporting its position" in said
     told(nav2, "goal")
     told(nav2, "cancel")

@@ -1,4 +1,4 @@
-"""The files of a mission: a log with a line for each event as it happens, and a summary."""
+"""The files of a mission: a log with one line per event, and a summary."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from codebotler.core.files import Appender, read_rows, to_line, write_whole
 EVENTS_FILE, SUMMARY_FILE = "events.jsonl", "mission.json"
 
 LogLine: TypeAlias = dict[str, Any]
-"""An event: `time` (seconds since 1970), `clock` (the robot's, in seconds), `event` (what kind), and more."""
+"""An event: `time` (seconds since 1970), `clock` (robot seconds), `event` (its kind), and its data."""
 
-_TEXT_FIELDS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")  # of a summary
+_TEXT_FIELDS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
 _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "state": frozenset({"state"}),
     "skill": frozenset({"number", "skill", "arguments"}),
@@ -34,7 +34,7 @@ _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "log": frozenset({"text"}),
     "map": frozenset({"rooms", "robot"}),
 }
-"""What belongs to each kind of event."""
+"""The keys of each kind of event."""
 
 
 class MissionState(StrEnum):
@@ -57,7 +57,7 @@ class MissionState(StrEnum):
 
     @property
     def is_moving(self) -> bool:
-        """Whether the robot works, or ends what it did."""
+        """Whether the robot works or is stopping."""
         return self in {MissionState.RUNNING, MissionState.STOPPING}
 
     @property
@@ -66,42 +66,35 @@ class MissionState(StrEnum):
         return self not in NEXT_STATES
 
 
-NEXT_STATES: dict[MissionState, frozenset[MissionState]] = {
-    MissionState.DRAFTING: frozenset(
-        {MissionState.DRAFTING, MissionState.CHECKED, MissionState.FAILED, MissionState.STOPPED}
-    ),
-    MissionState.CHECKED: frozenset(
-        {
-            MissionState.DRAFTING,
-            MissionState.CHECKED,
-            MissionState.APPROVED,
-            MissionState.FAILED,
-            MissionState.STOPPED,
-        }
-    ),
-    MissionState.APPROVED: frozenset({MissionState.RUNNING, MissionState.FAILED, MissionState.STOPPED}),
-    MissionState.RUNNING: frozenset({MissionState.DONE, MissionState.FAILED, MissionState.STOPPING}),
-    MissionState.STOPPING: frozenset({MissionState.STOPPED, MissionState.FAILED}),
+NEXT_STATES = {
+    MissionState(state): frozenset(map(MissionState, following.split()))
+    for state, following in {
+        "drafting": "drafting checked failed stopped",
+        "checked": "drafting checked approved failed stopped",
+        "approved": "running failed stopped",
+        "running": "done failed stopping",
+        "stopping": "stopped failed",
+    }.items()
 }
-"""The states that may follow each state; the others are final. A tool that dies leaves it interrupted."""
+"""The possible next states; the other states are final. A mission whose process died becomes interrupted."""
 
 
 @dataclass
 class MissionSummary:
-    """A mission in short."""
+    """The main facts of a mission."""
 
-    id: str  # by which it is found
+    id: str
     state: MissionState
-    robot: str  # its kind
+    robot: str  # the kind of robot
     created: float  # seconds since 1970
     instruction: str = ""  # empty if the program did not come from one
-    model: str = ""  # that wrote the program, if one did
+    model: str = ""  # the program's author; empty for a person
     program: str = ""
-    problems: tuple[str, ...] = ()  # found by the check, in sentences
-    reason: str = ""  # for its state, in a sentence
-    line: int | None = None  # of the program, at which it ended
+    problems: tuple[str, ...] = ()  # sentences from the check
+    reason: str = ""  # why it is in its state
+    line: int | None = None  # the program's line at which it ended
     ended: float | None = None  # seconds since 1970
-    if_tool_dies: str = ""  # what becomes of the robot then
+    if_tool_dies: str = ""  # what the robot does if CodeBotler ends unexpectedly
 
     @property
     def has_ended(self) -> bool:
@@ -110,7 +103,7 @@ class MissionSummary:
 
     @classmethod
     def read(cls, folder: Path) -> MissionSummary:
-        """The summary of a mission, or a UserError."""
+        """Read the summary of a mission; raises UserError if it is damaged."""
         path = folder / SUMMARY_FILE
         try:
             data = json.loads(path.read_bytes())
@@ -123,24 +116,24 @@ class MissionSummary:
         return summary
 
     def write(self, folder: Path) -> None:
-        """Write it whole, or leave what was there."""
+        """Replace the file in one step."""
         write_whole(folder / SUMMARY_FILE, json.dumps(asdict(self), indent=1).encode())
 
 
 def open_log(folder: Path) -> Appender:
-    """The log of a mission, locked until it is closed; BlockingIOError if another process has it open."""
+    """Open and lock the log of a mission; raises BlockingIOError if another process has it open."""
     return Appender(folder / EVENTS_FILE, exclusive=True)
 
 
 def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLine:
-    """Write an event at this moment, and return it."""
+    """Write an event with the current time, and return it."""
     line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
     log.append(to_line(line))
     return line
 
 
 def read_events(folder: Path) -> list[LogLine]:
-    """The events of a mission, without a torn last line; UserError if a line is something else."""
+    """Read the events of a mission, except a torn last line; raises UserError if a line is no event."""
     path, events = folder / EVENTS_FILE, []
     for number, line in read_rows(path, growing=True):
         if not _is_event(line):
@@ -158,11 +151,11 @@ def _is_event(line: LogLine) -> bool:
 
 
 SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
-"""The events with which a skill ends."""
+"""The kinds of events that end a skill."""
 
 
 def find_unfinished_skill(events: Iterable[LogLine]) -> LogLine | None:
-    """The skill that went on when the events broke off, if one did."""
+    """Return the event of the last skill that has not ended, if any."""
     going: LogLine | None = None
     for line in events:
         if line["event"] == "skill":

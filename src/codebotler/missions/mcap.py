@@ -1,4 +1,4 @@
-"""Missions as MCAP files, for Foxglove and other tools of roboticists."""
+"""Export missions as MCAP files, for Foxglove and other robotics tools."""
 
 from __future__ import annotations
 
@@ -17,18 +17,7 @@ from codebotler import __version__
 from codebotler.core.files import expect_replaceable, written_whole
 from codebotler.core.world import Point, World
 from codebotler.missions import foxglove
-from codebotler.missions.foxglove import (
-    INTEGER,
-    LEVEL_DEBUG,
-    LEVEL_ERROR,
-    LEVEL_INFO,
-    LEVEL_WARNING,
-    FLOAT,
-    SECOND_NS,
-    TEXT,
-    Message,
-    Schema,
-)
+from codebotler.missions.foxglove import FLOAT, INTEGER, SECOND_NS, TEXT, Message, Schema
 from codebotler.missions.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.map_event import map_from
 from codebotler.missions.pictures import read_picture
@@ -38,28 +27,21 @@ from codebotler.simulator.sampled_robot import RoomMap
 
 TimeSource: TypeAlias = Literal["wall", "robot"]
 
-_MAX_TIMESTAMP = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
-_STATE_TOPIC, _LOG_TOPIC, _POSE_TOPIC, _FRAME_TOPIC, _ROOM_TOPIC = (
-    "/mission/state",
-    "/mission/log",
-    "/robot/pose",
-    "/tf",
-    "/rooms",
-)
+MAX_TIME_NS = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
 _TEXT_KEYS = ("text", "message", "file")
-"""The keys of a skill's events that hold text."""
+"""The keys under which a skill's events hold text."""
 _LOG_LEVELS = {
-    "feedback": LEVEL_DEBUG,
-    "error": LEVEL_ERROR,
-    **dict.fromkeys(("rule", "stop", "cancelled", "late"), LEVEL_WARNING),
+    "feedback": foxglove.LEVEL_DEBUG,
+    "error": foxglove.LEVEL_ERROR,
+    **dict.fromkeys(("rule", "stop", "cancelled", "late"), foxglove.LEVEL_WARNING),
 }
-"""The levels of log lines, by kind of event; for others it is INFO."""
+"""Log levels by kind of event; others have INFO."""
 _STATE_SCHEMA: Schema = {"type": "object", "properties": {"state": TEXT, "reason": TEXT, "clock": FLOAT}}
 _JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
 class TopicMessage(NamedTuple):
-    """A message for a topic; a schema of Foxglove's goes by its name, others by their topic."""
+    """A message and its topic; `schema` is the name of a Foxglove schema, or our own schema."""
 
     topic: str
     message: Message
@@ -74,27 +56,25 @@ def write_mcap(
     folder: Path | None = None,
     clock: TimeSource = "wall",
 ) -> None:
-    """Write a mission: a topic for each skill, and topics for states, the log, the robot's pose and rooms.
+    """Write a mission: one topic per skill, and topics for states, the log, the robot's pose and the rooms.
 
-    The program is attached. Messages are timed by the clock on the wall, or by the robot's, put to start with
-    the mission. Pictures lie in its `folder`; None leaves them out.
+    The program is an attachment. Times come from the wall clock, or from the robot's clock counted from the
+    beginning of the mission. Pictures are read from `folder`; None leaves them out.
     """
-    began = round(min(summary.created * SECOND_NS, _MAX_TIMESTAMP))
+    began = round(min(summary.created * SECOND_NS, MAX_TIME_NS))
     writer = Writer(file)
     writer.start(profile="", library=f"codebotler {__version__}")
     channels: dict[str, int] = {}
-    skills, way = _SkillMessages(events), _RobotPath()
+    skills, path = _SkillMessages(events), _RobotPath()
 
     def time(line: LogLine) -> int:
         seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
-        return round(min(seconds * SECOND_NS, _MAX_TIMESTAMP))
+        return round(min(seconds * SECOND_NS, MAX_TIME_NS))
 
     def add(topic: str, message: Message, schema: Schema | str, at: int) -> None:
         if topic not in channels:
             name = "codebotler." + topic.strip("/").replace("/", ".")
-            name, data = (
-                (schema, foxglove.FOXGLOVE_SCHEMAS[schema]) if isinstance(schema, str) else (name, schema)
-            )
+            name, data = (schema, foxglove.SCHEMAS[schema]) if isinstance(schema, str) else (name, schema)
             number = writer.register_schema(name, "jsonschema", json.dumps(data).encode())
             channels[topic] = writer.register_channel(topic, "json", number)
         writer.add_message(channels[topic], at, json.dumps(message).encode(), at)
@@ -102,9 +82,9 @@ def write_mcap(
     for line in events:
         at = time(line)
         for item in (
-            *_event_messages(line, skills, at),
-            *_picture_messages(line, folder, at),
-            *way.items(line, at),
+            *_about_event(line, skills, at),
+            *_about_picture(line, folder, at),
+            *path.messages(line, at),
         ):
             add(*item, at)
     last = time(events[-1]) if events else began
@@ -114,30 +94,36 @@ def write_mcap(
     writer.finish()  # type: ignore[no-untyped-call]  # theirs
 
 
-def _event_messages(line: LogLine, skills: _SkillMessages, at: int) -> Iterator[TopicMessage]:
-    """The messages about an event: of its skill, of the state, and a line of the log."""
+def _about_event(line: LogLine, skills: _SkillMessages, at: int) -> Iterator[TopicMessage]:
+    """Yield the messages for an event: its skill, its state, and a log line."""
     event = line["event"]
     if "skill" in line:
-        yield skills.item(line)
+        yield skills.message(line)
     if event == "state":
         message = {"state": line["state"], "reason": line.get("reason", ""), "clock": line["clock"]}
-        yield TopicMessage(_STATE_TOPIC, message, _STATE_SCHEMA)
+        yield TopicMessage("/mission/state", message, _STATE_SCHEMA)
     text = event_text(line)
     if not text or (event == "sleep" and not line["seconds"]):
         return
-    level = LEVEL_ERROR if line.get("state") == MissionState.FAILED else _LOG_LEVELS.get(event, LEVEL_INFO)
+    level = (
+        foxglove.LEVEL_ERROR
+        if line.get("state") == MissionState.FAILED
+        else _LOG_LEVELS.get(event, foxglove.LEVEL_INFO)
+    )
     name = str(line.get("skill", event))
-    yield TopicMessage(_LOG_TOPIC, foxglove.log_line(level, text, name, line.get("line"), at), "foxglove.Log")
+    yield TopicMessage(
+        "/mission/log", foxglove.log_line(level, text, name, line.get("line"), at), "foxglove.Log"
+    )
 
 
-def _picture_messages(line: LogLine, folder: Path | None, at: int) -> Iterator[TopicMessage]:
+def _about_picture(line: LogLine, folder: Path | None, at: int) -> Iterator[TopicMessage]:
     if folder is not None and (picture := read_picture(folder, line)) is not None:
         image = foxglove.compressed_image(*picture, at)
         yield TopicMessage(f"/skill/{line['skill']}/picture", image, "foxglove.CompressedImage")
 
 
 class _SkillMessages:
-    """The messages of skills, with schemas of the arguments and results that these events have."""
+    """Creates skill messages, with schemas inferred from all arguments and results."""
 
     def __init__(self, events: Sequence[LogLine]) -> None:
         arguments: dict[str, dict[str, list[object]]] = {}
@@ -153,8 +139,8 @@ class _SkillMessages:
         }
         self._results = {skill: schema_of(values) for skill, values in results.items()}
 
-    def item(self, line: LogLine) -> TopicMessage:
-        """The message of a skill's event."""
+    def message(self, line: LogLine) -> TopicMessage:
+        """Return the message for a skill's event."""
         skill = line["skill"]
         arguments, result = self._arguments.get(skill, {}), self._results.get(skill)
         message = {"number": line["number"], "event": line["event"], "clock": line["clock"]}
@@ -178,20 +164,18 @@ class _SkillMessages:
 
 
 class _RobotPath:
-    """The rooms, and the robot's way through them."""
+    """Creates messages for the rooms and the robot's poses."""
 
     def __init__(self) -> None:
         self._progress = Progress()
         self._world: World | None = None
         self._at: Point | None = None
 
-    def items(self, line: LogLine, at: int) -> Iterator[TopicMessage]:
-        """The messages of an event that tells of rooms, or after which the robot is elsewhere."""
+    def messages(self, line: LogLine, at: int) -> Iterator[TopicMessage]:
+        """Yield messages if an event contains the map or changes the robot's position."""
         if line["event"] == "map":
             self._world = map_from(line)
-            yield TopicMessage(
-                _ROOM_TOPIC, foxglove.scene_update(self._world.rooms, at), "foxglove.SceneUpdate"
-            )
+            yield TopicMessage("/rooms", foxglove.scene_update(self._world.rooms, at), "foxglove.SceneUpdate")
         else:
             self._progress = self._progress.after(line)
         now, before = self._position(), self._at
@@ -199,10 +183,8 @@ class _RobotPath:
             return
         self._at = now
         heading = 0.0 if before is None else math.atan2(now[1] - before[1], now[0] - before[0])
-        yield TopicMessage(_POSE_TOPIC, foxglove.pose_in_frame(now, heading, at), "foxglove.PoseInFrame")
-        yield TopicMessage(
-            _FRAME_TOPIC, foxglove.frame_transform(now, heading, at), "foxglove.FrameTransform"
-        )
+        yield TopicMessage("/robot/pose", foxglove.pose_in_frame(now, heading, at), "foxglove.PoseInFrame")
+        yield TopicMessage("/tf", foxglove.frame_transform(now, heading, at), "foxglove.FrameTransform")
 
     def _position(self) -> Point | None:
         if self._world is None:
@@ -211,7 +193,7 @@ class _RobotPath:
 
 
 def schema_of(values: Sequence[object]) -> dict[str, Any]:
-    """The schema of arguments or results; text where their types differ, since Foxglove takes no unions."""
+    """Infer a schema from values; mixed types become text, because Foxglove has no union types."""
     lists = [value for value in values if isinstance(value, list)]
     if len(lists) == len(values):
         return {"type": "array", "items": {"type": _json_type([one for each in lists for one in each])}}
@@ -226,12 +208,12 @@ def _json_type(values: Sequence[object]) -> str:
 
 
 def _json_type_of(value: object) -> str:
-    is_endless = isinstance(value, float) and not math.isfinite(value)  # JSON has no such numbers
-    return "string" if is_endless else _JSON_TYPES.get(type(value), "string")
+    is_infinite = isinstance(value, float) and not math.isfinite(value)  # JSON has neither inf nor nan
+    return "string" if is_infinite else _JSON_TYPES.get(type(value), "string")
 
 
 def _fit_schema(value: object, schema: Mapping[str, Any]) -> object:
-    """The value, as text where the schema says so."""
+    """Convert a value to text where the schema requires it."""
     if schema["type"] == "array" and isinstance(value, list):
         return [_fit_schema(one, schema["items"]) for one in value]
     return value if schema["type"] != "string" or isinstance(value, str) else str(value)
@@ -252,15 +234,15 @@ def export_mcap(
     clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""
+    """Write an MCAP file in one step; raises UserError rather than overwrite a file of another kind."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
-    path.parent.stat()  # no folder is created where a name is mistyped
+    path.parent.stat()  # do not create folders for a mistyped name
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)
     if path.exists() and not path.is_file():
         path.write_bytes(whole.getvalue())
         return
-    temporary = path.with_name(f".{uuid4().hex}.mcap")  # no file of the user's, and no name that is too long
+    temporary = path.with_name(f".{uuid4().hex}.mcap")
     with written_whole(path, temporary) as file:
         file.write(whole.getvalue())

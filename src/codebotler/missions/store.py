@@ -1,4 +1,4 @@
-"""Past missions on the disk: listed, found, and closed if the tool died."""
+"""Past missions on disk: list and find them, and close interrupted ones."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
 
 def read_missions(home: Path) -> list[MissionSummary]:
-    """All missions, oldest first; raises UserError if one cannot be read."""
+    """Read the summaries of all missions, oldest first; raises UserError if one is damaged."""
     return sorted(
         map(MissionSummary.read, _mission_folders(home)), key=lambda summary: (summary.created, summary.id)
     )
 
 
 def find_mission(home: Path, name: str) -> Path:
-    """The folder of a mission, by its name or `last`; raises UserError if there is none."""
+    """Return the folder of a mission, given its name or `last`; raises UserError if there is none."""
     if name == "last" and (known := read_missions(home)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
@@ -43,14 +43,14 @@ def find_mission(home: Path, name: str) -> Path:
 
 
 def recover_missions(home: Path) -> list[MissionSummary]:
-    """Close and note the missions that were interrupted because the tool died; unreadable ones are left."""
+    """Close the missions whose process died, and report them; damaged ones are skipped."""
     found: list[MissionSummary] = []
     for folder in _mission_folders(home):
         try:
             found += _close_interrupted(folder)
         except UserError:
             continue
-        except OSError as error:  # such as a full disk, which stops no robot
+        except OSError as error:  # such as a full disk; it must not keep CodeBotler from starting
             why = system_sentence(error)
             note(f"mission {folder.name} may have been interrupted, but cannot be closed: {why}")
     for summary in found:
@@ -59,7 +59,6 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def _mission_folders(home: Path) -> list[Path]:
-    """The folders of missions."""
     folder = home / "missions"
     try:
         found = sorted(folder.iterdir())
@@ -73,13 +72,12 @@ def _mission_folders(home: Path) -> list[Path]:
 
 
 def _close_interrupted(folder: Path) -> list[MissionSummary]:
-    """The mission, if it was interrupted and not closed."""
     if MissionSummary.read(folder).has_ended:
         return []
     try:
         log = open_log(folder)
     except BlockingIOError:
-        return []  # another tool is on it
+        return []  # another process runs it
     with closing(log):
         summary, events = MissionSummary.read(folder), read_events(folder)
         if summary.has_ended:
@@ -104,6 +102,5 @@ def _interruption_reason(summary: MissionSummary, events: list[LogLine]) -> str:
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"
     going = written_call(skill["skill"], list(skill["arguments"].values()))
-    where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
-    where = f" ({where})" if where else ""
+    where = next((f" ({e['text']})" for e in reversed(events) if e["event"] == "feedback"), "")
     return f"CodeBotler ended unexpectedly during {going}{where}; {summary.if_tool_dies}"

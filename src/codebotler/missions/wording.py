@@ -1,4 +1,4 @@
-"""What happens in a mission, event by event, in English."""
+"""The events of a mission, in English."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from codebotler.core.trace import attempted, options_of, trace_from
 from codebotler.core.words import brief
 from codebotler.missions.log import LogLine, MissionSummary
 
-BY_PAGE = "the page"  # as whoever presses STOP there is logged
-_TITLE_CALLS = 2  # of a program, in the title of its mission
-_MAX_ACTIVITY_CHARACTERS = 100  # characters of each text
+BY_PAGE = "the page"  # the source of a stop, in the log
+_TITLE_CALLS = 2
+_MAX_ACTIVITY_CHARACTERS = 100
 
 
 def event_text(line: LogLine) -> str:
-    """An event as people read it, such as `drives to "kitchen"`; empty if there is nothing to read."""
+    """Return an event in words, such as `drives to "kitchen"`; empty if there are none."""
     words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
 
 def activity(line: LogLine) -> str:
-    """What a robot does during a skill or a pause of the program, such as `going to "supply room"`."""
+    """Return a skill or pause in words, such as `going to "supply room"`."""
     if line["event"] == "sleep":
         return f"waiting for {line['seconds']:g} s"
     return skill_text(line, "ing", _MAX_ACTIVITY_CHARACTERS) or f"executing {visible(line['skill'])}"
 
 
 def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
-    """The call of a skill in words; empty for a skill that has none in this process."""
+    """Return the call of a skill in words; empty for a skill without a verb."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
         return ""
@@ -47,25 +47,25 @@ def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
 
 
 def stop_text(by: str, doing: str = "") -> str:
-    """A stop in words, and what it interrupted, such as `driving to supply room`, if anything."""
+    """Return a stop in words, with the activity that it interrupted, if any."""
     during = f" while {doing}" if doing else ""
     return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}{during}"
 
 
 def state_text(state: str, reason: str) -> str:
-    """A state and why it was reached, such as `stopped by rule vault` or `failed: the door is shut`."""
+    """Return a state and its reason, such as `stopped by rule vault` or `failed: the door is shut`."""
     if not reason or reason.startswith(state):
         return shortened(reason) or state
     return f"{state}: {shortened(reason)}"
 
 
 def reason_text(reason: str, line: int | None) -> str:
-    """Why a mission ended, with the line of the program if one is to blame."""
+    """Return the reason with the program's line, if known."""
     return reason if line is None else f"line {line}: {reason}"
 
 
 def title(summary: MissionSummary) -> str:
-    """The instruction of a mission, or else the first skills that its program calls."""
+    """Return the instruction of a mission, or the first skills that its program calls."""
     if summary.instruction:
         return summary.instruction
     calls = [
@@ -98,10 +98,9 @@ def _result(line: LogLine) -> str:
 
 
 def _rule(line: LogLine) -> str:
-    """A rule that was enforced, broken, or not kept at the end."""
     rule, says = f'the rule "{visible(str(line["rule"]))}"', shortened(str(line["says"]))
     if "what" not in line:
-        return f"not kept: {rule}: {says}"
+        return f"{rule} was broken at the end: {says}"
     what = visible(phrase(trace_from([line["what"]])[0], "ing"))
     if line.get("why"):
         return f"{rule} cannot judge {what}, {visible(str(line['why']))}: {says}"
@@ -123,4 +122,4 @@ _EVENT_WORDERS: Mapping[str, Callable[[LogLine], str]] = {
     "log": lambda line: shortened(line["text"]),
     "map": lambda _: "",
 }
-"""The text of each kind of event."""
+"""Functions that word each kind of event."""
