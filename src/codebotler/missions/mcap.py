@@ -18,7 +18,7 @@ from codebotler.core.files import expect_replaceable, written_whole
 from codebotler.core.world import Point, World
 from codebotler.missions import foxglove
 from codebotler.missions.foxglove import FLOAT, INTEGER, SECOND_NS, TEXT, Message, Schema
-from codebotler.missions.log import LogLine, MissionState, MissionSummary
+from codebotler.missions.log import LogLine, MissionSummary
 from codebotler.missions.map_event import map_from
 from codebotler.missions.pictures import read_picture
 from codebotler.missions.progress import Progress, position_on_map
@@ -105,15 +105,9 @@ def _about_event(line: LogLine, skills: _SkillMessages, at: int) -> Iterator[Top
     text = event_text(line)
     if not text or (event == "sleep" and not line["seconds"]):
         return
-    level = (
-        foxglove.LEVEL_ERROR
-        if line.get("state") == MissionState.FAILED
-        else _LOG_LEVELS.get(event, foxglove.LEVEL_INFO)
-    )
-    name = str(line.get("skill", event))
-    yield TopicMessage(
-        "/mission/log", foxglove.log_line(level, text, name, line.get("line"), at), "foxglove.Log"
-    )
+    level = _LOG_LEVELS.get("error" if line.get("state") == "failed" else event, foxglove.LEVEL_INFO)
+    message = foxglove.log_line(level, text, str(line.get("skill", event)), line.get("line"), at)
+    yield TopicMessage("/mission/log", message, "foxglove.Log")
 
 
 def _about_picture(line: LogLine, folder: Path | None, at: int) -> Iterator[TopicMessage]:

@@ -1,4 +1,4 @@
-"""The HTTP API: everything the page does with missions, checks and the robot."""
+"""The HTTP API for missions, checks and the robot."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from codebotler.missions.wording import BY_PAGE
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, MAX_WAIT_SECONDS, Console
 
 _CURRENT = "current"
-"""The current mission, in an address."""
+"""Names the current mission in a path."""
 
 _LimitedText = Annotated[str, Field(max_length=MAX_PROGRAM_CHARACTERS)]
 
@@ -44,7 +44,7 @@ class NewMission(_Form):
 
 
 class NewProgram(_Form):
-    """A program to check, alone or in the place of the current one."""
+    """A program to check, or to replace the current one."""
 
     program: _LimitedText
 
@@ -52,9 +52,7 @@ class NewProgram(_Form):
 class Approval(_Form):
     """A person's approval of a program."""
 
-    program: str = Field(
-        description="The digest of the program that the person saw.", examples=["3f5a8b0c9d21e467"]
-    )
+    program: str = Field(description="The digest of the reviewed program.", examples=["3f5a8b0c9d21e467"])
     despite_problems: bool = False
 
 
@@ -72,7 +70,7 @@ class AskAgainForm(_Form):
 
 
 class AsciiJSONResponse(JSONResponse):
-    """JSON in ASCII, which can hold the lone surrogates of a program."""
+    """ASCII-only JSON, because programs may contain lone surrogates."""
 
     def render(self, content: object) -> bytes:
         """The response's body."""
@@ -80,18 +78,17 @@ class AsciiJSONResponse(JSONResponse):
 
 
 def invalid_request(_request: Request, error: Exception) -> AsciiJSONResponse:
-    """Say what is wrong with a request, without sending it back."""
-    assert isinstance(error, RequestValidationError), "registered for this error alone"
-    told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
-    return AsciiJSONResponse({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
+    """Explain what is wrong with a request, without echoing it."""
+    assert isinstance(error, RequestValidationError), "registered only for this error"
+    detail = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
+    return AsciiJSONResponse({"detail": detail}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(console: Console) -> APIRouter:
-    """The addresses of the API."""
+    """Create the routes of the API."""
     api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AsciiJSONResponse)
     _add_missions(api, console)
     _add_changes(api, console)
-    _add_events(api, console)
     _add_rest(api, console)
     return api
 
@@ -105,7 +102,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission; writing and checking go on in the background. Refused while a mission runs."""
+        """Begin a mission, which is written and checked in the background. Refused while a mission runs."""
         with as_http_errors():
             session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
@@ -115,7 +112,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """A mission: the current one with its check, or the summary of a past one."""
+        """The current mission with its check, or the summary of a past one."""
         view = console.view
         if mission in {_CURRENT, view.id}:
             return view_data(view)
@@ -123,7 +120,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}/events.jsonl")
     def jsonl(mission: str) -> Response:
-        """The events as JSON lines."""
+        """Download the events as JSON lines."""
         summary, _ = _read_mission(console, mission)
         data = (console.home / "missions" / summary.id / EVENTS_FILE).read_bytes()
         return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
@@ -136,7 +133,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
             Query(description="`robot` for simulated time, else `wall`."),
         ] = "wall",
     ) -> Response:
-        """The events as MCAP, which Foxglove opens."""
+        """Download the events as MCAP, for Foxglove."""
         with as_http_errors(), installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
 
@@ -157,7 +154,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
-        """Have the model write another program, which is then checked."""
+        """Have the model write and check another program."""
         session = _current_session(console, mission)
         with as_http_errors():
             session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
@@ -165,7 +162,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
-        """Run the program that the person saw, and no other."""
+        """Run exactly the program that the person reviewed."""
         session = _current_session(console, mission)
         with as_http_errors():
             session.approve(approval.program, despite_problems=approval.despite_problems)
@@ -173,7 +170,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
-        """Stop the current mission; `state` says when it has stopped."""
+        """Stop the current mission; `state` tells when it has stopped."""
         _current_session(console, mission)
         console.stop(BY_PAGE)
         return view_data(console.view)
@@ -182,14 +179,12 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     async def stop(
         *, only_moving: Annotated[bool, Query(description="Stop only a robot that runs a program.")] = False
     ) -> dict[str, Any]:
-        """Stop the current mission, or only one whose robot moves; says whether there is any."""
+        """Stop the current mission, or only a running one; return whether there is one."""
         return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}
 
-
-def _add_events(api: APIRouter, console: Console) -> None:
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
-        """The events as they happen (server-sent), from the first one on or after `Last-Event-ID`."""
+        """Stream the events (server-sent), from the beginning or after `Last-Event-ID`."""
         return StreamingResponse(
             _stream(console, _current_session(console, mission), last_event_id),
             media_type="text/event-stream",
@@ -200,7 +195,7 @@ def _add_events(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program by the house rules, in the rooms of the current mission if there is one."""
+        """Check a program against the house rules, in the rooms of the current mission, if any."""
         with as_http_errors():
             return console.check(new.program, console.view.room_map, console.rules).data()
 
@@ -214,7 +209,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
             bool, Query(description="Wait for the beginning of a mission, at most 15 s.")
         ] = False,
     ) -> dict[str, Any]:
-        """The robot, its skills and its mission."""
+        """The robot, its skills and the current mission."""
         if once_begun:
             await console.view_once(over=False)
         view = await console.view_once(over=True) if once_over else console.view
@@ -234,7 +229,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
 
 
 async def _stream(console: Console, session: MissionSession, known: int) -> AsyncIterator[str]:
-    """Server-sent events; a slow reader skips nothing and delays nobody."""
+    """Yield server-sent events; a slow reader misses nothing and delays nobody."""
 
     def has_more() -> bool:
         return bool(session.events(known)) or session.view.is_over
@@ -250,7 +245,7 @@ async def _stream(console: Console, session: MissionSession, known: int) -> Asyn
 
 
 def view_data(view: SessionView) -> dict[str, Any]:
-    """A view as plain data."""
+    """Return a view as plain data."""
     return {
         "id": view.id,
         "state": view.state,
@@ -291,14 +286,12 @@ def _current_session(console: Console, mission: str) -> MissionSession:
 def _read_mission(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine]]:
     name = console.view.id if mission == _CURRENT else mission
     if not name:
-        none = "there is no mission yet; POST /api/missions starts one"
-        raise HTTPException(404, none if console.session is None else "the current mission has not started")
+        raise HTTPException(404, "there is no current mission; POST /api/missions starts one")
     try:
         folder = find_mission(console.home, name)
     except UserError:
-        raise HTTPException(
-            404, f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
-        ) from None
+        sentence = f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
+        raise HTTPException(404, sentence) from None
     try:
         return MissionSummary.read(folder), read_events(folder)
     except UserError as error:
@@ -307,7 +300,7 @@ def _read_mission(console: Console, mission: str) -> tuple[MissionSummary, list[
 
 @contextmanager
 def as_http_errors() -> Iterator[None]:
-    """Answer what a mission refuses with 409, and what is wrong with 422."""
+    """Convert MissionError to status 409 and UserError to 422."""
     try:
         yield
     except MissionError as error:
@@ -317,5 +310,5 @@ def as_http_errors() -> Iterator[None]:
 
 
 def _file(data: bytes, name: str, kind: str) -> Response:
-    shown = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
-    return Response(data, media_type=kind, headers=shown)
+    headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+    return Response(data, media_type=kind, headers=headers)

@@ -1,4 +1,4 @@
-"""The robot's face: its page and its part of the API. It cannot run or read programs."""
+"""The page and the API of the robot's face, which can neither run nor read programs."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _FACE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
-"""Stricter than that of other pages, since there is no NiceGUI: no script can turn a text into markup."""
+"""Stricter than for NiceGUI's pages: no script can turn text into markup."""
 
 BY_FACE = "a person at the face"
 _BACK_LINK = '<a id="back" href="./">Operate the robot</a>'
-_BACK_PLACEHOLDER = "<!-- back -->"  # for those who may operate
+_BACK_PLACEHOLDER = "<!-- back -->"  # replaced for operators
 MAX_FACE_TEXT, MAX_FACE_OPTION, MAX_FACE_OPTIONS = 2_000, 300, 50
-"""Characters and options that people can read on a screen."""
+"""Limits for texts and options, in characters and number."""
 
 
 class FaceAnswer(BaseModel):
@@ -43,10 +43,10 @@ class FaceAnswer(BaseModel):
 
 
 def router(console: Console, face: Face) -> APIRouter:
-    """The addresses of the face."""
-    here = APIRouter(tags=["face"])
+    """Create the routes of the face."""
+    routes = APIRouter(tags=["face"])
 
-    @here.get("/face", include_in_schema=False)
+    @routes.get("/face", include_in_schema=False)
     def page(request: Request) -> HTMLResponse:
         headers = {"content-security-policy": _FACE_POLICY, "cache-control": "no-store"}
         may_operate = getattr(request.state, "role", None) is Role.OPERATOR
@@ -55,51 +55,48 @@ def router(console: Console, face: Face) -> APIRouter:
         )
         return HTMLResponse(shown, headers=headers)
 
-    @here.get("/api/face")
+    @routes.get("/api/face")
     async def show(*, once_over: bool = False, once_begun: bool = False) -> dict[str, Any]:
-        """What the face shows: what the robot does, says and asks; with `once_over` after the mission.
-
-        `question` has the number to answer.
-        """
+        """What the robot does, says and asks; with `once_over`, after the end of the mission."""
         if once_begun:
             await console.view_once(over=False)
         if once_over:
             await console.view_once(over=True)
         return face_data(console, face)
 
-    @here.post("/api/face/answer")
+    @routes.post("/api/face/answer")
     def answer(given: FaceAnswer) -> dict[str, Any]:
-        """Answer the question; the first answer counts, and one that comes too late is refused."""
+        """Answer the question; the first answer counts, and late ones are refused."""
         try:
             face.answer(given.question, given.option)
         except AnswerError as error:
             raise HTTPException(409, error.sentence) from None
         return face_data(console, face)
 
-    @here.post("/api/face/stop", status_code=202)
+    @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
-        """Stop a robot that runs, and nothing else; says whether there is one."""
+        """Stop a running mission; return whether there is one."""
         return {"stopping": console.stop(BY_FACE, only_moving=True)}
 
-    @here.websocket("/api/face/live")
+    @routes.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
-        """Send what the face shows, again at each change; messages from there are ignored."""
+        """Send the face's data now and at each change; incoming messages are ignored."""
         await socket.accept()
         with face.count_screen():
             sending = asyncio.create_task(_send_changes(socket, console, face))
             try:
-                with suppress(WebSocketDisconnect, KeyError):  # a message that is no text
+                with suppress(WebSocketDisconnect, KeyError):  # not a text message
                     while True:
                         await socket.receive_text()
             finally:
                 sending.cancel()
 
-    return here
+    return routes
 
 
 async def _send_changes(socket: WebSocket, console: Console, face: Face) -> None:
     sent: object = None
-    with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
+    with suppress(WebSocketDisconnect, RuntimeError):  # the face was closed
         async for _ in console.notifier.changes():
             data = face_data(console, face)
             shown = {**data, "seconds_left": None}
@@ -109,7 +106,7 @@ async def _send_changes(socket: WebSocket, console: Console, face: Face) -> None
 
 
 def face_data(console: Console, face: Face) -> dict[str, Any]:
-    """What a face shows, as plain data."""
+    """Return what a face shows, as plain data."""
     view, shown = console.view, face.shown
     question = shown.question
     is_moving = view.is_running and view.progress.is_driving
@@ -134,7 +131,7 @@ def _seconds_left(question: FaceQuestion) -> float | None:
 
 
 def question_data(question: FaceQuestion) -> dict[str, Any]:
-    """A question as plain data."""
+    """Return a question as plain data."""
     return {
         "number": question.number,
         "person": screen_text(question.person, MAX_FACE_OPTION),
@@ -145,7 +142,7 @@ def question_data(question: FaceQuestion) -> dict[str, Any]:
 
 
 def screen_text(text: str, most: int = MAX_FACE_TEXT) -> str:
-    """A text with its lines, cut after so many characters, and with hidden characters written out."""
+    """Shorten a text, keep its line breaks, and escape hidden characters."""
     return shortened(text, most, visible_lines)
 
 

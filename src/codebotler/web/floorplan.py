@@ -1,4 +1,4 @@
-"""A map of the rooms, with the robot, its way so far, and what it has met (SVG)."""
+"""The map of the rooms as SVG, with the robot, its trail and its finds."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from codebotler.core.world import Point, Room, World, is_within, laid_out
 _MARGIN = 0.6
 MAX_DRAWN_ROOMS = 100
 _LETTER_WIDTH = 0.62
-"""The width of a letter, in heights of a letter."""
+"""The width of a letter, relative to its height."""
 
 _MIN_LETTER, _MAX_LETTER, _FIND_LETTER = 0.2, 0.62, 0.44
-_HALO_RADIUS = 0.62  # the radius around the robot, in metres
+_HALO_RADIUS = 0.62  # metres
 _MAX_LABEL_CHARACTERS, _MAX_FINDS = 60, 3
 
 
 @dataclass(frozen=True)
 class MapState:
-    """What a map shows besides the rooms.
+    """The contents of a map.
 
     Args:
         at: the robot's position in metres, if known.
-        room: where it is, or where it drives to; empty if that is not known, or it is in none.
-        is_driving: whether it drives there.
-        trail: the positions on its way so far.
-        finds: by room, what was seen and who was asked there.
-        held: what it holds.
+        room: its room or destination; empty if unknown or between rooms.
+        is_driving: whether `room` is its destination.
+        trail: its previous positions.
+        finds: things and people that it found, by room.
+        held: the object that it holds.
     """
 
     at: Point | None = None
@@ -41,7 +41,7 @@ class MapState:
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """The contents in words."""
         where = "is between rooms" if self.at else ""
         if self.room:
             where = f"{'is driving to' if self.is_driving else 'is in'} {self.room}"
@@ -52,7 +52,7 @@ class MapState:
 
 
 def floorplan(world: World, state: MapState) -> str:
-    """Draw a world as seen from above; nothing covers the name of a room."""
+    """Draw a world from above, with room names on top."""
     rooms = laid_out(world).rooms[:MAX_DRAWN_ROOMS]
     points = [corner for one in rooms for corner in one.footprint or ()]
     points += [*state.trail, *([state.at] if state.at else [])]
@@ -86,7 +86,7 @@ def floorplan(world: World, state: MapState) -> str:
 
 
 def room_at(rooms: Iterable[Room], at: Point) -> str:
-    """The name of the room whose footprint a point is in; empty if there is none."""
+    """Return the name of the room that contains a point; empty if there is none."""
     return next((one.name for one in rooms if one.footprint and is_within(at, one.footprint)), "")
 
 
@@ -96,40 +96,38 @@ def _svg_points(points: Iterable[Point]) -> str:
 
 def _robot(x: float, y: float) -> str:
     at = f'cx="{x:.2f}" cy="{y:.2f}"'
-    return f'<g class="robot"><circle class="halo" {at} r="{_HALO_RADIUS}"/><circle class="body" {at} r=".34"/></g>'
+    halo = f'<circle class="halo" {at} r="{_HALO_RADIUS}"/>'
+    return f'<g class="robot">{halo}<circle class="body" {at} r=".34"/></g>'
 
 
 def _labels(
     room: Room, corners: Sequence[Point], on_map: Callable[[Point], Point], finds: Sequence[str]
 ) -> Iterator[str]:
-    """The name of a room at the side that is farther from where the robot stands.
-
-    Finds are beside the name if there is space before the robot, or else at the other side.
-    """
+    """Yield a room's name, at the wall farther from the robot, and its finds, next to it if there is space."""
     top, bottom = min(y for _, y in corners), max(y for _, y in corners)
     left, right = min(x for x, _ in corners), max(x for x, _ in corners)
-    middle, stands = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
+    middle, stop = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
     lines = _wrap(shortened(room.name, _MAX_LABEL_CHARACTERS))
     size = _size(lines, right - left, _MAX_LETTER)
-    is_above = stands >= (top + bottom) / 2
+    is_above = stop >= (top + bottom) / 2
     start = top + 1.2 * size if is_above else bottom - size * (1.15 * (len(lines) - 1) + 0.5)
     for number, line in enumerate(lines):
         yield _text(middle, start + 1.15 * size * number, size, line, "name")
-    met = [shortened(one, _MAX_LABEL_CHARACTERS) for one in finds[-_MAX_FINDS:]]
-    small = _size(met or [""], right - left, _FIND_LETTER)
-    named, found = size * (1.15 * len(lines) + 0.35), small * 1.15 * len(met)
-    is_beside = max(stands - top, bottom - stands) - _HALO_RADIUS >= named + found
+    labels = [shortened(one, _MAX_LABEL_CHARACTERS) for one in finds[-_MAX_FINDS:]]
+    small = _size(labels or [""], right - left, _FIND_LETTER)
+    named, found = size * (1.15 * len(lines) + 0.35), small * 1.15 * len(labels)
+    fits = max(stop - top, bottom - stop) - _HALO_RADIUS >= named + found
     if is_above:
-        first = top + named + 0.85 * small if is_beside else bottom - found + 0.65 * small
+        first = top + named + 0.85 * small if fits else bottom - found + 0.65 * small
     else:
-        first = bottom - named - found + 0.85 * small if is_beside else top + 1.2 * small
-    for number, one in enumerate(met):
+        first = bottom - named - found + 0.85 * small if fits else top + 1.2 * small
+    for number, one in enumerate(labels):
         yield _text(middle, first + 1.15 * small * number, small, one, "find")
 
 
 def _size(lines: Sequence[str], width: float, largest: float) -> float:
-    fits = width * 0.92 / (_LETTER_WIDTH * max(1, *map(len, lines)))
-    return max(_MIN_LETTER, min(largest, fits))
+    size = width * 0.92 / (_LETTER_WIDTH * max(1, *map(len, lines)))
+    return max(_MIN_LETTER, min(largest, size))
 
 
 def _text(x: float, y: float, size: float, text: str, kind: str) -> str:
@@ -137,7 +135,7 @@ def _text(x: float, y: float, size: float, text: str, kind: str) -> str:
 
 
 def _wrap(name: str) -> list[str]:
-    """A name in one line, or in two of about the same length."""
+    """Split a long name into two lines of similar length."""
     words = name.split()
     if len(words) < 2 or len(name) < 9:  # noqa: PLR2004 - two words, and longer than fits
         return [name]

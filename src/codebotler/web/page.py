@@ -1,4 +1,4 @@
-"""The operator's page: its three panes, updated at each change."""
+"""The operator's page with its three panes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def add(console: Console, frame: Frame) -> None:
 
 
 def _next_step(view: SessionView) -> str:
-    """What an operator does next, by which a small screen orders its panes."""
+    """The operator's next step, which determines the order of panes on small screens."""
     if view.is_running:
         return "watch"
     if not view.is_over:

@@ -1,4 +1,4 @@
-"""Serves the page and its API on a port, behind the guard, and prints the link that opens it."""
+"""Serves the page and its API behind the guard, and prints the link that opens it."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ from codebotler.web.guard import MAX_BODY_BYTES, NO_PAGE, Guard, refusal
 from codebotler.web.proxy import path_of
 
 STATIC_FOLDER = Path(__file__).with_name("static")
-BY_LEAVING = "CodeBotler, since the last operator closed the page"
+BY_LEAVING = "CodeBotler, because the last operator closed the page"
 RUNS_FOLDER = Path("runs")
 _HTTP_METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 _PAGE_SOCKETS = "/_nicegui_ws/"
-"""Where the page of an operator holds a websocket open for as long as it is shown."""
+"""An operator's page keeps a websocket open below this path."""
 
 _STREAM_END_SECONDS = 3
-"""Seconds that streams have to end when the server stops."""
+"""The time for streams to end when the server stops."""
 
 
 def serve(
@@ -55,11 +55,11 @@ def serve(
     *,
     alone_for: float | None = None,
 ) -> None:
-    """Serve the page, or without a console only further pages, until Ctrl-C, which stops a running robot.
+    """Serve the page, or without a console only other pages, until Ctrl-C, which also stops a running robot.
 
-    `alone_for` seconds after the last operator left, a running robot is stopped, too; None means never.
+    A running robot is also stopped `alone_for` seconds after the last operator left; None means never.
     """
-    with place.listening() as bound, console or nullcontext():
+    with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]
         pages = application(console, further, runs)
         _check_prefixes(pages, place)
@@ -69,7 +69,7 @@ def serve(
         guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
-            log_config=None,  # its log is noted like all else
+            log_config=None,  # its log goes to our own
             log_level=logging.WARNING,
             access_log=False,
             proxy_headers=False,
@@ -96,25 +96,25 @@ def _links(place: PageAddress, port: int, access: Access, console: Console | Non
         lines.append("Other machines can open this link, too. The connection is not encrypted.\n")
     if console and console.face is not None:
         where = "here (--host lets other machines in)" if place.is_private else "on the robot's tablet"
-        lines.append(f"The robot's face cannot run anything. Open it {where}:\n")
+        lines.append(f"Open the robot's face, which cannot run programs, {where}:\n")
         lines += links("face", access.face)
     return "\n".join(lines)
 
 
 def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
-    """Refuse prefixes that begin like an address of ours, since proxies may or may not remove them."""
+    """Refuse prefixes that look like our own paths, because proxies may or may not remove them."""
     routes = (*app.routes, *nicegui.app.routes)
     own = {path.split("/")[1] for route in routes if (path := getattr(route, "path", ""))}
     for proxy in place.proxies:
         first = proxy.prefix.split("/")[1] if proxy.prefix else ""
         if first and first in own:
             raise UserError(
-                f"--behind-proxy {proxy.page}: the page itself uses /{first}; choose another path"
+                f"--behind-proxy {proxy.page}: /{first} is a path of the page; choose another one"
             )
 
 
 def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS_FOLDER) -> FastAPI:
-    """The page and its API, without the guard."""
+    """Create the application, without the guard."""
     links = tuple((pages.name, pages.address) for pages in further)
     to_face = (FACE_LINK,) if console and console.face else ()
     frame = (
@@ -125,7 +125,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
     app = FastAPI(
         title="CodeBotler",
         version=__version__,
-        description="What the page does, for programs.",
+        description="Controls missions, checks programs and describes the robot.",
         docs_url=None,
         redoc_url=None,
         openapi_url="/api/openapi.json",
@@ -139,7 +139,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
         pages.add(Site(app, frame, runs))
     app.add_exception_handler(RequestValidationError, api.invalid_request)
     app.mount("/static", StaticFiles(directory=STATIC_FOLDER))
-    core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard allows ours alone
+    core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard only ours
     nicegui.app.config.socket_io_js_transports = ["websocket"]
     nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app, frame.brand))
     ui.run_with(
@@ -150,14 +150,14 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
         language="en-US",
         tailwind=False,
         reconnect_timeout=20.0,
-        gzip_middleware_factory=None,  # the guard reads pages to mark their scripts
+        gzip_middleware_factory=None,  # the guard adds nonces to uncompressed pages
         show_welcome_message=False,
     )
     return app
 
 
 def _not_found(app: FastAPI, brand: str, request: Request, _error: Exception) -> Response:
-    """404, or 405 where NiceGUI took an address that the API has for another method."""
+    """Return 404, or 405 if the API has this path for another method."""
     status, sentence, headers = HTTPStatus.NOT_FOUND, NO_PAGE, {}
     allowed = [method for method in _HTTP_METHODS if _is_taken(app.routes, method, path_of(request.scope))]
     if allowed:
@@ -176,9 +176,9 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
 
 
 class Presence:
-    """ASGI middleware behind the guard that calls `alone` when no operator's page was open for some seconds.
+    """ASGI middleware that calls `alone` after some seconds without an open operator's page.
 
-    It must return at once. A page that is reloaded is away for a moment.
+    The call must return at once. The delay covers reloads.
     """
 
     def __init__(self, app: ASGIApp, seconds: float, alone: Callable[[], object]) -> None:
@@ -187,7 +187,7 @@ class Presence:
         self._leaving: asyncio.TimerHandle | None = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, and count the pages that are open."""
+        """Pass a request on, and count open pages."""
         is_operator = scope.get("state", {}).get("role") is Role.OPERATOR
         if not is_operator or scope["type"] != "websocket" or not path_of(scope).startswith(_PAGE_SOCKETS):
             await self._app(scope, receive, send)
@@ -204,7 +204,7 @@ class Presence:
 
 
 class _Server(uvicorn.Server):
-    """Stops the robot at a signal, before anything else ends."""
+    """Stops the robot first at a signal."""
 
     def __init__(self, config: uvicorn.Config, console: Console | None) -> None:
         super().__init__(config)

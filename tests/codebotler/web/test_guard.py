@@ -167,7 +167,7 @@ def test_tries_are_counted_by_address_and_for_a_while() -> None:
 
 
 def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
-    access = Access.asked_for(None, "the tablet's own", open_to_all=False, is_private=True)
+    access = Access.from_options(None, "the tablet's own", open_to_all=False, is_private=True)
     for _ in range(MAX_WRONG_TOKENS):
         access.of_token("wrong", "here")
     assert access.of_token(access.operator or "", "here") is Role.OPERATOR
@@ -493,14 +493,14 @@ def test_names_by_which_the_page_may_be_called() -> None:
 def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with PageAddress(port=0).listening() as first, PageAddress(port=0).listening() as other:
+    with PageAddress(port=0).listen() as first, PageAddress(port=0).listening() as other:
         taken, free = first.getsockname()[1], other.getsockname()[1]
         other.close()
         monkeypatch.setattr("codebotler.web.access.DEFAULT_PORTS", (taken, free))
-        with PageAddress().listening() as found:
+        with PageAddress().listen() as found:
             assert found.getsockname()[1] == free
         with pytest.raises(UserError, match=f"port {taken} is already in use"):
-            PageAddress(port=taken).listening()
+            PageAddress(port=taken).listen()
 
 
 # --- behind a proxy
