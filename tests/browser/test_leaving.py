@@ -53,7 +53,7 @@ def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, 
     until_over(server)
     assert (
         read_missions(server.home)[-1].reason
-        == "stopped by CodeBotler, since the last operator closed the page"
+        == "stopped by CodeBotler, because the last operator closed the page"
     )
 
 

@@ -332,7 +332,7 @@ def _plain_argument(argument: Argument) -> base.RobotArgument:
 
 
 def _chosen_option(result: base.RobotResult, event: Event) -> int:
-    """Return the position of the chosen option, ignoring case and blanks; raises RobotError if there is none."""
+    """Return the position of the chosen option, ignoring case; raises RobotError if none matches."""
     heard = str(result)
     for same in (str, lambda text: text.strip().casefold()):
         for number, option in enumerate(event.options):

@@ -137,7 +137,7 @@ class Mission:
             self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
-        """Approve the program; raises MissionError if it is unchecked or has problems, which `despite_problems` allows."""
+        """Approve the program; raises MissionError if it is unchecked, or has unaccepted problems."""
         with self._writing:
             if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(

@@ -28,7 +28,7 @@ _LISTEN_BACKLOG = 128  # connections
 
 
 class Role(StrEnum):
-    """The role of a visitor: operators may do everything, the robot's face may only talk to people and stop."""
+    """The role of a visitor: operators may do everything, the robot's face may only talk and stop."""
 
     OPERATOR = "operator"
     FACE = "face"

@@ -103,7 +103,7 @@ def _robot(x: float, y: float) -> str:
 def _labels(
     room: Room, corners: Sequence[Point], on_map: Callable[[Point], Point], finds: Sequence[str]
 ) -> Iterator[str]:
-    """Yield a room's name, at the wall farther from the robot, and its finds, next to it if there is space."""
+    """Yield a room's name at the wall farther from the robot, and its finds near it if there is space."""
     top, bottom = min(y for _, y in corners), max(y for _, y in corners)
     left, right = min(x for x, _ in corners), max(x for x, _ in corners)
     middle, stop = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom

@@ -25,15 +25,15 @@ MAX_BODY_BYTES = 2_000_000
 
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _FACE_PATHS = ("/face", "/api/face", "/static", "/favicon.ico")
-"""The paths for faces, without NiceGUI's websocket, which accepts messages for any page by its number."""
+"""The paths for faces; NiceGUI's websocket would accept messages for any page by its number."""
 
 _PAGE_POLICY = (
     "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
-"""NiceGUI needs `unsafe-eval`, because Vue compiles templates in the browser, and inline styles for Quasar and
-CodeMirror. The guard adds a nonce to each page's inline scripts, whose content, and so whose hash, varies."""
+"""NiceGUI needs `unsafe-eval`, because Vue compiles templates in the browser, and inline styles for Quasar
+and CodeMirror. Inline scripts get a nonce, because their content, and so their hash, varies."""
 
 _REFUSAL_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
 _SECURITY_HEADERS = {
@@ -54,7 +54,7 @@ _NO_SCRIPT = "script-src 'none'"  # pages with this policy get no nonce
 
 _NO_CONTROL_CHARACTERS = "there is no such page; addresses cannot contain control characters"
 NO_PAGE = "there is no such page"
-_WRONG_TOKEN = "this token is wrong"
+_WRONG = "this token is wrong"
 _OTHER_SITE = "this request came from another site, which is not allowed"
 _HOST_CHANGED = "the proxy must pass on the browser's Host header unchanged"
 _BODY_TOO_LARGE = f"this request is too large; the limit is {MAX_BODY_BYTES:,} bytes"
@@ -111,9 +111,7 @@ class Guard:
             await self._app(scope, receive, send)
 
     def _check_path(self, path: str) -> None:
-        if _CONTROL_CHARACTERS.search(path) and not self._has_page(
-            path
-        ):  # names that people gave may have them
+        if _CONTROL_CHARACTERS.search(path) and not self._has_page(path):  # names of runs may have them
             raise RefusedError(HTTPStatus.BAD_REQUEST, _NO_CONTROL_CHARACTERS)
 
     def _check_host(self, request: HTTPConnection) -> None:
@@ -122,7 +120,7 @@ class Guard:
         if name not in self._rules.hosts and not (self._rules.any_address and _is_address(name)):
             raise RefusedError(
                 HTTPStatus.MISDIRECTED_REQUEST,
-                "this host name is unknown; open the printed link, or add the name with --name or --behind-proxy",
+                "unknown host name; open the printed link, or add the name with --name or --behind-proxy",
             )
 
     def _check_origin(self, request: HTTPConnection, proxy: OuterAddress | None) -> None:
@@ -162,7 +160,7 @@ class Guard:
         if kind.lower() == "bearer" and given:
             role = self._of_token(given.strip(), request)
             if role is None:
-                raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG_TOKEN)
+                raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
             return role
         role = access.of_cookie(request.cookies.get(self._rules.cookie, ""))
         return Role.OPERATOR if role is None and access.operator is None else role
@@ -179,7 +177,7 @@ class Guard:
         """Exchange the token of a link for a cookie, to keep it out of the history."""
         role = self._of_token(token, request)
         if role is None and self._rules.access.operator is not None:
-            raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG_TOKEN)
+            raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
         path = "/" + path_of(request.scope).strip("/")  # a double slash would start a host name
         if _CONTROL_CHARACTERS.search(path):
             raise RefusedError(HTTPStatus.BAD_REQUEST, _NO_CONTROL_CHARACTERS)

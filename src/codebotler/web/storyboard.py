@@ -1,4 +1,4 @@
-"""Storyboards on the page: a strip for each kind of sampled world."""
+"""Storyboards on the page: one strip for each kind of sampled world."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from codebotler.core.trace import Event
 from codebotler.web.frame import PlainText
 
 _MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
-_LEFT_OUT = "…"  # instead of a room, where steps are left out
+_LEFT_OUT = "…"  # replaces rooms in a shortened strip
 
 
 @dataclass(frozen=True)
 class Action:
-    """Something that the robot does in a room."""
+    """An action of the robot in a room."""
 
-    kind: str  # `say`, `ask` and `answer` for what is spoken; else the event's
+    kind: str  # the event's, or `answer`
     text: str
-    step: int = field(default=0, compare=False)  # in the trace, from 1; 0 for an answer
+    step: int = field(default=0, compare=False)  # position in the trace, from 1; 0 for an answer
 
 
 @dataclass(frozen=True)
 class Scene:
     """A stay in a room."""
 
-    room: str  # for a drive that fails, the room that was asked for
+    room: str  # the requested one if the drive fails
     deeds: tuple[Action, ...] = ()
-    is_found: bool = True  # whether there is such a room
-    step: int = field(default=0, compare=False)  # of the drive there, from 1; 0 where the robot started
+    is_found: bool = True  # whether the room exists
+    step: int = field(default=0, compare=False)  # of the drive, in the trace, from 1; 0 at the start
 
 
 @dataclass(frozen=True)
 class Strip:
     """The scenes of one sampled world."""
 
-    world: str  # what it is like, as the first half of a sentence
+    world: str  # its description, as the first half of a sentence
     scenes: tuple[Scene, ...]
     ending: str
     ends_well: bool
@@ -51,22 +51,19 @@ class Strip:
 
 @dataclass(frozen=True)
 class RouteProgress:
-    """How far a robot has come."""
+    """The progress of a robot along a strip."""
 
     visited: tuple[str, ...] = ()  # rooms
-    looks: tuple[tuple[str, bool], ...] = ()  # what it looked for, and whether it was found
-    answers: tuple[str | None, ...] = ()  # to its questions; None where one failed
+    looks: tuple[tuple[str, bool], ...] = ()  # objects, and whether they were found
+    answers: tuple[str | None, ...] = ()  # None for a question that failed
 
 
 NO_PROGRESS = RouteProgress()
-_NO_STRIP_FITS = "What happened fits none of the imagined worlds; they are only examples."
+_NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
 
 
 def draw_strips(check: Check, reached: RouteProgress = NO_PROGRESS) -> None:
-    """Draw what a robot would do, as far as a check found, and tick off the rooms that it has visited.
-
-    A strip that is no longer possible is folded.
-    """
+    """Draw what a robot would do according to a check; tick off visited rooms, and fold refuted strips."""
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
@@ -84,13 +81,13 @@ def draw_strips(check: Check, reached: RouteProgress = NO_PROGRESS) -> None:
 
 
 def folded(numbers: Sequence[int | None]) -> list[bool]:
-    """Whether each strip is folded: none is where none fits, since they are but some worlds."""
+    """Whether to fold each strip; if none matches, all are shown."""
     is_among_them = any(number is not None for number in numbers)
     return [is_among_them and number is None for number in numbers]
 
 
 def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
-    """How many drives of a strip the robot has made; None if it went, found or heard something else."""
+    """The number of a strip's drives that the robot has made; None if its run differs from the strip."""
     is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
     if is_whole and not (_has_seen(strip, reached.looks) and _has_heard(strip, reached.answers)):
         return None
@@ -108,10 +105,10 @@ def _has_seen(strip: Strip, looks: Sequence[tuple[str, bool]]) -> bool:
 
 
 def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
-    """Robots that hear people may return an option in another case and with blanks around it."""
+    # Speech recognition may change an option's case and add blanks.
     heard = [NO_ANSWER if answer is None else shortened(answer, _MAX_STEP_TEXT) for answer in answers]
-    told = _texts(strip, "answer")[: len(answers)]
-    return [text.strip().casefold() for text in told] == [text.strip().casefold() for text in heard]
+    expected = _texts(strip, "answer")[: len(answers)]
+    return [text.strip().casefold() for text in expected] == [text.strip().casefold() for text in heard]
 
 
 def _texts(strip: Strip, kind: str) -> list[str]:
@@ -121,10 +118,7 @@ def _texts(strip: Strip, kind: str) -> list[str]:
 def draw_scene(
     scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False, anchor: str = ""
 ) -> None:
-    """Draw a stay in a room, and mark the steps whose numbers are wrong.
-
-    With an `anchor`, each step has it and its number as an id, to which links lead.
-    """
+    """Draw a stay in a room, and mark wrong steps; the id of a step is `anchor` and its number."""
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
     with ui.element("li").classes(" ".join(kinds)):
@@ -148,7 +142,7 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: Check) -> list[Strip]:
-    """One strip for each kind of world that makes a difference: those that show a problem first."""
+    """Return one strip for each outcome, those with problems first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
@@ -160,7 +154,7 @@ def strips(check: Check) -> list[Strip]:
 def _strip(sample: Sample, check: Check) -> Strip:
     error = sample.outcome.error
     if sample.in_vain:
-        ending = "The robot waits or searches without success, which is not counted as a problem."
+        ending = "The robot waits or searches in vain; this does not count as a problem."
     elif error is not None:
         ending = f"Fails: {shortened(error.message, _MAX_STEP_TEXT)} ({shortened(error.kind)})"
     else:
@@ -173,7 +167,7 @@ def _strip(sample: Sample, check: Check) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """The scenes of a trace from its start on; of a long one its ends, and the steps that are needed."""
+    """Return the scenes of a trace; a long one is shortened in the middle, except for needed steps."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in cut(steps, needed):
         if not is_shown:
@@ -200,7 +194,7 @@ def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
-    """A look and its result in words."""
+    """Return a look and its result in words."""
     return _phrase(Event(CHECK, what, found=is_found))
 
 

@@ -193,15 +193,15 @@ def test_a_token_is_made_for_each_start() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--no-token", "--host", "0.0.0.0"], "this machine only"),
+        (["--no-token", "--host", "0.0.0.0"], "--no-token works only"),
         *(
-            pytest.param(["--no-token", "--host", host], "this machine only", marks=pytest.mark.slow)
+            pytest.param(["--no-token", "--host", host], "--no-token works only", marks=pytest.mark.slow)
             for host in ("::", "0", "127.example", "")
         ),
-        (["--no-token", "--token", "x" * 20], "this machine only"),
-        (["--no-token", "--behind-proxy", "https://robot.example"], "this machine only"),
-        (["--behind-proxy", "https://robot.example/missions"], "the page itself uses /missions"),
-        (["--behind-proxy", "https://robot.example/_nicegui/x"], "the page itself uses /_nicegui"),
+        (["--no-token", "--token", "x" * 20], "--no-token works only"),
+        (["--no-token", "--behind-proxy", "https://robot.example"], "--no-token works only"),
+        (["--behind-proxy", "https://robot.example/missions"], ": /missions is a path of the page"),
+        (["--behind-proxy", "https://robot.example/_nicegui/x"], ": /_nicegui is a path of the page"),
         (["--behind-proxy", "robot.example"], "https://HOST"),
         (["--token", "short"], "too short"),
         (["--host", "999.1.1.1"], "cannot listen"),
@@ -493,7 +493,7 @@ def test_names_by_which_the_page_may_be_called() -> None:
 def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with PageAddress(port=0).listen() as first, PageAddress(port=0).listening() as other:
+    with PageAddress(port=0).listen() as first, PageAddress(port=0).listen() as other:
         taken, free = first.getsockname()[1], other.getsockname()[1]
         other.close()
         monkeypatch.setattr("codebotler.web.access.DEFAULT_PORTS", (taken, free))

@@ -1,9 +1,9 @@
-"""The page that lists past missions, with filters; it follows what happens."""
+"""The page that lists all missions, with filters and live updates."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Annotated, Any
 from urllib.parse import urlencode
@@ -29,13 +29,7 @@ _NO_MISSIONS = "No missions yet."
 
 @dataclass(frozen=True)
 class MissionFilter:
-    """Which missions are shown; what is empty leaves nothing out.
-
-    Args:
-        state: in which they are.
-        robot: that carried them out.
-        text: in their instruction, program or reason, whatever its capitals.
-    """
+    """A filter for missions: by state, by robot, and by text in the instruction, program or reason."""
 
     state: str = ""
     robot: str = ""
@@ -43,15 +37,15 @@ class MissionFilter:
 
     @property
     def query(self) -> str:
-        """How an address says it."""
+        """The filter as a query string."""
         chosen = {name: value for name, value in vars(self).items() if value}
         return f"?{urlencode(chosen)}" if chosen else ""
 
     def shows(self, summary: MissionSummary) -> bool:
-        """Whether a mission is shown."""
-        is_alike = self.state in {"", summary.state} and self.robot in {"", summary.robot}
+        """Whether the filter shows a mission."""
+        has_state = self.state in {"", summary.state} and self.robot in {"", summary.robot}
         texts = (summary.instruction, summary.program, summary.reason)
-        return is_alike and any(self.text.casefold() in text.casefold() for text in texts)
+        return has_state and any(self.text.casefold() in text.casefold() for text in texts)
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -68,24 +62,24 @@ def add(console: Console, frame: Frame) -> None:
 
 
 class _MissionList:
-    """The missions that a filter shows, newest first."""
+    """The filters and the list of missions, newest first."""
 
     def __init__(self, console: Console, chosen: MissionFilter) -> None:
         self._console, self._chosen = console, chosen
         self._known: list[MissionSummary] = []
         self._seen: object = None
         self._rows: dict[str, _MissionRow] = {}
-        with ui.element("div").classes("filters").props('role=search aria-label="Which missions are shown"'):
+        with ui.element("div").classes("filters").props('role=search aria-label="Filter missions"'):
             self._text = ui.input("Search", value=chosen.text, on_change=self._choose)
             self._text.props("outlined dense clearable debounce=300 dir=auto maxlength=200")
             self._state = _select_box("State", chosen.state, self._choose)
             self._robot = _select_box("Robot", chosen.robot, self._choose)
         self._count = PlainText("p", "", "quiet").props("role=status")
-        self._trouble = PlainText("p", "", "trouble").props("role=alert")
+        self._error = PlainText("p", "", "trouble").props("role=alert")
         self._list = ui.element("ol").classes("rows")
 
     async def update(self) -> None:
-        """Show the missions as they are now; they are read again only after one has come to another state."""
+        """Read and show the missions again if the current one has changed its state."""
         view = self._console.view
         seen = (view.id, view.state, view.reason)
         if seen == self._seen:
@@ -93,10 +87,10 @@ class _MissionList:
         try:
             self._known = await asyncio.to_thread(read_missions, self._console.home)
         except UserError as error:
-            self._trouble.say(str(error))
+            self._error.say(str(error))
             return
         self._seen = seen
-        self._trouble.say("")
+        self._error.say("")
         _set_options(
             self._state, "All states", {summary.state for summary in self._known}, self._chosen.state
         )
@@ -136,7 +130,6 @@ def _select_box(label: str, value: str, chosen: Any) -> ui.select:  # noqa: ANN4
 
 
 def _set_options(box: ui.select, everything: str, values: set[str], chosen: str) -> None:
-    """Offer what there is, and what is chosen, which may come back."""
     options = {"": everything, **{value: visible(value) for value in sorted(values | {chosen}) if value}}
     if options != box.options:
         box.set_options(options)
@@ -145,15 +138,14 @@ def _set_options(box: ui.select, everything: str, values: set[str], chosen: str)
 def _count_text(found: int, known: int) -> str:
     if not known:
         return _NO_MISSIONS
-    last = f", the last {MAX_LISTED_MISSIONS:,} are listed" if found > MAX_LISTED_MISSIONS else ""
+    last = f"; showing the latest {MAX_LISTED_MISSIONS:,}" if found > MAX_LISTED_MISSIONS else ""
     return f"{counted(known, 'mission') if found == known else f'{found:,} of {known:,} missions'}{last}"
 
 
 class _MissionRow:
-    """A mission in the list."""
+    """An entry of the list."""
 
     def __init__(self, mission: str) -> None:
-        self._shown: MissionSummary | None = None
         with ui.element("li") as self.element, html.a(href=outside(f"{_MISSIONS_PATH}/{mission}")):
             self._time = PlainText("time")
             with ui.element("span").classes("about"):
@@ -162,10 +154,7 @@ class _MissionRow:
             self._state = PlainText("small")
 
     def show(self, summary: MissionSummary) -> None:
-        """Show a mission, unless it is shown already."""
-        if summary == self._shown:
-            return
-        self._shown = replace(summary)
+        """Show a mission."""
         self._time.say(f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
         self._title.say(shortened(title(summary), _MAX_TITLE))
         reason = (

@@ -1,4 +1,4 @@
-"""The page of one mission: how it ended, its timeline, and its program; it follows one that goes on."""
+"""The page of one mission: its outcome, timeline and program, with live updates."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from codebotler.web.live import follow
 
 MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "Program written", MissionState.RUNNING: "Started"}
-"""How the timeline names states of a mission, but for those that speak for themselves."""
+"""Names of states in the timeline; others are used as they are."""
 
 _STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
-"""States that are not shown where a stop is."""
+"""States that are not shown after a stop."""
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -47,13 +47,13 @@ def add(console: Console, frame: Frame) -> None:
 
 
 async def _update(console: Console, page: _MissionPage) -> None:
-    """Show what has happened meanwhile; another tool's mission and a past one do not change here."""
+    """Refresh the page, if it shows the current mission of this process."""
     if page.mission == console.view.id and not page.has_ended:
         page.show(*await asyncio.to_thread(_read, console, page.mission))
 
 
 def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """The events that are shown, in words; a stop and what it interrupted are one."""
+    """Yield the visible events in words; a stop includes the activity that it interrupted."""
     doing, is_stopped = "", False
     for number, line in enumerate(events):
         event = line["event"]
@@ -65,14 +65,14 @@ def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
             is_stopped = True
             yield line, _capitalize(stop_text(line["by"], doing))
             continue
-        is_told = event == "cancelled" or (is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP)
-        words = "" if is_told else timeline_text(line, is_first=number == 0)
+        is_hidden = event == "cancelled" or (is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP)
+        words = "" if is_hidden else timeline_text(line, is_first=number == 0)
         if words:
             yield line, words
 
 
 def timeline_text(line: LogLine, *, is_first: bool) -> str:
-    """An event in the timeline; empty if it is not shown."""
+    """Return the text of an event in the timeline; empty if it is hidden."""
     event = line["event"]
     if event == "state":
         state, reason = line["state"], shortened(line.get("reason", ""))
@@ -94,8 +94,6 @@ def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine]
 
 
 class _MissionPage:
-    """A mission: how it ended and why, what happened, and the program."""
-
     def __init__(self, summary: MissionSummary) -> None:
         self.mission, self.has_ended = summary.id, False
         self._shown: MissionSummary | None = None
@@ -108,13 +106,13 @@ class _MissionPage:
         self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
 
     def show(self, summary: MissionSummary, events: Sequence[LogLine]) -> None:
-        """Show a mission, of which more may have happened."""
+        """Show a mission, including new events."""
         self.has_ended = summary.has_ended
         if summary != self._shown:
             self._shown = replace(summary)
             self._head.clear()
             with self._head:
-                _draw_head(summary)
+                _draw_header(summary)
             self._source.clear()
             with self._source:
                 _draw_source(summary)
@@ -124,19 +122,19 @@ class _MissionPage:
                 _draw_event(line, words)
         self._count = len(steps)
         more = len(events) - MAX_LISTED_EVENTS
-        self._more.say(f"{more:,} more events are in the downloads above." if more > 0 else "")
+        self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_head(summary: MissionSummary) -> None:
+def _draw_header(summary: MissionSummary) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):
         PlainText("small", summary.state, f"state state-{summary.state}")
         if summary.reason:
             PlainText("span", shortened(reason_text(summary.reason, summary.line)), "reason")
-        if code := _line_of(summary):
+        if code := _last_line(summary):
             PlainText("code", shortened(code, _MAX_CODE_CHARACTERS))
-    by_hand = " · program typed or changed by hand" if summary.program else ""
+    by_hand = " · program typed or edited by hand" if summary.program else ""
     by = f" · program by {summary.model}" if summary.model else by_hand
     PlainText("p", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}", "facts")
     with ui.element("p").classes("downloads"):
@@ -146,17 +144,16 @@ def _draw_head(summary: MissionSummary) -> None:
         PlainText("p", shortened(problem), "trouble")
 
 
-def _line_of(summary: MissionSummary) -> str:
-    """The line of the program at which the mission ended, without its indentation; empty if it is unknown."""
+def _last_line(summary: MissionSummary) -> str:
+    """The line of the program at which the mission ended, unindented; empty if unknown."""
     lines = summary.program.split("\n")
     is_there = summary.line is not None and 0 < summary.line <= len(lines)
     return lines[summary.line - 1].strip() if summary.line is not None and is_there else ""
 
 
 def _draw_source(summary: MissionSummary) -> None:
-    """The program, in which the line at which the mission ended is marked."""
     lines = summary.program.split("\n")
-    at = summary.line if _line_of(summary) else None
+    at = summary.line if _last_line(summary) else None
     if at is None:
         PlainText("span", summary.program)
         return

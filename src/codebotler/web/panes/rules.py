@@ -1,4 +1,4 @@
-"""The house rules that count for a program, and how a person switches one off."""
+"""The house rules, which can be switched off for one program."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MAX_RULES, _MAX_RULE_CHARACTERS, _MAX_SWITCH_OFF_REASON = 100, 300, 500
 
 
 class RulesPane:
-    """Lists the rules; nothing where there are none."""
+    """Lists the rules, if any."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -26,7 +26,7 @@ class RulesPane:
         self._box.set_visibility(bool(console.rules))
 
     def show(self, view: SessionView) -> None:
-        """Show which rules count in the mission at hand."""
+        """Show which rules are in force."""
         drawn = (view.disabled_rules, view.may_be_approved)
         if self._console.rules and drawn != self._drawn:
             self._drawn = drawn
@@ -48,12 +48,11 @@ class RulesPane:
                         off.props(f'aria-label="Switch off the rule {rule.name} for this program"')
 
     def _ask_why(self, rule: Rule) -> None:
-        """Have the person say why the rule does not count for the program that waits."""
         with ui.dialog() as dialog, ui.card().classes("pane"):
             PlainText("h3", f'Switch off "{shortened(rule.says, _MAX_RULE_CHARACTERS)}" for this program?')
-            PlainText("p", "The robot may break it while this program runs. The reason is logged.", "quiet")
+            PlainText("p", "The robot may break it while this program runs. Your reason is logged.", "quiet")
             reason = (
-                ui.input("Why?")
+                ui.input("Reason")
                 .props(f"outlined autofocus maxlength={_MAX_SWITCH_OFF_REASON}")
                 .classes("why")
             )
