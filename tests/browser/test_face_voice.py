@@ -158,9 +158,7 @@ def test_a_browser_that_may_not_listen_says_so(server: PageServer, opened: OpenP
     face.evaluate("fail('no-speech')")
     expect(voice).to_be_checked()
     face.evaluate("fail('not-allowed')")
-    expect(face.locator("#ended")).to_have_text(
-        "The browser blocks the microphone. Please tap an answer."
-    )
+    expect(face.locator("#ended")).to_have_text("The browser blocks the microphone. Please tap an answer.")
     expect(voice).not_to_be_checked()
     option(face, "Yes").click()
     expect(said(face)).to_have_text("She says Yes")

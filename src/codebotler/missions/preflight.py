@@ -108,13 +108,12 @@ def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
     """Return the recorded instructions, each with a program, whose rooms exist here."""
     replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
-    if room_map is None:
-        return known
-    return {
-        instruction: program
-        for instruction, program in known.items()
-        if named_rooms(tree_of(program)) and not unknown_rooms(program, room_map)
-    }
+
+    def is_possible(program: str) -> bool:
+        has_rooms = bool(named_rooms(tree_of(program)))
+        return room_map is None or (has_rooms and not unknown_rooms(program, room_map))
+
+    return {instruction: program for instruction, program in known.items() if is_possible(program)}
 
 
 def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) -> UnknownInstructionError:

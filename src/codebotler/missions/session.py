@@ -141,11 +141,9 @@ class MissionSession:
                 self._change(disabled_rules=(*view.disabled_rules, name), **_UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
-        """Have the model write another program.
+        """Have the model write another program; for a repair, it gets its program with the problems.
 
-        Args:
-            repair: whether to send the model its program with the problems, or why its reply has no program.
-            max_tokens: a new limit for this reply and later ones, in tokens; None keeps the limit.
+        `max_tokens` is a new limit for this reply and later ones; None keeps the limit.
         """
         with self._editing, self._lock:
             if not self._view.may_be_asked_again:

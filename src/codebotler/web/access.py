@@ -10,7 +10,7 @@ import secrets
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -146,7 +146,7 @@ class PageAddress:
                 if error.errno == errno.EADDRINUSE and port != ports[-1]:
                     continue
                 raise UserError(
-                    f"{_ports_are(ports)} already in use; choose another --port"
+                    f"port {port} is already in use; choose another --port"
                     if error.errno == errno.EADDRINUSE
                     else f"cannot listen on {self.host}, port {port}: {error.strerror}"
                 ) from None
@@ -172,7 +172,3 @@ class PageAddress:
         hosts = LOOPBACK_HOSTS | named | (set() if self.is_loopback else {socket.gethostname().lower()})
         cookie, proxies = f"codebotler-{port}", addresses_by_host(self.proxies)
         return GuardRules(access, frozenset(hosts), not self.is_loopback, cookie, proxies)
-
-
-def _ports_are(ports: Sequence[int]) -> str:
-    return f"port {ports[0]} is" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]} are"

@@ -58,7 +58,7 @@ class Console:
         self.interrupted: tuple[MissionSummary, ...] = ()
         self._open_model = open_model
         self._lock = threading.Lock()  # held briefly
-        self._session: MissionSession | None = None
+        self.session: MissionSession | None = None  # the current one, or the last one
         self._checking = threading.Lock()
         self._held = ExitStack()
         self._pool: WorkerPool | None = None
@@ -69,7 +69,7 @@ class Console:
         return self
 
     def __exit__(self, *_: object) -> None:
-        session = self._session
+        session = self.session
         if session is not None:
             session.stop(BY_SHUTDOWN)
             session.join(STOP_GRACE_SECONDS + 1)
@@ -77,14 +77,9 @@ class Console:
             self._held.close()
 
     @property
-    def session(self) -> MissionSession | None:
-        """The current session, or the last one."""
-        return self._session
-
-    @property
     def view(self) -> SessionView:
         """The current view."""
-        session = self._session
+        session = self.session
         return SessionView() if session is None else session.view
 
     async def view_once(self, *, over: bool) -> SessionView:
@@ -99,10 +94,10 @@ class Console:
         for text in (order.instruction, order.program):
             _check_length(text)
         with self._lock:
-            before = self._session
+            before = self.session
             if before is not None and before.view.is_running:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
-            self._session = session = MissionSession(
+            self.session = session = MissionSession(
                 self.robot,
                 self.home,
                 order,
@@ -123,7 +118,7 @@ class Console:
     def edit(self, program: str) -> MissionSession:
         """Replace the current program; after the end of a mission, begin another one."""
         _check_length(program)
-        session = self._session
+        session = self.session
         if session is None or session.view.is_over:
             before = self.view
             if program == before.program:
@@ -140,7 +135,7 @@ class Console:
 
     def stop(self, by: str, *, only_moving: bool = False) -> bool:
         """Stop the mission, or only a running one, without waiting; return whether there is one."""
-        session, view = self._session, self.view
+        session, view = self.session, self.view
         if session is None or view.is_over or (only_moving and not view.is_running):
             return False
         session.stop_soon(by)

@@ -106,7 +106,8 @@ class Guard:
             return
         scope.setdefault("state", {})["role"] = role
         if is_http:
-            await _LimitedBody(receive, send).run(self._app, scope)
+            limited = _LimitedBody(scope, receive, send)
+            await self._app(scope, limited.receive, limited.send)
         else:
             await self._app(scope, receive, send)
 
@@ -128,7 +129,8 @@ class Guard:
         headers, is_socket = request.headers, request.scope["type"] == "websocket"
         origin = headers.get("origin")
         host = headers.get("host", "") if proxy is None else proxy.host
-        if origin is not None and not _is_same(origin, host, request.scope):
+        secure = "s" if request.scope["scheme"] in {"https", "wss"} else ""
+        if origin is not None and origin.lower() != f"http{secure}://{host.lower()}":
             raise RefusedError(HTTPStatus.FORBIDDEN, self._why_not(origin.lower(), request, proxy))
         changes = is_socket or request.scope["method"] not in _SAFE_METHODS
         from_browser = "cookie" in headers or is_socket
@@ -212,8 +214,7 @@ def _named_host(scope: Scope) -> str:
 
 def _host(request: HTTPConnection) -> str:
     """The requested host name."""
-    named = [host.lower() for host in request.headers.getlist("host")]
-    found = _HOST_HEADER.fullmatch(named[0]) if len(named) == 1 else None
+    found = _HOST_HEADER.fullmatch(_named_host(request.scope))
     if found is None or not 0 < int(found[3] or 80) <= _MAX_PORT:
         raise RefusedError(HTTPStatus.BAD_REQUEST, "send exactly one Host header, with a name and a port")
     return found[1] or found[2]
@@ -225,11 +226,6 @@ def _is_address(name: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _is_same(origin: str, host: str, scope: Scope) -> bool:
-    secure = scope["scheme"] in {"https", "wss"}
-    return origin.lower() == f"http{'s' if secure else ''}://{host.lower()}"
 
 
 def _token_in_link(request: HTTPConnection) -> str | None:
@@ -254,15 +250,11 @@ def _check_length(request: HTTPConnection) -> None:
 class _LimitedBody:
     """Cuts off a request body that is too large, and adds security headers to the response."""
 
-    def __init__(self, receive: Receive, send: Send) -> None:
-        self._receive, self._send = receive, send
+    def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._scope, self._receive, self._send = scope, receive, send
         self._length = 0
         self._nonce = secrets.token_urlsafe(16)
         self._is_page = self._is_refused = False
-
-    async def run(self, app: ASGIApp, scope: Scope) -> None:
-        self._scope = scope
-        await app(scope, self.receive, self.send)
 
     async def receive(self) -> Message:
         message = await self._receive()

@@ -89,7 +89,9 @@ def folded(numbers: Sequence[int | None]) -> list[bool]:
 def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
     """The number of a strip's drives that the robot has made; None if its run differs from the strip."""
     is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
-    if is_whole and not (_has_seen(strip, reached.looks) and _has_heard(strip, reached.answers)):
+    seen = [look_text(*look) for look in reached.looks]
+    has_seen = _texts(strip, CHECK)[: len(seen)] == seen
+    if is_whole and not (has_seen and _has_heard(strip, reached.answers)):
         return None
     for number, room in enumerate(reached.visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
@@ -98,10 +100,6 @@ def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
         if scene is None or scene.room != shortened(room, _MAX_STEP_TEXT):
             return None
     return len(reached.visited)
-
-
-def _has_seen(strip: Strip, looks: Sequence[tuple[str, bool]]) -> bool:
-    return _texts(strip, CHECK)[: len(looks)] == [look_text(*look) for look in looks]
 
 
 def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:

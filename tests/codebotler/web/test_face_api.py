@@ -154,7 +154,7 @@ def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path:
     console = Console(
         Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face
     )
-    console._session = type(
+    console.session = type(
         "Ended", (), {"view": SessionView(1, "m", MissionState.FAILED, reason=UNCONFIRMED_STOP)}
     )()
     assert face_data(console, face)["reason"] == UNCONFIRMED_STOP

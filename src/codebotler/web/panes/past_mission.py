@@ -146,9 +146,8 @@ def _draw_header(summary: MissionSummary) -> None:
 
 def _last_line(summary: MissionSummary) -> str:
     """The line of the program at which the mission ended, unindented; empty if unknown."""
-    lines = summary.program.split("\n")
-    is_there = summary.line is not None and 0 < summary.line <= len(lines)
-    return lines[summary.line - 1].strip() if summary.line is not None and is_there else ""
+    lines, number = ["", *summary.program.split("\n")], summary.line or 0
+    return lines[number].strip() if 0 < number < len(lines) else ""
 
 
 def _draw_source(summary: MissionSummary) -> None:

@@ -241,8 +241,8 @@ def _for_editor(program: str) -> str:
 
 
 def _skill_marks(program: str) -> list[dict[str, Any]]:
-    calls = (found for found in _CALL.finditer(program) if by_name(found[1]) is not None)
-    found = list(islice(calls, _MAX_MARKS))
+    calls = (match for match in _CALL.finditer(program) if by_name(match[1]) is not None)
+    found = islice(calls, _MAX_MARKS)
     return [{"kind": "mark", "from": m.start(), "to": m.end(), "class": "skill"} for m in found]
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from nicegui import html
 
-from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.view import SessionView
 from codebotler.web.frame import PlainText
 
-_MAX_REPLY_CHARACTERS = 6_000
+_MAX_CHARACTERS = 6_000
 """The limit for a reply: its end is shown while it arrives, its beginning afterwards."""
 
 
@@ -22,22 +21,17 @@ class ReplyPane:
 
     def show(self, view: SessionView) -> None:
         """Show a view."""
-        waits = (view.may_be_approved or view.waits_for_program) and not view.is_written
-        none = view.programless if waits else None
-        kept = " The previous program is kept." if view.program else ""
-        self._why.say("" if none is None else none.sentence + kept)
-        self._text.say(_end_of(view.arriving.text) if view.is_written else _text_of(none))
-        self._reasoning.say(_reasoning_of(none))
-
-
-def _text_of(none: ProgramlessReply | None) -> str:
-    """The text of a reply, unless the sentence already quotes it."""
-    return "" if none is None or none.sentence.endswith(none.text.strip()) else _start_of(none.text)
-
-
-def _reasoning_of(none: ProgramlessReply | None) -> str:
-    """The reasoning before a reply, unless its text contains it."""
-    return "" if none is None or none.reasoning in none.text else _start_of(none.reasoning)
+        why = text = reasoning = ""
+        none = view.programless
+        if view.is_written:
+            text = view.arriving.text
+        elif none is not None and (view.may_be_approved or view.waits_for_program):
+            why = none.sentence + (" The previous program is kept." if view.program else "")
+            text = "" if none.sentence.endswith(none.text.strip()) else none.text  # else quoted twice
+            reasoning = "" if none.reasoning in none.text else none.reasoning
+        self._why.say(why)
+        self._text.say(text, is_arriving=view.is_written)
+        self._reasoning.say(reasoning)
 
 
 class _Folded:
@@ -49,15 +43,9 @@ class _Folded:
             PlainText("summary", title)
             self._text = PlainText("div", "", "text").props("tabindex=0")
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, *, is_arriving: bool = False) -> None:
         """Show a text; an empty one hides the element."""
         self._box.set_visibility(bool(text.strip()))
+        if len(text) > _MAX_CHARACTERS:
+            text = f"… {text[-_MAX_CHARACTERS:]}" if is_arriving else f"{text[:_MAX_CHARACTERS]} …"
         self._text.say(text.strip())
-
-
-def _start_of(text: str) -> str:
-    return text if len(text) <= _MAX_REPLY_CHARACTERS else f"{text[:_MAX_REPLY_CHARACTERS]} …"
-
-
-def _end_of(text: str) -> str:
-    return text if len(text) <= _MAX_REPLY_CHARACTERS else f"… {text[-_MAX_REPLY_CHARACTERS:]}"
