@@ -10,7 +10,7 @@ from typing import Any
 from codebotler.core.files import write_whole
 
 PICTURE_FOLDER = "pictures"
-MAX_PICTURE_BYTES = 2_000_000
+MAX_STORED_PICTURE_BYTES = 2_000_000
 MAX_MISSION_PICTURE_BYTES = 200_000_000
 _SIGNATURES: Mapping[str, bytes] = {"jpg": b"\xff\xd8\xff", "png": b"\x89PNG\r\n\x1a\n"}
 """The first bytes of each file format."""
@@ -29,8 +29,10 @@ class PictureStore:
         kind = next((kind for kind, start in _SIGNATURES.items() if data.startswith(start)), None)
         if kind is None:
             return _explain_loss(f"its {len(data):,} bytes are neither JPEG nor PNG")
-        if len(data) > MAX_PICTURE_BYTES:
-            return _explain_loss(f"it has {len(data):,} bytes; at most {MAX_PICTURE_BYTES:,} are allowed")
+        if len(data) > MAX_STORED_PICTURE_BYTES:
+            return _explain_loss(
+                f"it has {len(data):,} bytes; at most {MAX_STORED_PICTURE_BYTES:,} are allowed"
+            )
         if self._bytes + len(data) > MAX_MISSION_PICTURE_BYTES:
             return _explain_loss(f"a mission keeps at most {MAX_MISSION_PICTURE_BYTES:,} bytes of pictures")
         name = f"{PICTURE_FOLDER}/{self._count + 1}.{kind}"

@@ -22,8 +22,8 @@ MAX_WRONG_TOKENS, WRONG_TOKEN_SECONDS = 10, 60.0
 
 MAX_ADDRESSES = 10_000
 MIN_TOKEN_LENGTH = 16
-LOOPBACK_HOSTS = frozenset({"localhost", "127.0.0.1", "::1"})
-DEFAULT_PORTS = range(8080, 8100)
+LOCAL_HOST_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
+PAGE_PORTS = range(8080, 8100)
 _LISTEN_BACKLOG = 128  # connections
 
 
@@ -108,7 +108,7 @@ class GuardRules:
     """The guard's settings."""
 
     access: Access
-    hosts: frozenset[str] = LOOPBACK_HOSTS  # accepted host names, without ports
+    hosts: frozenset[str] = LOCAL_HOST_NAMES  # accepted host names, without ports
     any_address: bool = False  # whether to accept all numeric addresses, too
     cookie: str = "codebotler"  # the cookie's name, different for each port
     proxies: Mapping[str, OuterAddress] = field(default_factory=dict)  # by Host header
@@ -119,7 +119,7 @@ class PageAddress:
     """The address at which to serve the page."""
 
     host: str = "127.0.0.1"
-    port: int | None = None  # 0 for any free port, None for the first free one of `DEFAULT_PORTS`
+    port: int | None = None  # 0 for any free port, None for the first free one of `PAGE_PORTS`
     names: tuple[str, ...] = ()  # additional host names
     proxies: tuple[OuterAddress, ...] = ()  # its addresses at reverse proxies
 
@@ -129,7 +129,7 @@ class PageAddress:
         try:
             return ipaddress.ip_address(self.host).is_loopback
         except ValueError:
-            return self.host in LOOPBACK_HOSTS
+            return self.host in LOCAL_HOST_NAMES
 
     @property
     def is_private(self) -> bool:
@@ -138,7 +138,7 @@ class PageAddress:
 
     def listen(self) -> socket.socket:
         """Open a socket; raises UserError if no port is free."""
-        ports = DEFAULT_PORTS if self.port is None else (self.port,)
+        ports = PAGE_PORTS if self.port is None else (self.port,)
         for port in ports:
             try:
                 return self._bind(port)
@@ -169,6 +169,6 @@ class PageAddress:
     def rules(self, access: Access, port: int) -> GuardRules:
         """Return the guard's settings for this address."""
         named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
-        hosts = LOOPBACK_HOSTS | named | (set() if self.is_loopback else {socket.gethostname().lower()})
+        hosts = LOCAL_HOST_NAMES | named | (set() if self.is_loopback else {socket.gethostname().lower()})
         cookie, proxies = f"codebotler-{port}", addresses_by_host(self.proxies)
         return GuardRules(access, frozenset(hosts), not self.is_loopback, cookie, proxies)

@@ -43,7 +43,7 @@ class Frame:
     has_robot: bool = True
 
     def __call__(self, title: str, here: str, parts: Sequence[tuple[str, str]] = ()) -> None:
-        """Begin a page; the bar marks the address `here`, and on small screens links to `parts` of the page."""
+        """Begin a page; the bar marks the address `here`, and on small screens links to `parts`."""
         ui.page_title(f"{title} · {self.brand}")
         ui.add_head_html(_STYLESHEET_HTML.format(prefix=outside("")))
         if self.has_robot:

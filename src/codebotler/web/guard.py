@@ -129,8 +129,7 @@ class Guard:
         headers, is_socket = request.headers, request.scope["type"] == "websocket"
         origin = headers.get("origin")
         host = headers.get("host", "") if proxy is None else proxy.host
-        secure = "s" if request.scope["scheme"] in {"https", "wss"} else ""
-        if origin is not None and origin.lower() != f"http{secure}://{host.lower()}":
+        if origin is not None and not _is_same(origin, host, request.scope):
             raise RefusedError(HTTPStatus.FORBIDDEN, self._why_not(origin.lower(), request, proxy))
         changes = is_socket or request.scope["method"] not in _SAFE_METHODS
         from_browser = "cookie" in headers or is_socket
@@ -226,6 +225,11 @@ def _is_address(name: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _is_same(origin: str, host: str, scope: Scope) -> bool:
+    secure = "s" if scope["scheme"] in {"https", "wss"} else ""
+    return origin.lower() == f"http{secure}://{host.lower()}"
 
 
 def _token_in_link(request: HTTPConnection) -> str | None:

@@ -636,7 +636,7 @@ def test_robot_is_on_one_mission_at_a_time(home: Path) -> None:
         ready(home) as two,
         running(one, reserved, until="skill"),
     ):
-        with pytest.raises(NotReadyError, match="another mission"):
+        with pytest.raises(NotReadyError, match="already run a mission"):
             two.run(reserved)
         assert two.state is MissionState.APPROVED
         with pytest.raises(NotReadyError, match=f"process {os.getpid()}, since") as error:

@@ -61,7 +61,7 @@ def test_pictures_are_kept_as_they_came_and_named(tmp_path: Path) -> None:
 
 
 def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MAX_PICTURE_BYTES", 20)
+    monkeypatch.setattr(module, "MAX_STORED_PICTURE_BYTES", 20)
     monkeypatch.setattr(module, "MAX_MISSION_PICTURE_BYTES", 2 * len(JPEG))
     mission, lines = mission_with(tmp_path, b"<svg onload=alert(1)>", b"", JPEG + b"!" * 20, JPEG, JPEG, JPEG)
     assert mission.state is MissionState.DONE
@@ -72,7 +72,7 @@ def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         [["21 bytes", "JPEG nor PNG"], ["0 bytes", "JPEG nor PNG"], ["32 bytes", "20"], ["24 bytes"]],
         strict=True,
     ):
-        assert all(name in text for name in ["picture", "not kept", *named]), text
+        assert all(name in text for name in ["picture", "not stored", *named]), text
     assert event_text(lines[0]) == lines[0]["text"]
 
 

@@ -97,12 +97,12 @@ def test_mission_that_cannot_be_closed_is_told_and_others_are(
     for name in ("20260101-000001", "20260101-000002"):
         left(tmp_path, MissionState.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
 
-    def open_log(folder: Path) -> Appender:
+    def open_second(folder: Path) -> Appender:
         if folder.name.endswith("1"):
             raise OSError(number, os.strerror(number), str(folder / EVENTS_FILE))
         return open_log(folder)
 
-    monkeypatch.setattr("codebotler.missions.store.log_of", open_log)
+    monkeypatch.setattr("codebotler.missions.store.open_log", open_second)
     (summary,) = recover_missions(tmp_path)
     assert summary.state == "interrupted"
     unclosed, closed = capsys.readouterr().err.splitlines()

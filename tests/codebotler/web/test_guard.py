@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 
 from codebotler.core.errors import UserError
 from codebotler.web.access import (
-    LOOPBACK_HOSTS,
+    LOCAL_HOST_NAMES,
     MAX_WRONG_TOKENS,
     WRONG_TOKEN_SECONDS,
     Access,
@@ -463,7 +463,7 @@ def passed(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
     headers = [*named, (b"authorization", f"Bearer {token}".encode())]
     scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "scheme": "http"}
     scope["headers"] = headers
-    rules = GuardRules(Access("an operator's", "a face's"), LOOPBACK_HOSTS | {"robot.local"})
+    rules = GuardRules(Access("an operator's", "a face's"), LOCAL_HOST_NAMES | {"robot.local"})
     guard = Guard(behind, rules, set().__contains__)
     asyncio.run(guard(scope, receive, send))
     return int(sent[0]["status"])
@@ -496,7 +496,7 @@ def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
     with PageAddress(port=0).listen() as first, PageAddress(port=0).listen() as other:
         taken, free = first.getsockname()[1], other.getsockname()[1]
         other.close()
-        monkeypatch.setattr("codebotler.web.access.DEFAULT_PORTS", (taken, free))
+        monkeypatch.setattr("codebotler.web.access.PAGE_PORTS", (taken, free))
         with PageAddress().listen() as found:
             assert found.getsockname()[1] == free
         with pytest.raises(UserError, match=f"port {taken} is already in use"):
