@@ -30,11 +30,9 @@ class PictureStore:
         if kind is None:
             return _explain_loss(f"its {len(data):,} bytes are neither JPEG nor PNG")
         if len(data) > MAX_STORED_PICTURE_BYTES:
-            return _explain_loss(
-                f"it has {len(data):,} bytes; at most {MAX_STORED_PICTURE_BYTES:,} are allowed"
-            )
+            return _explain_loss(f"it has {len(data):,} bytes; the limit is {MAX_STORED_PICTURE_BYTES:,}")
         if self._bytes + len(data) > MAX_MISSION_PICTURE_BYTES:
-            return _explain_loss(f"a mission keeps at most {MAX_MISSION_PICTURE_BYTES:,} bytes of pictures")
+            return _explain_loss(f"the limit for a mission is {MAX_MISSION_PICTURE_BYTES:,} bytes")
         name = f"{PICTURE_FOLDER}/{self._count + 1}.{kind}"
         write_whole(self._folder / name, data)
         self._count += 1

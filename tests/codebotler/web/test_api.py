@@ -273,7 +273,7 @@ def test_missions_that_can_no_longer_be_kept_are_said_in_a_sentence(tmp_path: Pa
         (server.home / "missions").rmdir()
         (server.home / "missions").touch()
         answer = server.call("POST", "/api/missions", {"program": HELLO})
-    assert (answer.status, answer.data["detail"]) == (409, f"{server.home / 'read_missions'}: File exists")
+    assert (answer.status, answer.data["detail"]) == (409, f"{server.home / 'missions'}: File exists")
 
 
 def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServer) -> None:

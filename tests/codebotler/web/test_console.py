@@ -575,7 +575,7 @@ def test_an_order_that_says_nothing_is_refused() -> None:
 
 
 def test_a_program_that_is_too_long_is_refused(console: Console) -> None:
-    with pytest.raises(UserError, match="too long"):
+    with pytest.raises(UserError, match="the limit is"):
         console.begin(MissionOrder(program="#" * (MAX_PROGRAM_CHARACTERS + 1)))
     assert read_missions(console.home) == []
 
