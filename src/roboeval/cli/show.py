@@ -244,7 +244,7 @@ def serve(
     from roboeval.web.run_store import RunStore
 
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
-    access = Access.asked_for(token, None, open_to_all=no_token, is_private=place.is_private)
+    access = Access.from_options(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
         raise UserError("there is no such folder; `roboeval run` creates it with the first run", file=runs)
     suites = [load(each) for each in suite or ()]

@@ -24,9 +24,9 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.live import LiveRobot
-from codebotler.missions.log import State
+from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Mission
-from codebotler.missions.preflight import preflight
+from codebotler.missions.preflight import ask_rooms
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError
 from codebotler.robots.open import check_readiness
@@ -497,7 +497,7 @@ def test_it_is_listed() -> None:
 
 
 def test_rooms_are_regexes_for_the_check_as_in_its_world() -> None:
-    plan, place = preflight(connected(World((Room("hall"), Room("kitchen|cafe")), "hall")), print)
+    plan, place = ask_rooms(connected(World((Room("hall"), Room("kitchen|cafe")), "hall")), print)
     assert plan is not None
     assert (plan.room("the cafe"), place) == ("kitchen|cafe", "hall")
 
@@ -514,8 +514,8 @@ def test_rules_about_where_it_is_hold_along_its_own_way(
     mission.check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission:
-        room_map, place = preflight(robot, mission.note, world)
+        room_map, place = ask_rooms(robot, mission.note, world)
         rules = [Rule("never", "Never be there.", formula)]
         assert not check(mission.summary.program, room_map=room_map, house_rules=rules).problems or is_stopped
         mission.run(reserved, place, rules=rules, room_map=room_map)
-    assert mission.state is (State.STOPPED if is_stopped else State.DONE)
+    assert mission.state is (MissionState.STOPPED if is_stopped else MissionState.DONE)
