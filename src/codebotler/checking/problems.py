@@ -12,7 +12,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, outcome_data
 from codebotler.core.words import brief, counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.sampled_robot import Fact, RoomMap
+from codebotler.simulator.sampled_robot import RoomMap, SampledFact
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Sample:
 
     number: int  # of the world, from 0
     outcome: Outcome
-    facts: tuple[Fact, ...] = field(default=(), repr=False)  # about the world, in the order of the run
+    facts: tuple[SampledFact, ...] = field(default=(), repr=False)  # about the world, in the order of the run
     draws: tuple[Draw, ...] = field(default=(), repr=False)  # that settled them, in order
     in_vain: bool = False  # it waited or searched in vain, so that its end says little
     is_chosen: bool = False  # the world was no random one, but chosen for a fact that had not been met

@@ -14,14 +14,14 @@ from codebotler.core.trace import Outcome
 from codebotler.core.world import World
 from codebotler.simulator.pool import WorkerPool, cores
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.settings import PAPER, SimulationSettings
+from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
 
 
 def run(
     pairs: Iterable[tuple[str, World]],
     *,
     workers: int | None = None,
-    rules: SimulationSettings = PAPER,
+    settings: SimulationSettings = PAPER_SETTINGS,
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
@@ -30,7 +30,7 @@ def run(
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:
             jobs = [
-                (source, [partial(SimulatedRobot, world, rules, skills) for _, world in same])
+                (source, [partial(SimulatedRobot, world, settings, skills) for _, world in same])
                 for source, same in groupby(pairs, key=itemgetter(0))
             ]
             return [outcome for outcomes in pool.here().run_all(jobs) for outcome in outcomes]

@@ -24,17 +24,17 @@ from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.process.spawn import ONE_AT_A_TIME
+from codebotler.simulator.process.spawn import START_LOCK
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 
 MAX_RESULT = 64_000_000  # bytes of JSON
 RESULT, FAILURE = b"+", b"-"  # first byte of an answer
-CODE = f"import sys; sys.path[:] = sys.argv[3:]; from {__name__} import serve; serve(*sys.argv[1:3])"
+SERVE_CODE = f"import sys; sys.path[:] = sys.argv[3:]; from {__name__} import serve; serve(*sys.argv[1:3])"
 
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
 class IsolatedCallError(Exception):
@@ -53,15 +53,15 @@ class IsolatedCallError(Exception):
         return f"{self.kind}: {self.message}"
 
 
-class IsolatedFunction(Generic[Arguments, Result]):
+class IsolatedFunction(Generic[_Arguments, _Result]):
     """A function that is called in a closed process; `isolated` makes one."""
 
-    def __init__(self, function: Callable[Arguments, Result], rehearsal: tuple[Any, ...]) -> None:
+    def __init__(self, function: Callable[_Arguments, _Result], rehearsal: tuple[Any, ...]) -> None:
         self.function, self._rehearsal = function, rehearsal
         self.__doc__, self.__wrapped__ = function.__doc__, function
         self.__module__, self.__name__ = function.__module__, function.__name__
 
-    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+    def __call__(self, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
         """Call the function in a closed process, and in a new one if a used one fails.
 
         Raises:
@@ -69,7 +69,7 @@ class IsolatedFunction(Generic[Arguments, Result]):
             EngineError: no process can be started.
         """
         call = (self.__name__, pickle.dumps((args, kwargs)))
-        idle = IDLE.setdefault(self.__module__, [])
+        idle = IDLE_PROCESSES.setdefault(self.__module__, [])
         with suppress(IndexError, IsolatedCallError, LostProcessError):
             return self._call(idle.pop(), call)
         try:
@@ -85,19 +85,19 @@ class IsolatedFunction(Generic[Arguments, Result]):
         """Call the function here, so that whatever it imports is imported."""
         self.function(*self._rehearsal)  # type: ignore[call-arg]  # a rehearsal is a call that fits
 
-    def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> Result:
+    def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> _Result:
         try:
             result = process.call(*call)
         except BaseException:  # even an interrupt, since the answer to this call must not reach the next one
             process.end()
             raise
-        IDLE[self.__module__].append(process)
+        IDLE_PROCESSES[self.__module__].append(process)
         return result  # type: ignore[no-any-return]  # which came as JSON
 
 
 def isolated(
     *rehearsal: object,
-) -> Callable[[Callable[Arguments, Result]], IsolatedFunction[Arguments, Result]]:
+) -> Callable[[Callable[_Arguments, _Result]], IsolatedFunction[_Arguments, _Result]]:
     """Have a module's function called in a closed process.
 
     The process gets pickled arguments, and answers with plain data, as JSON has it: tuples become lists.
@@ -106,7 +106,7 @@ def isolated(
         rehearsal: arguments with which each new process calls the function before it is closed.
     """
 
-    def decorate(function: Callable[Arguments, Result]) -> IsolatedFunction[Arguments, Result]:
+    def decorate(function: Callable[_Arguments, _Result]) -> IsolatedFunction[_Arguments, _Result]:
         return IsolatedFunction(function, rehearsal)
 
     return decorate
@@ -119,9 +119,9 @@ class ClosedProcess:
         flags = ["-S", "-s", "-P", "-W", "ignore", *(["-B"] if sys.dont_write_bytecode else [])]
         path = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path would follow links
         ours, theirs = socket.socketpair()
-        with theirs, ONE_AT_A_TIME:
+        with theirs, START_LOCK:
             self._process = subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
-                [sys.executable, *flags, "-c", CODE, module, str(theirs.fileno()), *path],
+                [sys.executable, *flags, "-c", SERVE_CODE, module, str(theirs.fileno()), *path],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -166,20 +166,20 @@ class ClosedProcess:
         self._channel.hang_up()
 
 
-IDLE: dict[str, list[ClosedProcess]] = {}
+IDLE_PROCESSES: dict[str, list[ClosedProcess]] = {}
 """The processes that wait for a call, by the module whose functions they call."""
 
 
 def end_all() -> None:
     """End the processes that wait; nobody may be calling."""
-    for processes in IDLE.values():
+    for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().end()
 
 
 def forget_all() -> None:
     """Let go of the processes of the parent, in a forked process."""
-    for processes in IDLE.values():
+    for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().forget()
 

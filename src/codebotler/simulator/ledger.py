@@ -13,21 +13,21 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.settings import Limits, SimulationSettings
 
-FEW = 50  # calls of which nothing is remembered
+UNREMEMBERED_CALLS = 50  # calls of which nothing is remembered
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 WAITS = "it waits for something that can never come"
-LAST_LINE = 1_000_000
-LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
+MAX_LINE = 1_000_000
+MAX_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 SkillAnswer: TypeAlias = tuple[str, Any]
 """`ok` and a result, `error` and its number, kind and message, or `stop` and whether a rule is the reason."""
 STOP: SkillAnswer = ("stop", None)
-REFUSED: SkillAnswer = ("stop", True)
+STOPPED_BY_RULE: SkillAnswer = ("stop", True)
 
 
 class SkillPerformer(Protocol):
     """A robot, as a run needs it; executing a skill may take as long as it likes."""
 
-    rules: SimulationSettings
+    settings: SimulationSettings
     skills: SkillTable
     is_live: bool  # time passes by itself: sleeping takes it, and each skill refuels the program
     line: int | None  # of a live program, which asks for something there
@@ -51,7 +51,7 @@ class Ledger:
     """What one run has asked of its robot, and how much it may still ask."""
 
     def __init__(self, robot: SkillPerformer) -> None:
-        self.robot, self.limits = robot, robot.rules.limits
+        self.robot, self.limits = robot, robot.settings.limits
         self.calls = self.text = 0  # characters of all texts
         self.limit: str | None = None  # the one that was reached, in words
         self.errors: list[RobotError] = []
@@ -67,7 +67,7 @@ class Ledger:
         except RobotError as error:
             if error.ends_run:
                 self.broken, self.limit = error, str(error)
-                return REFUSED
+                return STOPPED_BY_RULE
             self.errors.append(error)
             return ("error", (len(self.errors) - 1, error.kind, str(error)))
         return ("ok", result)
@@ -105,8 +105,8 @@ class Ledger:
 
     def outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
         """The outcome of a run that ended in an error."""
-        where = line if type(line) is int and 0 < line <= LAST_LINE else None
-        return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
+        where = line if type(line) is int and 0 < line <= MAX_LINE else None
+        return Outcome(status, self.robot.trace, RunError(kind, message[:MAX_MESSAGE]), where)
 
     def _spend(self, arguments: Sequence[Argument]) -> None:
         limits, size = self.limits, 0
@@ -172,7 +172,7 @@ class RememberingLedger(Ledger):
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
         """Let the robot execute one skill, unless that goes beyond a limit."""
         robot = self._simulated
-        if self.calls < FEW or skill not in self._idle:
+        if self.calls < UNREMEMBERED_CALLS or skill not in self._idle:
             self._same.clear()
             return super().perform(skill, arguments)
         call = (skill, *arguments)

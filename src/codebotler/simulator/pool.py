@@ -20,22 +20,22 @@ from typing import Any, Generic, ParamSpec, Self, TypeVar
 
 from codebotler.simulator.worker import EngineError, Worker
 
-LOG = logging.getLogger("codebotler.engine")
+_log = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses filters of system calls (seccomp)"
 NOT_LINUX = "programs are less isolated here: only Linux has filters of system calls (seccomp)"
-ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
+WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
-IN_MEMORY = 8_000_000  # bytes of results
-UNREADABLE = b""  # in the place of a key that could not be read
-FEW, LARGEST = 16, 64  # keys of the first calls and of the last, and of those between
-HEARD_S = 0.5  # seconds after which a signal is heard at the latest
-AHEAD = 2  # calls for each thread that are under way, so that none waits
-MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
+RESULTS_IN_MEMORY = 8_000_000  # bytes of results
+UNREADABLE_KEY = b""  # in the place of a key that could not be read
+MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # keys of the first calls and of the last, and of those between
+SIGNAL_POLL_SECONDS = 0.5  # seconds after which a signal is heard at the latest
+CALLS_PER_THREAD = 2  # calls for each thread that are under way, so that none waits
+MAX_KEYS_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
-Key = TypeVar("Key")
-Called = TypeVar("Called")
-Value = TypeVar("Value")
-Arguments = ParamSpec("Arguments")
+_Key = TypeVar("_Key")
+_Called = TypeVar("_Called")
+_Value = TypeVar("_Value")
+_Arguments = ParamSpec("_Arguments")
 
 
 class WorkerPool:
@@ -49,7 +49,7 @@ class WorkerPool:
         self, workers: int, *, require_isolation: bool = False, one_process_per_run: bool = False
     ) -> None:
         if sys.platform == "win32":
-            raise EngineError(ON_WINDOWS)
+            raise EngineError(WINDOWS_UNSUPPORTED)
         self.workers = workers
         self._local = threading.local()
         self._threads = ThreadPoolExecutor(
@@ -69,7 +69,7 @@ class WorkerPool:
             if require_isolation:
                 first.close()
                 raise EngineError(without_filter())
-            LOG.warning(without_filter())
+            _log.warning(without_filter())
         self._workers.append(first)
         self._idle.append(first)
 
@@ -128,8 +128,8 @@ class WorkerPool:
             worker.stay_on(core)
 
     def submit(
-        self, function: Callable[Arguments, Value], *args: Arguments.args, **kwargs: Arguments.kwargs
-    ) -> Future[Value]:
+        self, function: Callable[_Arguments, _Value], *args: _Arguments.args, **kwargs: _Arguments.kwargs
+    ) -> Future[_Value]:
         """Call a function in one of the threads, where `here` is its worker; from any thread."""
         return self._threads.submit(function, *args, **kwargs)
 
@@ -138,7 +138,7 @@ class WorkerPool:
         """Whether this is one of the threads, which must not wait for another one."""
         return getattr(self._local, "is_ours", False)
 
-    def call(self, function: Callable[[], Value]) -> Value:
+    def call(self, function: Callable[[], _Value]) -> _Value:
         """Call a function in one of the threads, this one if it is one of them, and wait for its result."""
         return function() if self.is_here else self.submit(function).result()
 
@@ -149,27 +149,27 @@ class WorkerPool:
 
     def map_distinct(
         self,
-        function: Callable[[Sequence[Key]], Sequence[Called]],
-        keys: Iterable[Key],
+        function: Callable[[Sequence[_Key]], Sequence[_Called]],
+        keys: Iterable[_Key],
         *,
-        name: Callable[[Key], bytes],
-        then: Callable[[Called], Any] = lambda result: result,
+        name: Callable[[_Key], bytes],
+        then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
         """The results for keys, in their order, calling the function in threads; see `map_batches`."""
 
-        def submit(keys: Sequence[Key]) -> Future[Sequence[Called]]:
+        def submit(keys: Sequence[_Key]) -> Future[Sequence[_Called]]:
             return self._threads.submit(function, keys)
 
         return map_batches(submit, keys, workers=self.workers, name=name, then=then)
 
 
 def map_batches(
-    submit: Callable[[Sequence[Key]], Future[Sequence[Called]]],
-    keys: Iterable[Key],
+    submit: Callable[[Sequence[_Key]], Future[Sequence[_Called]]],
+    keys: Iterable[_Key],
     *,
     workers: int,
-    name: Callable[[Key], bytes],
-    then: Callable[[Called], Any] = lambda result: result,
+    name: Callable[[_Key], bytes],
+    then: Callable[[_Called], Any] = lambda result: result,
 ) -> Iterator[Any]:
     """The results for keys, in their order, with several calls under way at the same time.
 
@@ -185,9 +185,9 @@ def map_batches(
     """
     distinct = DistinctKeys(keys, name)
     waiting, failed = distinct.waiting, distinct.failed
-    running: dict[Future[Sequence[Called]], list[bytes]] = {}
-    ended: SimpleQueue[Future[Sequence[Called]]] = SimpleQueue()
-    calls = AHEAD * workers
+    running: dict[Future[Sequence[_Called]], list[bytes]] = {}
+    ended: SimpleQueue[Future[Sequence[_Called]]] = SimpleQueue()
+    calls = CALLS_PER_THREAD * workers
     with ResultFile() as done:
         while True:
             while len(running) < calls and (batch := distinct.batch(workers)):
@@ -220,11 +220,11 @@ def map_batches(
                     failed[named] = error
 
 
-def _next(queue: SimpleQueue[Value]) -> Value:
+def _next(queue: SimpleQueue[_Value]) -> _Value:
     """What comes next in a queue; signals are heard meanwhile, which polars keeps from ending a wait."""
     while True:
         with contextlib.suppress(Empty):
-            return queue.get(timeout=HEARD_S)
+            return queue.get(timeout=SIGNAL_POLL_SECONDS)
 
 
 def without_filter() -> str:
@@ -232,28 +232,28 @@ def without_filter() -> str:
     return NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 
 
-class DistinctKeys(Generic[Key]):
+class DistinctKeys(Generic[_Key]):
     """Keys with a name each, which are read a little ahead and handed out in batches, equal ones once."""
 
-    def __init__(self, keys: Iterable[Key], name: Callable[[Key], bytes]) -> None:
+    def __init__(self, keys: Iterable[_Key], name: Callable[[_Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
         self._seen: set[bytes] = set()
-        self._new: dict[bytes, Key] = {}  # read, and not yet handed out
+        self._new: dict[bytes, _Key] = {}  # read, and not yet handed out
         self._sent = 0
         self.waiting: deque[bytes] = deque()  # names of keys that were read, until somebody takes them
         self.failed: dict[bytes, BaseException] = {}
 
-    def batch(self, width: int) -> dict[bytes, Key]:
+    def batch(self, width: int) -> dict[bytes, _Key]:
         """New keys by name, for one call of so many that work at the same time.
 
         Batches grow, so that the first results come soon; the last ones shrink, so that all calls end at the
         same time. None is left once there are no more keys, or too many wait to be taken. What is raised when
         they are read comes in the place of the next one, as that of a name that fails.
         """
-        size = min(LARGEST, max(FEW, self._sent // 2))
+        size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
         share = -(-len(self._new) // width)
-        size = min(size, max(share, FEW if self._sent >= LARGEST else 1))
+        size = min(size, max(share, MIN_BATCH_KEYS if self._sent >= MAX_BATCH_KEYS else 1))
         batch = dict(islice(self._new.items(), size))
         for named in batch:
             del self._new[named]
@@ -262,7 +262,7 @@ class DistinctKeys(Generic[Key]):
 
     def _read(self, most: int) -> None:
         try:
-            while len(self._new) < most and len(self.waiting) < MOST_AHEAD:
+            while len(self._new) < most and len(self.waiting) < MAX_KEYS_AHEAD:
                 key = next(self._keys)
                 name = self._name(key)
                 self.waiting.append(name)
@@ -273,15 +273,15 @@ class DistinctKeys(Generic[Key]):
             pass
         except Exception as error:  # noqa: BLE001 - raised after the results of what was read before
             self._keys = iter(())
-            self.waiting.append(UNREADABLE)
-            self.failed[UNREADABLE] = error
+            self.waiting.append(UNREADABLE_KEY)
+            self.failed[UNREADABLE_KEY] = error
 
 
 class ResultFile:
     """Results by name, in a temporary file, so that a million of them need little memory."""
 
     def __init__(self) -> None:
-        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by __exit__
+        self._file = tempfile.SpooledTemporaryFile(RESULTS_IN_MEMORY)  # noqa: SIM115 - closed by __exit__
         self._places: dict[bytes, int] = {}
 
     def __enter__(self) -> Self:
@@ -309,10 +309,10 @@ class ResultFile:
 
 def shared_pool() -> WorkerPool:
     """The pool of this process, with one worker for each core, started on first use; a fork has its own."""
-    with SHARED.lock:
-        if SHARED.pool is None:
-            SHARED.pool = WorkerPool(cores()).__enter__()  # a pool that cannot start is not kept
-        return SHARED.pool
+    with SHARED_POOL.lock:
+        if SHARED_POOL.pool is None:
+            SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # a pool that cannot start is not kept
+        return SHARED_POOL.pool
 
 
 class SharedPool:
@@ -348,4 +348,4 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-SHARED = SharedPool()
+SHARED_POOL = SharedPool()

@@ -19,7 +19,7 @@ from codebotler.core.trace import Event, Option, Trace, attempted, options_of
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.settings import (
-    PAPER,
+    PAPER_SETTINGS,
     Matching,
     SimulationSettings,
     choose,
@@ -76,10 +76,10 @@ class Somebody:
         """Whether they are in the room now."""
         return self.looks_before == 0 and not self.is_gone
 
-    def answer(self, question: str, rules: SimulationSettings) -> Answer | None:
+    def answer(self, question: str, settings: SimulationSettings) -> Answer | None:
         """What they answer, if anything."""
         for topic, answer in self.person.topics:
-            if finds(question, topic, rules.matching):
+            if finds(question, topic, settings.matching):
                 return answer
         if not self.answers:
             return None
@@ -97,14 +97,14 @@ class SimulatedRobot:
     def __init__(
         self,
         world: World,
-        rules: SimulationSettings = PAPER,
+        settings: SimulationSettings = PAPER_SETTINGS,
         skills: SkillTable = SKILLS,
         *,
         guard: SkillGuard | None = None,
     ) -> None:
         self.guard = guard
-        self.world, self.rules, self.skills = world, rules, skills
-        self.setup: Setup = ("simulated", (world, rules))
+        self.world, self.settings, self.skills = world, settings, skills
+        self.setup: Setup = ("simulated", (world, settings))
         missing = () if skills is SKILLS else [name for name, row in skills.items() if row.does is None]
         if missing:
             raise UserError(f'the skill "{missing[0]}" cannot be simulated: nothing says what it does')
@@ -156,12 +156,12 @@ class SimulatedRobot:
         wanted = request.strip().lower()
         named = [room for room in self.rooms if room.lower() == wanted]
         if named:
-            leads_to = resolve_room(self.rooms, request, self.rules.matching)
+            leads_to = resolve_room(self.rooms, request, self.settings.matching)
             return [*named, *([] if leads_to is None else [leads_to])]
-        return [room for room in self.rooms if finds(request, room, self.rules.matching)]
+        return [room for room in self.rooms if finds(request, room, self.settings.matching)]
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """The same, whatever rules say."""
+        """The same, whatever settings say."""
         row = self.skills[skill]
         assert row.does is not None, "the robot was made with it"
         if row.adds_event or row.fails:
@@ -182,7 +182,7 @@ class SimulatedRobot:
     def drive(self, location: str) -> None:
         """Drive to the first room whose name is found in the request."""
         room = self.room_for(location)
-        if self.rules.events == "as-requested":
+        if self.settings.events == "as-requested":
             self.record(GOTO, location, destination=room)
         elif room is not None:
             self.record(GOTO, room, destination=room)
@@ -192,13 +192,13 @@ class SimulatedRobot:
 
     def room_for(self, request: str) -> str | None:
         """The first room whose name is found in a request; None if there is no such room."""
-        return resolve_room(self.rooms, request, self.rules.matching)
+        return resolve_room(self.rooms, request, self.settings.matching)
 
     def look(self, entity: str) -> bool:
         """Look for an object, else for a person; who was not there may come after looks in vain."""
-        rules, here = self.rules, self.people[self.room]
-        seen = any(thing.is_meant_by(entity, rules.matching) for thing in self.things[self.room])
-        seen = seen or any(one.is_here and is_called(one.person, entity, rules) for one in here)
+        settings, here = self.settings, self.people[self.room]
+        seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things[self.room])
+        seen = seen or any(one.is_here and is_called(one.person, entity, settings) for one in here)
         self.record(CHECK, entity, found=seen)
         if not any(one.is_here for one in here) and (
             coming := next((o for o in here if not o.is_gone), None)
@@ -213,11 +213,11 @@ class SimulatedRobot:
         if not options:
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
         here = (one for one in self.people[self.room] if one.is_here)
-        asked = next((one for one in here if is_called(one.person, person, self.rules)), None)
+        asked = next((one for one in here if is_called(one.person, person, self.settings)), None)
         if asked is None:
             raise RobotError("AskNoPerson", f'nobody is in "{self.room}" to be asked "{question}"')
-        answer = asked.answer(question, self.rules)
-        chosen = None if answer is None else choose(answer, question, options, self.rules)
+        answer = asked.answer(question, self.settings)
+        chosen = None if answer is None else choose(answer, question, options, self.settings)
         if chosen is None:
             offered = ", ".join(option.text for option in options)
             raise RobotError(
@@ -233,10 +233,10 @@ class SimulatedRobot:
                 "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
             )
         here = self.things[self.room]
-        thing = next((thing for thing in here if thing.is_meant_by(obj, self.rules.matching)), None)
+        thing = next((thing for thing in here if thing.is_meant_by(obj, self.settings.matching)), None)
         if thing is None:
             raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
-        self.record(PICK, obj if self.rules.events == "as-requested" else thing.label)
+        self.record(PICK, obj if self.settings.events == "as-requested" else thing.label)
         here.remove(thing)
         self.held, self.taken = obj, thing
 
@@ -245,8 +245,8 @@ class SimulatedRobot:
 
         Where events are recorded as they happened, any name that finds what it holds will do.
         """
-        taken = self.taken if self.rules.events == "as-happened" else None
-        is_meant = taken is not None and taken.is_meant_by(obj, self.rules.matching)
+        taken = self.taken if self.settings.events == "as-happened" else None
+        is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
             holds = "nothing" if self.held is None else f'"{self.held}"'
             raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')

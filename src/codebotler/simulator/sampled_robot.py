@@ -25,14 +25,14 @@ from codebotler.simulator.settings import SimulationSettings, finds
 AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves a program unchanged, as a robot will run it
 
 SOMEBODY = "somebody"
-PEOPLE = frozenset(  # words that mean whoever is there
+PERSON_WORDS = frozenset(  # words that mean whoever is there
     {
         *("", SOMEBODY, "someone", "anybody", "anyone", "everybody", "everyone", "all"),
         *("person", "persons", "people", "human", "humans", "human being"),
         *("another person", "other person", "other people"),
     }
 )
-AGREES = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
+AGREEING_TEXT = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
 _ARTICLE = re.compile(r"(?:the|an?|any|some)\s+")
 
 
@@ -121,7 +121,7 @@ class GivenAnswer:
 
 
 @dataclass(frozen=True)
-class Lot:
+class RandomOutcome:
     """The fact that a statement is true or not, or that a skill comes to something."""
 
     statement: str
@@ -134,7 +134,7 @@ class Lot:
         return f"{brief(self.statement)} {self.outcome}"
 
 
-Fact: TypeAlias = Whereabouts | GivenAnswer | Lot
+SampledFact: TypeAlias = Whereabouts | GivenAnswer | RandomOutcome
 
 
 # --- what a program has found out; names are those that `meant` gives
@@ -154,7 +154,7 @@ class ExploredRoom:
 
 
 @dataclass
-class Search:
+class RoomSearch:
     """The rooms in which a program looked for somebody or something, in vain or not."""
 
     vain: set[str] = field(default_factory=set)
@@ -180,23 +180,23 @@ class SampledRobot(SimulatedRobot):
         self,
         room_map: RoomMap,
         sampler: FactSampler,
-        rules: SimulationSettings = AS_WRITTEN,
+        settings: SimulationSettings = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         *,
         guard: SkillGuard | None = None,
     ) -> None:
         world = World(tuple(map(Room, room_map.rooms)), room_map.start)
-        super().__init__(world, rules, skills, guard=guard)
-        self.setup = "sampled", (room_map, sampler, rules)
+        super().__init__(world, settings, skills, guard=guard)
+        self.setup = "sampled", (room_map, sampler, settings)
         self.room_map, self.sampler = room_map, sampler
         self.things = defaultdict(list)
         self.people = defaultdict(list)  # of nobody whom a world file would name
         self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
         self.answers: dict[tuple[str, ...], str] = {}  # by room, person and question
         self.lots: dict[str, int] = {}  # outcomes of statements
-        self.facts: list[Fact] = []
+        self.facts: list[SampledFact] = []
         self.draws: list[Draw] = []
-        self.searches: defaultdict[str, Search] = defaultdict(Search)
+        self.searches: defaultdict[str, RoomSearch] = defaultdict(RoomSearch)
         self.excuses: set[str] = set()  # messages of errors
 
     @property
@@ -218,9 +218,9 @@ class SampledRobot(SimulatedRobot):
         """What the program has found out about the room that the robot is in."""
         return self.explored[self.room]
 
-    def search(self, name: str) -> Search:
+    def search(self, name: str) -> RoomSearch:
         """Where the program looked for somebody or something, also by a longer or a shorter name."""
-        all_of_them = Search()
+        all_of_them = RoomSearch()
         for sought, search in self.searches.items():
             if sought == name or (SOMEBODY not in {sought, name} and (sought in name or name in sought)):
                 all_of_them.vain |= search.vain
@@ -257,7 +257,7 @@ class SampledRobot(SimulatedRobot):
 
     def answer(self, options: Sequence[str], *question: str) -> str:
         """Draw the answer to a question."""
-        agreeing = next((i for i, text in enumerate(options) if AGREES.match(text)), 0)
+        agreeing = next((i for i, text in enumerate(options) if AGREEING_TEXT.match(text)), 0)
         drawn = self.sampler.answer(len(options), agreeing, *question)
         self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))
         return options[drawn]
@@ -268,7 +268,7 @@ class SampledRobot(SimulatedRobot):
         if statement not in self.lots:
             drawn = self.sampler.outcome(len(possible), statement)
             self.draws.append(Draw("outcome", (len(possible), statement), drawn))
-            self.facts.append(Lot(statement, possible[drawn]))
+            self.facts.append(RandomOutcome(statement, possible[drawn]))
             self.lots[statement] = drawn
         return self.lots[statement]
 
@@ -359,7 +359,7 @@ def meant(request: str) -> str:
     """Who or what a request means: without an article, and the same for all words for people."""
     name = " ".join(request.casefold().split())
     name = name.removeprefix(found[0]) if (found := _ARTICLE.match(name)) else name
-    return SOMEBODY if name in PEOPLE else name
+    return SOMEBODY if name in PERSON_WORDS else name
 
 
 def is_name(request: str) -> bool:

@@ -54,7 +54,7 @@ class SimulationSettings:
     clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # what clocks show when the run starts
 
 
-PAPER = SimulationSettings()
+PAPER_SETTINGS = SimulationSettings()
 ENDLESS = Limits(calls=10**12, trace=10**12)  # on a robot, where each skill refuels the program
 
 
@@ -94,11 +94,11 @@ def _anchored(label: str) -> str:
     return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
 
 
-def is_called(person: Person, request: str, rules: SimulationSettings) -> bool:
+def is_called(person: Person, request: str, settings: SimulationSettings) -> bool:
     """Whether a request means a person: by no name, their own, or a word for people."""
-    if rules.people == "answer-to-any-name" or not request.strip():
+    if settings.people == "answer-to-any-name" or not request.strip():
         return True
-    return any(finds(request, name, rules.matching) for name in (person.name, *rules.words_for_people))
+    return any(finds(request, name, settings.matching) for name in (person.name, *settings.words_for_people))
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
@@ -114,33 +114,33 @@ def _resolved(rooms: tuple[str, ...], request: str, matching: Matching) -> str |
 
 
 def choose(
-    answer: Answer, question: str, options: tuple[Option, ...], rules: SimulationSettings = PAPER
+    answer: Answer, question: str, options: tuple[Option, ...], settings: SimulationSettings = PAPER_SETTINGS
 ) -> int | None:
     """The position of the option that an answer means.
 
     The answer is looked for in the options. Failing that, a yes or a no is looked for in other words, if the
-    rules have any; and any other answer is a yes or a no to the question. An answer that is a number means
+    settings have any; and any other answer is a yes or a no to the question. An answer that is a number means
     the nearest option that there is, counted from 1, or from the end if it is negative.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
-    direct = _first_saying((answer,), options, rules.matching)
+    direct = _first_saying((answer,), options, settings.matching)
     if direct is not None:
         return direct
-    if answer in {"yes", "no"} and rules.words_for_no:
-        return _in_other_words(answer, options, rules)
-    means = "yes" if finds(question, answer, rules.matching) else "no"
-    found = _first_saying((means,), options, rules.matching)
-    return _in_other_words(means, options, rules) if found is None and rules.words_for_no else found
+    if answer in {"yes", "no"} and settings.words_for_no:
+        return _in_other_words(answer, options, settings)
+    means = "yes" if finds(question, answer, settings.matching) else "no"
+    found = _first_saying((means,), options, settings.matching)
+    return _in_other_words(means, options, settings) if found is None and settings.words_for_no else found
 
 
-def _in_other_words(answer: str, options: tuple[Option, ...], rules: SimulationSettings) -> int | None:
+def _in_other_words(answer: str, options: tuple[Option, ...], settings: SimulationSettings) -> int | None:
     """Which option means yes or no; the only one that does not mean no means yes, whatever it says."""
     if answer == "no":
-        return _first_saying(rules.words_for_no, options, rules.matching)
-    no = ("no", *rules.words_for_no)
-    may_be = [n for n, option in enumerate(options) if not _says(option.text, no, rules.matching)]
-    meant = [n for n in may_be if _says(options[n].text, rules.words_for_yes, rules.matching)]
+        return _first_saying(settings.words_for_no, options, settings.matching)
+    no = ("no", *settings.words_for_no)
+    may_be = [n for n, option in enumerate(options) if not _says(option.text, no, settings.matching)]
+    meant = [n for n in may_be if _says(options[n].text, settings.words_for_yes, settings.matching)]
     return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
 
 

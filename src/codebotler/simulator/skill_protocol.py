@@ -10,7 +10,7 @@ from typing import TypeAlias
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.ledger import LAST_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
+from codebotler.simulator.ledger import MAX_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
@@ -26,11 +26,11 @@ class SkillProtocol:
     """One run: answers what a fresh child asks until it ends, and says how it ended."""
 
     def __init__(self, child: IsolatedProcess, code: bytes, robot: SkillPerformer) -> None:
-        self.child, self.robot, self.limits = child, robot, robot.rules.limits
+        self.child, self.robot, self.limits = child, robot, robot.settings.limits
         self.ledger = Ledger(robot)
         self._heard = False
         self._skills = {skill.name: skill for skill in robot.skills.rows}
-        child.send((code, described(robot), settings_of(robot)))
+        child.send((code, described(robot), run_parameters(robot)))
 
     def outcome(self) -> Outcome:
         """Answer to the end, and say how the run ended."""
@@ -69,7 +69,7 @@ class SkillProtocol:
                 case _:
                     raise ProtocolError("a request is malformed")
             if self.robot.is_live:
-                self.robot.line = line if type(line) is int and 0 < line <= LAST_LINE else None
+                self.robot.line = line if type(line) is int and 0 < line <= MAX_LINE else None
             self.child.send((*self._answer(name, values, now), self.robot.now))
             overrun += self.ledger.limit is not None
             if overrun > OVERRUN:
@@ -113,10 +113,10 @@ def described(robot: SkillPerformer) -> Description:
     )
 
 
-def settings_of(robot: SkillPerformer) -> tuple[int, float, float, bool]:
+def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
     """What else a child is told of a run: fuel, simulated seconds, start of its clocks, if it is live."""
-    rules = robot.rules
-    return rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), robot.is_live
+    settings = robot.settings
+    return settings.limits.ticks, settings.limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:

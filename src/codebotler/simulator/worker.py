@@ -22,13 +22,13 @@ from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import SkillProtocol
 
-EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
+run_log = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 """A program, and what makes the robots with which it runs, one after the other."""
 Meanwhile: TypeAlias = Callable[[], object]
 """What is done while a child runs programs; what it returns does not matter."""
-NOTHING: Meanwhile = bool
+DO_NOTHING: Meanwhile = bool
 
 
 class Worker:
@@ -127,19 +127,21 @@ class Worker:
             self._fork_servers.popitem()[1].forget()
 
     def _prepare(self, source: str, robot: SkillPerformer) -> Prepared | Outcome:
-        lowercase = robot.rules.literals == "lowercase"
+        lowercase = robot.settings.literals == "lowercase"
         return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
 
-    def begin_to_prepare(self, source: str, skills: SkillTable, rules: SimulationSettings) -> None:
+    def begin_to_prepare(self, source: str, skills: SkillTable, settings: SimulationSettings) -> None:
         """Compile a program while the caller makes ready the robots with which it will run next."""
         try:
-            self._preparer.ask_ahead(source, lowercase=rules.literals == "lowercase", skills=tuple(skills))
+            self._preparer.ask_ahead(source, lowercase=settings.literals == "lowercase", skills=tuple(skills))
         except (LostProcessError, OSError):  # whoever runs it tries again, with a new preparer
             self._preparer.close()
 
     # --- several tame programs in a child
 
-    def run_tame(self, jobs: Sequence[Job], meanwhile: Meanwhile = NOTHING) -> dict[tuple[int, int], Outcome]:
+    def run_tame(
+        self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
+    ) -> dict[tuple[int, int], Outcome]:
         """The outcomes of tame programs, as far as they are certain, by the numbers of job and robot.
 
         While a child runs them, `meanwhile` is called, unless none is tame.
@@ -161,7 +163,7 @@ class Worker:
         robot = jobs[0][1][0]()
         if robot.guard is not None and robot.guard.may_refuse:
             return  # the child's copies refuse nothing
-        lowercase = robot.rules.literals == "lowercase"
+        lowercase = robot.settings.literals == "lowercase"
         sources, skills = [source for source, _ in jobs], tuple(robot.skills)
         if len(sources) == 1:
             told = [self._preparer.prepare(*sources, lowercase=lowercase, skills=skills)]
@@ -268,8 +270,8 @@ class Worker:
 
 
 def _log(source: str, what: str) -> None:
-    if EVENTS.isEnabledFor(logging.DEBUG):
-        EVENTS.debug("program %08x: %s", zlib.crc32(source.encode(errors="surrogatepass")), what)
+    if run_log.isEnabledFor(logging.DEBUG):
+        run_log.debug("program %08x: %s", zlib.crc32(source.encode(errors="surrogatepass")), what)
 
 
 def _log_end(source: str, outcome: Outcome) -> None:

@@ -157,7 +157,7 @@ def run_in_worlds(
 def robot_in(world: World, suite: Suite) -> SimulatedRobot:
     """A robot in a world, by the rules of a suite and of its house."""
     guard = None if suite.house is None else RuleGuard(suite.house.rules)
-    return SimulatedRobot(world, suite.rules, suite.skills, guard=guard)
+    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard)
 
 
 def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> tuple[bytes, ...] | None:

@@ -17,7 +17,7 @@ from typing import Generic, TypeVar
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import AHEAD, LARGEST, shared_pool
+from codebotler.simulator.pool import CALLS_PER_THREAD, MAX_BATCH_KEYS, shared_pool
 from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
 from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -167,7 +167,7 @@ class Rewards:
 
 def batches(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
     """Programs in batches, enough of them that all workers have some."""
-    size = max(1, min(LARGEST, -(-len(programs) // (AHEAD * workers))))
+    size = max(1, min(MAX_BATCH_KEYS, -(-len(programs) // (CALLS_PER_THREAD * workers))))
     return [programs[start : start + size] for start in range(0, len(programs), size)]
 
 

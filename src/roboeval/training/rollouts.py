@@ -14,7 +14,7 @@ from typing import TypeAlias
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import AHEAD, shared_pool
+from codebotler.simulator.pool import CALLS_PER_THREAD, shared_pool
 from roboeval.evaluation.judge import are_met, may_satisfy, robot_in
 from roboeval.evaluation.rewards import Remembered, Share, asked_in, total
 from roboeval.suites.families.tasks import WORLDS, trained_task
@@ -115,7 +115,7 @@ def _judge_ahead(
     waiting: deque[tuple[Batch, Future[list[Components]]]] = deque()
     try:
         while True:
-            for batch in islice(batches, AHEAD * pool.workers - len(waiting)):
+            for batch in islice(batches, CALLS_PER_THREAD * pool.workers - len(waiting)):
                 waiting.append((batch, pool.submit(judged, batch)))
             if not waiting:
                 return

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.simulator.pool import AHEAD, shared_pool
+from codebotler.simulator.pool import CALLS_PER_THREAD, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
 from roboeval.suites.families.suite import SPLITS
@@ -83,7 +83,7 @@ def test_only_a_few_batches_are_under_way(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(pool, "submit", counted)
     judge([saying(f"one of {number}") for number in range(400)])
-    assert 1 <= most[0] <= AHEAD * pool.workers
+    assert 1 <= most[0] <= CALLS_PER_THREAD * pool.workers
 
 
 def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.MonkeyPatch) -> None:

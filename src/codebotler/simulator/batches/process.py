@@ -24,7 +24,7 @@ from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, MAX_FR
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
-from codebotler.simulator.sandbox.fork_server import DOOR, serve
+from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
 from codebotler.simulator.sandbox.tame import GIVEN
 
@@ -41,18 +41,18 @@ if TYPE_CHECKING:
 __all__ = ["get_ready", "serve"]
 
 # In a process of its own, a program may call itself far deeper; what is too deep here is run again there.
-RECURSION_LIMIT = 400
-FEW = 50  # calls that are written one by one, also where some are equal
-LONGEST_CALL = 50_000  # bytes of what a skill is given; as one frame, more might be too long
-SURROGATE = b"\\ud"  # in JSON, half of a pair
-ODD = b"null"  # in the place of a transcript that a process of its own must decide
+BATCH_RECURSION_LIMIT = 400
+MAX_PLAIN_CALLS = 50  # calls that are written one by one, also where some are equal
+MAX_CALL_BYTES = 50_000  # bytes of what a skill is given; as one frame, more might be too long
+SURROGATE_ESCAPE = b"\\ud"  # in JSON, half of a pair
+UNDECIDED = b"null"  # in the place of a transcript that a process of its own must decide
 
 
 def get_ready(
     _role: str,
 ) -> tuple[socket, TranscribedRun, Callable[[TranscribedRun], None], Filter | None, int]:
     """Make all that batches need and share, and return what `serve` takes."""
-    door = socket(fileno=DOOR)
+    door = socket(fileno=RUN_DOOR)
     run = TranscribedRun()
     simulate_environment(run)
     rehearsal, lessons = loads(receive_setup(door))  # noqa: S302 - from the engine
@@ -105,7 +105,7 @@ def transcripts(
 class TranscribedRun(ProgramRun):
     """Runs one tame program after the other, and writes down what each asks of its robot."""
 
-    recursion_limit = RECURSION_LIMIT
+    recursion_limit = BATCH_RECURSION_LIMIT
 
     def __init__(self) -> None:
         super().__init__()
@@ -123,12 +123,17 @@ class TranscribedRun(ProgramRun):
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
         """Run a program with a robot, and return the transcript."""
         self._begin(ROBOTS[kind](*arguments))
-        rules = self.ledger.robot.rules
-        sys.setrecursionlimit(RECURSION_LIMIT)
-        settings = (rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), False)
-        end = self.execute(code, settings)
-        data = ODD if self.is_odd else self._written(end)
-        return ODD if self.is_odd or len(data) > MAX_FRAME else data
+        settings = self.ledger.robot.settings
+        sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
+        parameters = (
+            settings.limits.ticks,
+            settings.limits.seconds,
+            settings.clock_starts.timestamp(),
+            False,
+        )
+        end = self.execute(code, parameters)
+        data = UNDECIDED if self.is_odd else self._written(end)
+        return UNDECIDED if self.is_odd or len(data) > MAX_FRAME else data
 
     def _begin(self, robot: SimulatedRobot) -> None:
         """Be as before any run."""
@@ -204,9 +209,9 @@ class TranscribedRun(ProgramRun):
         return super().ended_by(error)
 
     def _written(self, end: str) -> bytes:
-        calls, order = (self._calls, None) if len(self._calls) <= FEW else distinct(self._calls)
+        calls, order = (self._calls, None) if len(self._calls) <= MAX_PLAIN_CALLS else distinct(self._calls)
         data = f"[{encoded([calls, order, self._moments])[1:-1]},{end}]".encode("ascii")
-        if len(data) > LONGEST_CALL or SURROGATE in data:
+        if len(data) > MAX_CALL_BYTES or SURROGATE_ESCAPE in data:
             self.is_odd = self.is_odd or not all(is_plain(each) for _, given, _, _ in calls for each in given)
         return data
 
@@ -252,7 +257,7 @@ def is_plain(given: Argument) -> bool:
     else:
         text = str(given)
     try:
-        return len(text.encode()) <= LONGEST_CALL
+        return len(text.encode()) <= MAX_CALL_BYTES
     except UnicodeEncodeError:
         return False
 

@@ -41,13 +41,15 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     end: dict[str, Any] | None  # None where the child waits for the answer to the last call
 
 
-Key: TypeAlias = tuple[Any, ...]  # a transcript as it is sent, and the ids of what its robot is made from
-MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 4_096  # transcripts, and bytes of one
+ReplayKey: TypeAlias = tuple[
+    Any, ...
+]  # a transcript as it is sent, and the ids of what its robot is made from
+MAX_REPLAYS, MAX_REPLAY_BYTES = 2_048, 4_096  # transcripts, and bytes of one
 # Outcomes of transcripts, and what the ids of their keys belong to, so that nothing else gets these ids.
-REPLAYED: dict[Key | None, tuple[Outcome, SkillTable, Setup]] = {}
+REPLAYED: dict[ReplayKey | None, tuple[Outcome, SkillTable, Setup]] = {}
 LAST_MOMENT = (-1, 0.0)  # after all of those in a transcript: of no call
 ONLY_TIME: SkillAnswer = ("time", None)
-DECODER = msgspec.json.Decoder(Transcript | None)
+TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 
 
 def message(programs: Programs) -> tuple[Description, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
@@ -111,16 +113,16 @@ def _frame(child: IsolatedProcess) -> bytes:
     return frame
 
 
-def key_of(frame: bytes, robot: SimulatedRobot) -> Key | None:
+def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
     """What a transcript is remembered by; None where it is long, or its robot of a kind of its own."""
-    if len(frame) > LONGEST_REMEMBERED or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
+    if len(frame) > MAX_REPLAY_BYTES or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
 
 
-def remember(key: Key, outcome: Outcome, robot: SimulatedRobot) -> None:
+def remember(key: ReplayKey, outcome: Outcome, robot: SimulatedRobot) -> None:
     """Keep what a transcript amounts to: many programs do the same in the same world."""
-    if len(REPLAYED) >= MOST_REMEMBERED:
+    if len(REPLAYED) >= MAX_REPLAYS:
         REPLAYED.clear()
     REPLAYED[key] = outcome, robot.skills, robot.setup
 
@@ -128,7 +130,7 @@ def remember(key: Key, outcome: Outcome, robot: SimulatedRobot) -> None:
 def decoded(frame: bytes) -> Transcript | None:
     """What a child says of a run; None where another process must decide."""
     try:
-        transcript: Transcript | None = DECODER.decode(frame)
+        transcript: Transcript | None = TRANSCRIPT_DECODER.decode(frame)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         raise ProtocolError("a transcript is malformed") from None
     return transcript

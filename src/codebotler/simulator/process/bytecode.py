@@ -19,7 +19,7 @@ from codebotler.simulator.sandbox.stdlib import IMPORTED
 
 SIMULATOR = __package__.rpartition(".")[0]
 SANDBOX = Path(__file__).parents[1] / "sandbox"
-SKILLS = SANDBOX.parents[1] / "core" / "skills"
+SKILLS_FOLDER = SANDBOX.parents[1] / "core" / "skills"
 CORE, BATCHES = "codebotler.core", f"{SIMULATOR}.batches"
 # What a child needs that has robots of its own, besides the sandbox.
 SIMULATION = (
@@ -28,7 +28,11 @@ SIMULATION = (
         f"{CORE}.{name}"
         for name in ("cachedproperty", "errors", "regex_flags", "trace", "unicode", "words", "world")
     ),
-    *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py")) if path.stem != "files"),
+    *(
+        f"{CORE}.skills.{path.stem}"
+        for path in sorted(SKILLS_FOLDER.glob("[a-z]*.py"))
+        if path.stem != "files"
+    ),
     *(f"{SIMULATOR}.{name}" for name in ("fact_sampler", "ledger", "robot", "settings", "sampled_robot")),
 )
 

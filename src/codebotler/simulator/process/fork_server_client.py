@@ -18,8 +18,8 @@ from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCE
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, described
 
-NUMBER = 8  # bytes of a number that it reports
-EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
+REPORT_BYTES = 8  # bytes of a number that it reports
+EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
 REHEARSALS = 8
 
 # A little of all that most programs do. A fork server runs this itself before it serves: what the interpreter
@@ -130,7 +130,7 @@ class ForkServer:
 
     def _rehearse(self) -> None:
         """Run an empty program: by then the heap of the fork server, which programs can see, has settled."""
-        SkillProtocol(self.fork(), EMPTY, SimulatedRobot(WARM_UP_WORLD)).outcome()
+        SkillProtocol(self.fork(), EMPTY_PROGRAM, SimulatedRobot(WARM_UP_WORLD)).outcome()
 
     def _ask_for_channel(self) -> socket.socket:
         ours, theirs = socket.socketpair()
@@ -156,7 +156,7 @@ class ForkServer:
         return self._read_report()
 
     def _read_report(self) -> int:
-        data = os.read(self._report, NUMBER)
+        data = os.read(self._report, REPORT_BYTES)
         if not data:
             raise LostProcessError("the fork server has ended")
         return int.from_bytes(data, sys.byteorder, signed=True)

@@ -17,8 +17,8 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.sandbox import HEADER, MAX_FRAME, MORE, PIECE, WITHOUT_REFERENCES
 
-LONGEST = 60.0  # seconds of waiting for a process in all; nothing that computes takes so long
-SILENCE = 1  # seconds after which a silent process is looked at
+MAX_WAIT_SECONDS = 60.0  # seconds of waiting for a process in all; nothing that computes takes so long
+SILENCE_SECONDS = 1  # seconds after which a silent process is looked at
 SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
 
 
@@ -34,12 +34,12 @@ class IsolatedProcess:
         has_seccomp: bool,  # so that it can be seen from outside whether it is isolated by now
     ) -> None:
         self._find_pid, self._channel, self._wait = find_pid, channel, wait
-        silence = struct.pack("ll", SILENCE, 0)
+        silence = struct.pack("ll", SILENCE_SECONDS, 0)
         for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call less than settimeout
             channel.setsockopt(socket.SOL_SOCKET, direction, silence)
         self._has_seccomp = has_seccomp
         self._buffer = bytearray()
-        self.patience = LONGEST  # seconds for which it will still be waited for
+        self.patience = MAX_WAIT_SECONDS  # seconds for which it will still be waited for
 
     @cached_property
     def pid(self) -> int:
@@ -121,7 +121,9 @@ class IsolatedProcess:
             self._be_patient(began)
 
     def _be_patient(self, since: float) -> None:
-        self.patience -= min(time.monotonic() - since, SILENCE)  # the rest is this process's own delay
+        self.patience -= min(
+            time.monotonic() - since, SILENCE_SECONDS
+        )  # the rest is this process's own delay
         if self.patience < 0:
             raise TimeoutError
 
@@ -148,7 +150,7 @@ class IsolatedProcess:
 
     def reset_patience(self) -> None:
         """Wait anew, since it has answered."""
-        self.patience = LONGEST
+        self.patience = MAX_WAIT_SECONDS
 
     def hang_up(self) -> None:
         """Close the channel."""

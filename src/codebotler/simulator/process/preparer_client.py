@@ -17,8 +17,10 @@ from codebotler.simulator.process.spawn import start
 from codebotler.simulator.sandbox import MAX_CODE, PLAIN, PREPARER, REFUSED, TAME
 
 MAX_SOURCE = 5_000_000
-LONG = 100_000  # characters: a longer program is prepared in a process of its own, more of them one by one
-SERVES = 2_000  # programs that one process prepares
+LONG_SOURCE = (
+    100_000  # characters: a longer program is prepared in a process of its own, more of them one by one
+)
+MAX_PREPARED = 2_000  # programs that one process prepares
 Skills: TypeAlias = tuple[str, ...]  # the names of those that a program may call
 EXHAUSTED = ("MemoryError", "TimeoutError", "Crash")
 
@@ -53,8 +55,8 @@ class Preparer:
         self, sources: Sequence[str], *, lowercase: bool, skills: Skills
     ) -> list[Prepared | Outcome]:
         """The same of several programs, which travel together where they are short."""
-        if sum(map(len, sources)) <= LONG:
-            if self._served + len(sources) > SERVES:
+        if sum(map(len, sources)) <= LONG_SOURCE:
+            if self._served + len(sources) > MAX_PREPARED:
                 self.close()
             results = self._ask(sources, lowercase, skills)
             if len(results) == len(sources) and not any(map(is_exhausted, results)):
@@ -64,7 +66,12 @@ class Preparer:
     def ask_ahead(self, source: str, *, lowercase: bool, skills: Skills) -> None:
         """Let the process begin with what `prepare` will be asked for next."""
         is_known = self._last is not None and self._last[0] == (source, lowercase, skills)
-        if not is_known and self._asked is None and self._served < SERVES and len(source) <= LONG:
+        if (
+            not is_known
+            and self._asked is None
+            and self._served < MAX_PREPARED
+            and len(source) <= LONG_SOURCE
+        ):
             self._send((source,), lowercase, skills)
 
     def start(self) -> IsolatedProcess:
@@ -98,7 +105,7 @@ class Preparer:
             self._process.hang_up()
 
     def _prepare(self, source: str, lowercase: bool, skills: Skills) -> Prepared | Outcome:  # noqa: FBT001 - private
-        if len(source) > LONG or self._served >= SERVES:
+        if len(source) > LONG_SOURCE or self._served >= MAX_PREPARED:
             self.close()
         served = self._served
         try:
@@ -108,7 +115,7 @@ class Preparer:
                 (result,) = self._ask((source,), lowercase, skills)
             return result
         finally:
-            if len(source) > LONG:
+            if len(source) > LONG_SOURCE:
                 self.close()
 
     def _ask(self, sources: Sequence[str], lowercase: bool, skills: Skills) -> list[Prepared | Outcome]:  # noqa: FBT001 - private

@@ -15,14 +15,14 @@ from codebotler.simulator.process.bytecode import BATCHES, SANDBOX, SIMULATOR, c
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.sandbox import BATCH_SERVER, FLAGS, FORK_SERVER, LIVE_SERVER, PREPARER
 
-MODULES = {PREPARER: f"{SIMULATOR}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}
+ROLE_MODULES = {PREPARER: f"{SIMULATOR}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}
 
 
 def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
     """Start a process in one of the roles, and hand it descriptors."""
     handed = (compiled_file(role).fileno(), *descriptors)
-    module = MODULES.get(role, f"{SIMULATOR}.sandbox.fork_server")
-    with ONE_AT_A_TIME:
+    module = ROLE_MODULES.get(role, f"{SIMULATOR}.sandbox.fork_server")
+    with START_LOCK:
         return subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
             [sys.executable, *FLAGS, str(SANDBOX / "start.py"), module, role, *map(str, handed)],
             stdin=subprocess.DEVNULL,
@@ -41,19 +41,19 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
         )
 
 
-ONE_AT_A_TIME = threading.Lock()
+START_LOCK = threading.Lock()
 # Who forks this process in the middle of a start would get half of it: a lock that nobody opens, and the end
 # of a pipe on whose closing the start waits.
 os.register_at_fork(
-    before=ONE_AT_A_TIME.acquire,
-    after_in_parent=ONE_AT_A_TIME.release,
-    after_in_child=ONE_AT_A_TIME.release,
+    before=START_LOCK.acquire,
+    after_in_parent=START_LOCK.release,
+    after_in_child=START_LOCK.release,
 )
 
 
 def compiled_file(role: str) -> IO[bytes]:
     """A file with the code of the modules that a process in one of the roles runs."""
-    with ONE_AT_A_TIME:
+    with START_LOCK:
         return _written_file(FORK_SERVER if role == LIVE_SERVER else role)
 
 

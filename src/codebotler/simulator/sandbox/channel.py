@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 # Functions below look here for `len` and the like, and not where a program can write.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
 
-TOO_LONG = '["too-long",[],0.0]'
+TOO_LONG_REQUEST = '["too-long",[],0.0]'
 
 
 def send(text: str) -> None:
     """Write one frame of JSON, which is ASCII."""
     if len(text) > MAX_FRAME:
-        text = TOO_LONG
+        text = TOO_LONG_REQUEST
     send_bytes(text.encode("ascii"))
 
 

@@ -11,7 +11,7 @@ import time
 import types
 from _sitebuiltins import Quitter
 
-from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, ProgramRun
+from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, ProgramRun
 from codebotler.simulator.sandbox.locks import simulate_locks
 
 TYPE_CHECKING = False
@@ -39,7 +39,7 @@ def simulate_environment(run: ProgramRun) -> None:
     forbid_watching()
     for name in ("exit", "quit"):
         setattr(builtins, name, Quitter(name, "Ctrl-D (i.e. EOF)"))
-    sys.setrecursionlimit(RECURSION_LIMIT)
+    sys.setrecursionlimit(PROGRAM_RECURSION_LIMIT)
 
 
 def forbid_watching() -> None:

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
     Parameter: TypeAlias = tuple[str, str, tuple[Any, ...], str]  # name, kind, choices if any, and words
     Skills: TypeAlias = tuple[tuple[str, tuple[Parameter, ...]], ...]
-    Settings: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
+    RunParameters: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
 
 # Functions below look here for `len` and the like, and not where a program can write.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
 
 # Python 3.11 counts calls into C as well: with one more, a function can call itself as often as under 3.12.
-RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
+PROGRAM_RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
 HEADROOM = 50  # for what a skill calls, so that the limit is met by the program, not on the way to the robot
 
 COROUTINE = 0x80  # among the flags of code
@@ -37,7 +37,7 @@ UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not as
 class ProgramRun:
     """One run of one program; all that can be is made before the fork, in the fork server."""
 
-    recursion_limit = RECURSION_LIMIT
+    recursion_limit = PROGRAM_RECURSION_LIMIT
 
     def __init__(self) -> None:
         self.skills: Skills = ()
@@ -61,9 +61,9 @@ class ProgramRun:
         names.update((name, self.skill(name, parameters)) for name, parameters in skills)
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
-    def execute(self, code: bytes | types.CodeType, settings: Settings) -> str:
+    def execute(self, code: bytes | types.CodeType, parameters: RunParameters) -> str:
         """Run the program, marshalled or not, to its end; how it ended, as JSON."""
-        self.fuel, self.seconds, self.start, self.is_live = settings
+        self.fuel, self.seconds, self.start, self.is_live = parameters
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
         try:
@@ -84,7 +84,7 @@ class ProgramRun:
         self.spent = self.entered = False
         self.refused_at = None
         self.codes.clear()
-        RAISED.clear()
+        ROBOT_ERROR_CLASSES.clear()
         self.refuel()
         provided = vars(self.namespace)
         provided.clear()
@@ -169,7 +169,7 @@ class ProgramRun:
         names = ", ".join(parameter[0] for parameter in parameters)
         arguments = "".join(f"{parameter[0]}, " for parameter in parameters)
         types_: list[tuple[type | str, Parameter]] = [
-            (each[1] if each[2] else USUAL.get(each[1], each[1]), each) for each in parameters
+            (each[1] if each[2] else EXACT_TYPES.get(each[1], each[1]), each) for each in parameters
         ]
         self.kinds[name] = [kind for _, kind, _, _ in parameters]
         scope = {
@@ -206,7 +206,9 @@ class ProgramRun:
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Ask the engine for a skill."""
         kinds = self.kinds[name]
-        given = [WRITTEN.get(kind, value_text)(value) for kind, value in zip(kinds, arguments, strict=True)]
+        given = [
+            JSON_WRITERS.get(kind, value_text)(value) for kind, value in zip(kinds, arguments, strict=True)
+        ]
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
@@ -264,11 +266,13 @@ def check_fit(name: str, parameter: Parameter, value: Any, given: type) -> None:
         for each in list.__iter__(value):
             check_fit(name, (named, base, choices, words), each, type(each))
         return
-    if not (given is KINDS.get(kind) or (kind == "float" and given is int)):
+    if not (given is PARAMETER_TYPES.get(kind) or (kind == "float" and given is int)):
         raise TypeError(f"{name}: {named} must be {words}, not {NAME_OF(given)}")
     if choices and value not in choices:
         raise ValueError(f"{name}: {named} must be {words}, not {repr(value)[:100]}")
-    if (given is int and not -LARGEST <= value <= LARGEST) or (given is float and value - value != 0):
+    if (given is int and not -MAX_EXACT_INT <= value <= MAX_EXACT_INT) or (
+        given is float and value - value != 0
+    ):
         raise ValueError(f"{name}: {named} is out of range")
 
 
@@ -312,10 +316,10 @@ def message_of(error: BaseException) -> str:
         return ""
 
 
-USUAL: dict[str, type] = {"str": str, "list": list}
-KINDS: dict[str, type] = {**USUAL, "int": int, "float": float, "bool": bool}
-WRITTEN: dict[str, Callable[[Any], str]] = {"str": quoted, "list": options_text}
-LARGEST = 2**53  # of whole numbers that JSON carries exactly
+EXACT_TYPES: dict[str, type] = {"str": str, "list": list}
+PARAMETER_TYPES: dict[str, type] = {**EXACT_TYPES, "int": int, "float": float, "bool": bool}
+JSON_WRITERS: dict[str, Callable[[Any], str]] = {"str": quoted, "list": options_text}
+MAX_EXACT_INT = 2**53  # of whole numbers that JSON carries exactly
 NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
 """The name of a class, past what a metaclass of the program may say."""
 
@@ -331,15 +335,15 @@ class SkillError(Exception):
 
 
 SkillError.__name__ = SkillError.__qualname__ = "RobotError"  # as programs see it
-RAISED: dict[str, type[SkillError]] = {}
+ROBOT_ERROR_CLASSES: dict[str, type[SkillError]] = {}
 
 
 def robot_error(number: int, kind: str, text: str) -> SkillError:
     """An error of the robot, of one class for each kind."""
-    if kind not in RAISED:
-        RAISED[kind] = type(kind, (SkillError,), {"__module__": "robot"})
-    RAISED[kind].number = number
-    error = RAISED[kind](text)
+    if kind not in ROBOT_ERROR_CLASSES:
+        ROBOT_ERROR_CLASSES[kind] = type(kind, (SkillError,), {"__module__": "robot"})
+    ROBOT_ERROR_CLASSES[kind].number = number
+    error = ROBOT_ERROR_CLASSES[kind](text)
     error.number = number
     return error
 

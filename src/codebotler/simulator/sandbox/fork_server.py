@@ -25,9 +25,12 @@ if TYPE_CHECKING:
 
     Run = TypeVar("Run", bound=ProgramRun)
 
-DOOR, REPORT = 5, 6  # descriptors: by which runs are asked for, and on which numbers are reported
-PID = 8  # bytes of a process id: as an int, a small one would take no memory and a large one some
-DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
+RUN_DOOR, REPORT_DESCRIPTOR = (
+    5,
+    6,
+)  # descriptors: by which runs are asked for, and on which numbers are reported
+PID_BYTES = 8  # bytes of a process id: as an int, a small one would take no memory and a large one some
+DESCRIPTOR_BYTES = 4  # bytes of one descriptor on its way through a socket
 
 
 def get_ready(
@@ -35,7 +38,7 @@ def get_ready(
 ) -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
     """Make all that runs need and share, and return what `serve` takes."""
     seconds = LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
-    door = socket(fileno=DOOR)
+    door = socket(fileno=RUN_DOOR)
     run = ProgramRun()
     simulate_environment(run)
     skills, lessons = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
@@ -99,7 +102,7 @@ def one_run(
     line = asked_for(door)
     if line < 0:
         return False
-    parent = getpid().to_bytes(PID, "big")
+    parent = getpid().to_bytes(PID_BYTES, "big")
     pid = os.fork()
     if pid == 0:
         try:
@@ -116,14 +119,14 @@ def one_run(
 
 def asked_for(door: socket) -> int:
     """Wait for the next run, reap the last child, and return the new one's socket; -1 where none comes."""
-    ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR))[1]
+    ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR_BYTES))[1]
     if not ancillary:
         return -1
     try:  # noqa: SIM105 - contextlib is large
         os.waitpid(-1, 0)
     except ChildProcessError:
         pass
-    return int.from_bytes(ancillary[0][2][:DESCRIPTOR], sys.byteorder)
+    return int.from_bytes(ancillary[0][2][:DESCRIPTOR_BYTES], sys.byteorder)
 
 
 def end_of(pid: int) -> int:
@@ -141,19 +144,19 @@ def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> N
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
-    if getppid().to_bytes(PID, "big") != parent:  # it died before that: no signal will come
+    if getppid().to_bytes(PID_BYTES, "big") != parent:  # it died before that: no signal will come
         os._exit(1)
     enclose(seccomp, seconds)
 
 
 def execute(run: ProgramRun) -> None:
     """Run the program that the engine sends, and report how it ended."""
-    code, skills, settings = receive()
+    code, skills, parameters = receive()
     if skills != run.skills:
         run.provide(skills)
-    send(run.execute(code, settings))
+    send(run.execute(code, parameters))
 
 
 def report(number: int) -> None:
     """Report a number to the engine."""
-    os.write(REPORT, number.to_bytes(8, sys.byteorder, signed=True))
+    os.write(REPORT_DESCRIPTOR, number.to_bytes(8, sys.byteorder, signed=True))

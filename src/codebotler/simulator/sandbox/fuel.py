@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-TASK = "task_program"
-TOO_LARGE = "the program is too large, or nested too deeply"
-DEEPEST = 250
-MOST_BLOCKS = 20
-BLOCKS = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
-LEAVES = frozenset({"ctx", "op", "ops"})  # fields whose nodes only name something
+TASK_NAME = "task_program"
+PROGRAM_TOO_LARGE = "the program is too large, or nested too deeply"
+MAX_DEPTH = 250
+MAX_NESTED_BLOCKS = 20
+BLOCK_NODES = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
+LEAF_FIELDS = frozenset({"ctx", "op", "ops"})  # fields whose nodes only name something
 WITH_LEAVES = frozenset(
     {*(ast.Name, ast.Attribute, ast.Subscript, ast.Starred, ast.List, ast.Tuple), *(ast.BinOp, ast.BoolOp)}
     | {ast.UnaryOp, ast.Compare, ast.AugAssign}
 )
-SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
+SCOPE_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 
 def prepared(
@@ -49,7 +49,7 @@ def prepared(
             note_entries(statement)
         return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), tame
     except (RecursionError, MemoryError):
-        raise MemoryError(TOO_LARGE) from None
+        raise MemoryError(PROGRAM_TOO_LARGE) from None
 
 
 def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
@@ -62,18 +62,18 @@ def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
     while waiting:
         node, depth, blocks = waiting.pop()
         kind = type(node)
-        if depth > DEEPEST - (kind in WITH_LEAVES):
+        if depth > MAX_DEPTH - (kind in WITH_LEAVES):
             raise MemoryError
-        if kind in SCOPES:
+        if kind in SCOPE_NODES:
             blocks = 0
-        elif kind in BLOCKS:
+        elif kind in BLOCK_NODES:
             blocks += 1
-            if blocks > MOST_BLOCKS:
+            if blocks > MAX_NESTED_BLOCKS:
                 raise SyntaxError("too many statically nested blocks", (PROGRAM, node.lineno, 1, None))  # type: ignore[attr-defined]  # by the line above
         nodes[kind].append(node)
         depth += 1
         for name in kind._fields:
-            if name not in LEAVES:
+            if name not in LEAF_FIELDS:
                 child = getattr(node, name, None)
                 if type(child) is list:
                     waiting += [(each, depth, blocks) for each in child if isinstance(each, ast.AST)]
@@ -137,7 +137,7 @@ def in_comprehension(node: ast.comprehension) -> None:
 
 def at_start(node: ast.Call) -> None:
     """Note that the task is called by its name."""
-    if isinstance(node.func, ast.Name) and node.func.id == TASK:
+    if isinstance(node.func, ast.Name) and node.func.id == TASK_NAME:
         start = call(BY_NAME, node.func).value
         node.func = ast.copy_location(ast.BoolOp(ast.Or(), [start, node.func]), node.func)
 
@@ -152,7 +152,7 @@ def note_entries(statement: ast.stmt) -> None:
         elif isinstance(node, ast.Lambda):
             enter = call(ENTER, node.body).value
             node.body = ast.copy_location(ast.BoolOp(ast.Or(), [enter, node.body]), node.body)
-        if not isinstance(node, SCOPES):
+        if not isinstance(node, SCOPE_NODES):
             waiting.extend(ast.iter_child_nodes(node))
 
 

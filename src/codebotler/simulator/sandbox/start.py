@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     import types
     from typing import NoReturn
 
-FIRST = 4  # of the descriptors that the engine hands over
-CODES = FIRST  # a file with the code of our own modules
+FIRST_DESCRIPTOR = 4  # of the descriptors that the engine hands over
+CODES_DESCRIPTOR = FIRST_DESCRIPTOR  # a file with the code of our own modules
 STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
@@ -24,9 +24,9 @@ def main(module: str, role: str, descriptors: list[str]) -> None:
         start_again(list(map(int, descriptors)))
     if role not in ("preparer", "batch-fork-server"):  # bytecode, now there and now not, would move the heap
         sys.pycache_prefix = os.devnull  # of what is not handed over
-    modules = CompiledModules(loads(os.pread(CODES, os.fstat(CODES).st_size, 0)))  # noqa: S302 - from the engine
+    modules = CompiledModules(loads(os.pread(CODES_DESCRIPTOR, os.fstat(CODES_DESCRIPTOR).st_size, 0)))  # noqa: S302 - from the engine
     sys.meta_path.insert(0, modules)
-    os.close(CODES)
+    os.close(CODES_DESCRIPTOR)
     taken_on = __import__(module, fromlist=["serve"])
     ready = taken_on.get_ready(role)
     modules.codes.clear()  # nothing is imported any more
@@ -66,7 +66,7 @@ class CompiledModules:
 
 
 def start_again(descriptors: list[int]) -> NoReturn:
-    """Start the interpreter again, with descriptors from FIRST on and with fixed addresses.
+    """Start the interpreter again, with descriptors from FIRST_DESCRIPTOR on and with fixed addresses.
 
     A program may say an address. It must be the same in every start, and even the lengths of arguments and
     the numbers of descriptors would move it.
@@ -75,9 +75,9 @@ def start_again(descriptors: list[int]) -> NoReturn:
     from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - the same
 
     forget_the_shell()
-    end = FIRST + len(descriptors)
+    end = FIRST_DESCRIPTOR + len(descriptors)
     copies = [fcntl(descriptor, F_DUPFD, end) for descriptor in descriptors]
-    for number, copy in enumerate(copies, FIRST):
+    for number, copy in enumerate(copies, FIRST_DESCRIPTOR):
         os.dup2(copy, number, inheritable=True)
     os.closerange(end, 65536)
     if sys.platform == "linux":

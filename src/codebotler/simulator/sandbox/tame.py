@@ -38,7 +38,7 @@ def words(text: str) -> frozenset[str]:
 CONSUMERS = words("all any dict len list max min next sorted sum tuple")
 FUNCTIONS = CONSUMERS | words("abs bool chr divmod float int ord pow print range repr round str")
 ITERATORS = words("enumerate filter map reversed zip")
-CLASSES = words("bool dict float int list str tuple")  # for `isinstance` and annotations
+DATA_CLASSES = words("bool dict float int list str tuple")  # for `isinstance` and annotations
 ERRORS = words(
     """
     ArithmeticError AssertionError AttributeError BaseException EOFError Exception IndexError KeyError
@@ -57,7 +57,7 @@ TEXT_METHODS = words(
     rfind rindex rjust rpartition rsplit rstrip split splitlines startswith strip swapcase title upper zfill
     """
 )
-METHODS = TEXT_METHODS | words(
+DATA_METHODS = TEXT_METHODS | words(
     "append clear copy extend get insert pop popitem remove reverse setdefault sort update"
 )
 CONSUMING_METHODS = words("extend join update")
@@ -162,7 +162,7 @@ class Verifier:
         match node:
             case ast.Constant(value) if value is None or value is ... or isinstance(value, str):
                 pass
-            case ast.Name(name) if name in CLASSES or self.is_data(name):
+            case ast.Name(name) if name in DATA_CLASSES or self.is_data(name):
                 pass
             case ast.Subscript(of, inner):
                 self.annotation(of)
@@ -245,7 +245,7 @@ class Verifier:
             self.value(part)
         elif isinstance(part, ast.stmt):
             STATEMENTS.get(type(part), wild)(self, part)
-        elif isinstance(part, ast.AST) and not isinstance(part, OPERATORS):
+        elif isinstance(part, ast.AST) and not isinstance(part, OPERATOR_NODES):
             wild()
 
     # --- expressions
@@ -283,7 +283,7 @@ class Verifier:
                 self.value(body)
             case ast.Name(name) if self.is_own(name) or self.is_given(name, FUNCTIONS - {"next"}):
                 pass
-            case ast.Attribute(ast.Name("str"), method) if self.is_given("str", CLASSES):
+            case ast.Attribute(ast.Name("str"), method) if self.is_given("str", DATA_CLASSES):
                 if method not in TEXT_METHODS:
                     wild()
             case ast.Attribute(of, "get" | "count" | "index"):
@@ -306,7 +306,7 @@ class Verifier:
                 self.arguments(node.args, node.keywords)
             case ast.Attribute(ast.Constant(str(text)), "format") if PLAIN_FIELDS.fullmatch(text):
                 self.arguments(node.args, node.keywords)
-            case ast.Attribute(of, method) if method in METHODS:
+            case ast.Attribute(of, method) if method in DATA_METHODS:
                 self.value(of)
                 self.method(method, node)
             case _:
@@ -320,7 +320,7 @@ class Verifier:
             case _:
                 wild()
         for kind in kinds.elts if isinstance(kinds, ast.Tuple) else [kinds]:
-            if not (isinstance(kind, ast.Name) and self.is_given(kind.id, CLASSES)):
+            if not (isinstance(kind, ast.Name) and self.is_given(kind.id, DATA_CLASSES)):
                 wild()
 
     def builtin(self, name: str, node: ast.Call) -> None:
@@ -459,7 +459,7 @@ def hidden_in(function: ast.FunctionDef) -> set[str]:
     return names
 
 
-OPERATORS = (ast.operator, ast.boolop, ast.unaryop, ast.expr_context)
+OPERATOR_NODES = (ast.operator, ast.boolop, ast.unaryop, ast.expr_context)
 OWN_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.DictComp, ast.GeneratorExp)
 STATEMENTS: dict[type[ast.AST], Callable[[Verifier, Any], None]] = {
     **dict.fromkeys(
