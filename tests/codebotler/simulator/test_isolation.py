@@ -145,7 +145,8 @@ def test_programs_are_kept_in_whoever_runs_the_engine(
 
 BELOW_A_FILTER = """
 import ctypes, platform, struct, sys
-from codebotler.simulator.sandbox.isolation import ALLOW, DENY, EQUAL, FIRST_ARGUMENT, LOAD, SYSCALL_NUMBER, RETURN
+from codebotler.simulator.sandbox.isolation import ALLOW, DENY, EQUAL, FIRST_ARGUMENT, LOAD, RETURN
+from codebotler.simulator.sandbox.isolation import SYSCALL_NUMBER
 from codebotler.simulator.sandbox.isolation import PR_SET_SECCOMP, install, refuse_new_rights
 
 prctl, seccomp = {"x86_64": (157, 317), "aarch64": (167, 277)}[platform.machine()]

@@ -1,4 +1,4 @@
-"""The settings by which a suite is stricter: whole words, own names, what happened; people who come and go."""
+"""The settings by which a suite is stricter: whole words, own names, what happened; people who leave."""
 
 from pathlib import Path
 

@@ -17,6 +17,7 @@ from codebotler.simulator.process.preparer_client import LONG_SOURCE, Prepared, 
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
+from codebotler.simulator.sandbox.tame_expressions import GIVEN
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
 from in_process import all_of
@@ -508,7 +509,7 @@ def names_of_ordinary_programs() -> list[str]:
 def test_each_name_that_other_programs_find_is_allowed_or_makes_a_program_wild() -> None:
     names = names_of_ordinary_programs()
     assert {"say", "print", "exit", "sys", "time", "open", "__name__", "__spec__"} < set(names)
-    allowed = NAMES | tame.GIVEN | {"time", "__name__"}
+    allowed = NAMES | GIVEN | {"time", "__name__"}
     places = [*NAMED, "x = {}", "{}.time()", "say({})", "f(*{})", "try: pass\nexcept {}: pass", "raise {}(1)"]
     own = {"None", "True", "False", "task_program"}
     for name in (name for name in names if name.isidentifier() and name not in own):

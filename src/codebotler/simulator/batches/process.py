@@ -26,7 +26,7 @@ from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
 from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
-from codebotler.simulator.sandbox.tame import GIVEN
+from codebotler.simulator.sandbox.tame_expressions import GIVEN
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
