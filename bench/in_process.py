@@ -26,7 +26,7 @@ from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, Limi
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.sandbox.preparer import answer
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
-from codebotler.simulator.skill_protocol import described, run_parameters
+from codebotler.simulator.skill_protocol import describe_skills, run_parameters
 
 CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
@@ -46,7 +46,7 @@ class Bare(ProgramRun):
     def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__()
         self.robot, self.limits = robot, robot.settings.limits
-        self.provide(described(robot))
+        self.provide(describe_skills(robot))
         self.fuel, self.seconds, self.left = self.limits.ticks, self.limits.seconds, self.limits.calls
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - as in ProgramRun

@@ -54,12 +54,12 @@ class Sample:
 
     def is_as_in(self, sampler: FactSampler) -> bool:
         """Whether a run in another world would meet the same facts, and so be the same."""
-        return all(draw.is_drawn_by(sampler) for draw in self.draws)
+        return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
     def drawn(self) -> tuple[str, ...]:
         """The facts that chance settled, in words."""
-        return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.by_lot))
+        return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.is_random))
 
     @property
     def world(self) -> str:
@@ -133,7 +133,7 @@ class Check:
             "samples": [
                 {
                     "sample": sample.number,
-                    "world": [{"fact": f.sentence, "drawn": f.by_lot} for f in sample.facts],
+                    "world": [{"fact": f.sentence, "drawn": f.is_random} for f in sample.facts],
                     "in_vain": sample.in_vain,
                     **outcome_data(sample.outcome, skills),
                 }

@@ -143,7 +143,7 @@ def unexplored(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactS
     found: list[FactSampler] = []
     for sample, sampler in zip(ran, drew, strict=True):
         for draw in sample.draws:
-            for other in draw.others:
+            for other in draw.alternatives:
                 if (other.method, other.arguments, other.result) not in met:
                     met.add((other.method, other.arguments, other.result))
                     found.append(replace(sampler, forced=(*sampler.forced, other)))

@@ -238,7 +238,7 @@ class LiveRobot:
 
     def _goals(self, request: str) -> list[str]:
         """Return the rooms that a request may mean, as rules name them."""
-        rooms = [] if self._room_map is None else self._room_map.rooms_meant(request)
+        rooms = [] if self._room_map is None else self._room_map.possible_rooms(request)
         return [*dict.fromkeys(name_of(room, request) for room in rooms)]
 
     def _ask_room(self) -> str | None:

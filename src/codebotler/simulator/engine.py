@@ -1,4 +1,4 @@
-"""Runs programs in worlds, in isolation; equal pairs run once, and results come in order."""
+"""Runs programs in worlds, in isolation; equal pairs run once, and outcomes keep the order of the pairs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def run(
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
-    """Run programs in worlds, read as they are needed, and yield their outcomes in the order of the pairs."""
+    """Run programs in worlds lazily, and yield their outcomes in the order of the pairs."""
     with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:
@@ -45,7 +45,7 @@ def run(
 
 
 def digest(*texts: str) -> bytes:
-    """A short name for texts, which no other texts have."""
+    """A hash of some texts, each with its length."""
     hashed = hashlib.sha256()
     for text in texts:
         data = text.encode(errors="surrogatepass")

@@ -232,7 +232,7 @@ def _attempts(
     names: list[str] = []
     for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
         if is_drive:
-            names += [name_of(room, request) for room in robot.meant_rooms(request)]
+            names += [name_of(room, request) for room in robot.possible_rooms(request)]
         else:
             names += _names_of_thing(robot, attempt.kind, request)
     for name in dict.fromkeys(names):

@@ -662,7 +662,7 @@ def test_replay_does_what_was_done() -> None:
 def test_replay_reaches_the_limits_that_were_reached(calls: object, order: object, moments: object) -> None:
     ledger = follow(calls, order, moments, TIGHT).ledger
     assert ledger.limit is not None
-    outcome = ledger.ended({"end": "finished"})
+    outcome = ledger.outcome_at_end({"end": "finished"})
     assert (outcome.status, outcome.error) == (Status.TIMEOUT, RunError("TimeoutError", ledger.limit))
 
 

@@ -12,12 +12,12 @@ import msgspec
 from codebotler.core.skills.table import Parameter, SkillTable
 from codebotler.core.skills.values import TEXT_TYPE, Scalar
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, kept
+from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, judge_end
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
 from codebotler.simulator.sandbox import MAX_FRAME
-from codebotler.simulator.skill_protocol import Description, described
+from codebotler.simulator.skill_protocol import Description, describe_skills
 
 Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
 """The code of each program, and a robot for each of its runs."""
@@ -63,7 +63,7 @@ def message(programs: Programs) -> tuple[Description, tuple[str, ...], bytes, li
         told.append((code, keys))
     numbers = {key: number for number, key in enumerate(setups)}
     numbered = [(code, [numbers[key] for key in keys]) for code, keys in told]
-    return described(robot), robot.own_skills, pickle.dumps(list(setups.values()), protocol=5), numbered
+    return describe_skills(robot), robot.own_skills, pickle.dumps(list(setups.values()), protocol=5), numbered
 
 
 def outcomes(
@@ -95,7 +95,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
                 raise ProtocolError("a rule ends the run, and the child waits")
             return None  # by itself, it also has the line at which the rule ends it
         if transcript.end is not None:
-            outcome = kept(replay.ledger.ended(transcript.end), robot)
+            outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
                 raise ProtocolError("an end is malformed")
             if key is not None:

@@ -16,7 +16,7 @@ from codebotler.simulator.process.spawn import start
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
-from codebotler.simulator.skill_protocol import SkillProtocol, described
+from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
 
 REPORT_BYTES = 8  # bytes of a number that it reports
 EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
@@ -114,7 +114,7 @@ class ForkServer:
 
     def _set_up(self) -> None:
         """Let it get ready, and learn whether its children will be behind a filter of system calls."""
-        setup = (described(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
+        setup = (describe_skills(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
         self._door.sendall(marshal.dumps(setup, WITHOUT_REFERENCES))
         for _ in range(self._read_report()):
             self._warm_up()
