@@ -92,7 +92,9 @@ class Somebody:
 
 
 class SimulatedRobot:
-    """A robot in its own copy of a world, with the trace of what it has done."""
+    """A robot in its own copy of a world, with its trace."""
+
+    is_copied = True  # in the child of a batch; subclasses are not, unless they say so
 
     def __init__(
         self,
@@ -135,7 +137,11 @@ class SimulatedRobot:
     @property
     def own_skills(self) -> tuple[str, ...]:
         """The skills declared elsewhere, which a copy made from `setup` would lack."""
-        return own_skills(self, SimulatedRobot)
+        if "is_copied" not in vars(type(self)):
+            return tuple(self.skills)
+        if self.skills is SKILLS:
+            return ()
+        return tuple(name for name, row in self.skills.items() if row.does is not _USUAL.get(name))
 
     @property
     def idle_skills(self) -> frozenset[str]:
@@ -150,7 +156,7 @@ class SimulatedRobot:
         return self.execute(skill, arguments)
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """All rooms that a request may mean; for the exact name of one, only those where it leads."""
+        """All rooms that a request may mean; for an exact name, only those where it leads."""
         wanted = request.strip().lower()
         named = [room for room in self.rooms if room.lower() == wanted]
         if named:
@@ -234,7 +240,7 @@ class SimulatedRobot:
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the held object, named as in the pick; any matching name will do for as-happened events."""
+        """Put down the held object, named as in the pick; as-happened events allow any matching name."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
@@ -357,24 +363,11 @@ class SimulatedRobot:
 
     def repeat(self, events: Sequence[Event]) -> None:
         """Add copies of earlier events in this room."""
-        for event in events:
-            seen = event.kind, event.text, event.options, event.answer, event.found
-            self.events.append(Event(*seen, self.room, self.now, event.holding, event.to))
+        self.events += [replace(event, time=self.now) for event in events]
 
     def amend(self, answer: str) -> None:
         """Add an answer to the last event."""
-        last = self.events[-1]
-        asked = last.kind, last.text, last.options, answer, last.found
-        self.events[-1] = Event(*asked, last.place, last.time, last.holding, last.to)
-
-
-def own_skills(robot: SimulatedRobot, kind: type[SimulatedRobot]) -> tuple[str, ...]:
-    """The skills of a robot that differ from those of the package."""
-    if type(robot) is not kind:
-        return tuple(robot.skills)
-    if robot.skills is SKILLS:
-        return ()
-    return tuple(name for name, row in robot.skills.items() if row.does is not _USUAL.get(name))
+        self.events[-1] = replace(self.events[-1], answer=answer)
 
 
 _USUAL = {name: row.does for name, row in SKILLS.items()}

@@ -19,7 +19,7 @@ from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World, laid_out
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing, own_skills, unknown_room
+from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing, unknown_room
 from codebotler.simulator.settings import SimulationSettings, finds
 
 AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves literals unchanged, as on a robot
@@ -176,6 +176,8 @@ class SampledRobot(SimulatedRobot):
     the resulting errors, which are not the program's fault.
     """
 
+    is_copied = True
+
     def __init__(
         self,
         room_map: RoomMap,
@@ -198,11 +200,6 @@ class SampledRobot(SimulatedRobot):
         self.draws: list[Draw] = []
         self.searches: defaultdict[str, RoomSearch] = defaultdict(RoomSearch)
         self.excuses: set[str] = set()  # messages of errors
-
-    @property
-    def own_skills(self) -> tuple[str, ...]:
-        """The skills that a copy made from `setup` would not have."""
-        return own_skills(self, SampledRobot)
 
     @property
     def idle_skills(self) -> frozenset[str]:

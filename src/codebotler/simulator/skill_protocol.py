@@ -57,7 +57,7 @@ class SkillProtocol:
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer requests until the last message of the child, which says how it ended; None if there is none."""
+        """Answer requests, and return the child's last message, which says how it ended, if any."""
         overrun = 0
         while (message := self.child.receive()) is not None:
             self._heard = True
@@ -116,7 +116,7 @@ def describe_skills(robot: SkillPerformer) -> Description:
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
-    """The parameters of a run for a child: fuel, simulated seconds, start of its clocks, whether it is live."""
+    """The parameters of a run: fuel, simulated seconds, start of the clocks, whether it is live."""
     settings = robot.settings
     return settings.limits.ticks, settings.limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 

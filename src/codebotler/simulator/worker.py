@@ -142,7 +142,7 @@ class Worker:
     def run_tame(
         self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
     ) -> dict[tuple[int, int], Outcome]:
-        """The certain outcomes of tame programs by the numbers of job and robot; `meanwhile` runs in parallel."""
+        """The certain outcomes of tame programs by job and robot; `meanwhile` is called while they run."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
