@@ -1,4 +1,4 @@
-"""A pool of workers in threads of this process, and the one that the whole process shares."""
+"""A pool of workers in threads of this process, and the shared pool of the process."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ NOT_LINUX = "programs are less isolated here: only Linux has filters of system c
 WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
 RESULTS_IN_MEMORY = 8_000_000  # bytes of results
-UNREADABLE_KEY = b""  # in the place of a key that could not be read
-MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # keys of the first calls and of the last, and of those between
-SIGNAL_POLL_SECONDS = 0.5  # seconds after which a signal is heard at the latest
-CALLS_PER_THREAD = 2  # calls for each thread that are under way, so that none waits
-MAX_KEYS_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
+UNREADABLE_KEY = b""  # in place of the name of a key that raised an error
+MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # of a call: the first and last ones are smaller
+SIGNAL_POLL_SECONDS = 0.5  # of waiting, since polars keeps signals from ending a wait
+CALLS_PER_THREAD = 2  # so that no thread waits
+MAX_KEYS_AHEAD = 4_000  # keys whose results are not yet taken; one thread may be slow for seconds
 
 _Key = TypeVar("_Key")
 _Called = TypeVar("_Called")
@@ -41,8 +41,8 @@ _Arguments = ParamSpec("_Arguments")
 class WorkerPool:
     """Threads that each own one worker; use as a context manager, which waits for the first worker.
 
-    That is started beside whatever the caller does before; with `contextlib.closing`, nothing waits for it
-    but the first call. Where the kernel has no seccomp, this warns, or refuses if isolation is required.
+    The first worker starts in parallel with the caller; with `contextlib.closing`, only the first call waits
+    for it. Where the kernel has no seccomp, this warns, or fails if isolation is required.
     """
 
     def __init__(
@@ -55,12 +55,12 @@ class WorkerPool:
         self._threads = ThreadPoolExecutor(
             workers, thread_name_prefix="worker", initializer=lambda: setattr(self._local, "is_ours", True)
         )
-        self._takes_turns = one_process_per_run  # a thread and a child, at each skill call
+        self._takes_turns = one_process_per_run  # thread and child run alternately
         self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
         self._workers: list[Worker] = []
         self._idle: list[Worker] = []
         self._stopping = False
-        # In a thread that lives as long as the pool: the processes end with the thread that started them.
+        # In a thread of the pool, since processes end with the thread that started them.
         self._first = self._threads.submit(self._start_first, require_isolation=require_isolation)
 
     def _start_first(self, *, require_isolation: bool) -> None:
@@ -115,14 +115,14 @@ class WorkerPool:
     def _keep_together(self, worker: Worker) -> None:
         """Keep this thread and the processes of its worker on one core.
 
-        To wake one on another core costs more than a skill call. For that reason, too, this thread does not
-        push a child aside each time that it says something.
+        Waking a process on another core costs more than a skill call. As a batch thread, this one does not
+        preempt the child at each message.
         """
         if sys.platform != "linux":
             return
         cores = sorted(os.sched_getaffinity(0))
         core = cores[(os.getpid() + self._workers.index(worker)) % len(cores)]
-        with contextlib.suppress(OSError):  # only slower without
+        with contextlib.suppress(OSError):  # only slower
             os.sched_setaffinity(0, {core})
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
             worker.stay_on(core)
@@ -130,20 +130,20 @@ class WorkerPool:
     def submit(
         self, function: Callable[_Arguments, _Value], *args: _Arguments.args, **kwargs: _Arguments.kwargs
     ) -> Future[_Value]:
-        """Call a function in one of the threads, where `here` is its worker; from any thread."""
+        """Call a function in one of the threads, from any thread; `here` is its worker there."""
         return self._threads.submit(function, *args, **kwargs)
 
     @property
     def is_here(self) -> bool:
-        """Whether this is one of the threads, which must not wait for another one."""
+        """Whether this is a thread of the pool, which must not wait for another one."""
         return getattr(self._local, "is_ours", False)
 
     def call(self, function: Callable[[], _Value]) -> _Value:
-        """Call a function in one of the threads, this one if it is one of them, and wait for its result."""
+        """Call a function in a thread of the pool, perhaps this one, and wait for its result."""
         return function() if self.is_here else self.submit(function).result()
 
     def forget(self) -> None:
-        """Close the descriptors in a forked process, to which neither the workers nor the threads belong."""
+        """Close the descriptors in a forked process, which has neither the workers nor the threads."""
         for worker in self._workers:
             worker.forget()
 
@@ -155,12 +155,14 @@ class WorkerPool:
         name: Callable[[_Key], bytes],
         then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """The results for keys, in their order, calling the function in threads; see `map_batches`."""
-
-        def submit(keys: Sequence[_Key]) -> Future[Sequence[_Called]]:
-            return self._threads.submit(function, keys)
-
-        return map_batches(submit, keys, workers=self.workers, name=name, then=then)
+        """Call the function in threads, and yield results in the order of the keys; see `map_batches`."""
+        return map_batches(
+            lambda some: self._threads.submit(function, some),
+            keys,
+            workers=self.workers,
+            name=name,
+            then=then,
+        )
 
 
 def map_batches(
@@ -171,17 +173,17 @@ def map_batches(
     name: Callable[[_Key], bytes],
     then: Callable[[_Called], Any] = lambda result: result,
 ) -> Iterator[Any]:
-    """The results for keys, in their order, with several calls under way at the same time.
+    """Run several calls at the same time, and yield their results in the order of the keys.
 
-    Equal keys are called once. While the next result is long in coming, more keys are read, so that the
-    other workers have work. What the keys or a call raise comes in its place among the results.
+    Equal keys are called once. While one result is slow, more keys are read, so that the other workers have
+    work. An error of the keys or of a call is raised in the place of the result.
 
     Args:
-        submit: begins a call for a few keys, which gives a result for each.
+        submit: starts a call for a few keys, which returns a result for each.
         keys: read a little ahead.
-        workers: how many calls are carried out at the same time.
-        name: gives each key a short name of its own.
-        then: called with each result in the thread that asks for them; its own result is pickled.
+        workers: the number of simultaneous calls.
+        name: returns a short unique name for each key.
+        then: called with each result in the thread of the caller; its own result is pickled.
     """
     distinct = DistinctKeys(keys, name)
     waiting, failed = distinct.waiting, distinct.failed
@@ -193,7 +195,7 @@ def map_batches(
             while len(running) < calls and (batch := distinct.batch(workers)):
                 try:
                     future = submit(list(batch.values()))
-                except Exception as error:  # noqa: BLE001 - raised after the results of those before
+                except Exception as error:  # noqa: BLE001 - raised after earlier results
                     failed.update(dict.fromkeys(batch, error))
                     continue
                 running[future] = list(batch)
@@ -210,45 +212,43 @@ def map_batches(
             names = running.pop(future)
             try:
                 results = future.result()
-            except Exception as error:  # noqa: BLE001 - raised where the result is waited for
+            except Exception as error:  # noqa: BLE001 - raised in place of the result
                 failed.update(dict.fromkeys(names, error))
                 continue
             for named, result in zip(names, results, strict=True):
                 try:
                     done[named] = then(result)
-                except Exception as error:  # noqa: BLE001 - the same, for this one alone
+                except Exception as error:  # noqa: BLE001 - raised in place of this result
                     failed[named] = error
 
 
 def _next(queue: SimpleQueue[_Value]) -> _Value:
-    """What comes next in a queue; signals are heard meanwhile, which polars keeps from ending a wait."""
     while True:
         with contextlib.suppress(Empty):
             return queue.get(timeout=SIGNAL_POLL_SECONDS)
 
 
 def without_filter() -> str:
-    """Why programs are less isolated here."""
+    """The warning for systems without seccomp."""
     return NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 
 
 class DistinctKeys(Generic[_Key]):
-    """Keys with a name each, which are read a little ahead and handed out in batches, equal ones once."""
+    """Keys with names, read a little ahead and returned in batches, equal keys once."""
 
     def __init__(self, keys: Iterable[_Key], name: Callable[[_Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
         self._seen: set[bytes] = set()
-        self._new: dict[bytes, _Key] = {}  # read, and not yet handed out
+        self._new: dict[bytes, _Key] = {}  # not yet in a batch
         self._sent = 0
-        self.waiting: deque[bytes] = deque()  # names of keys that were read, until somebody takes them
+        self.waiting: deque[bytes] = deque()  # names of keys whose results are not yet taken
         self.failed: dict[bytes, BaseException] = {}
 
     def batch(self, width: int) -> dict[bytes, _Key]:
-        """New keys by name, for one call of so many that work at the same time.
+        """New keys by name, for one of `width` simultaneous calls; empty at the end, or if too many wait.
 
         Batches grow, so that the first results come soon; the last ones shrink, so that all calls end at the
-        same time. None is left once there are no more keys, or too many wait to be taken. What is raised when
-        they are read comes in the place of the next one, as that of a name that fails.
+        same time. An error of the keys is that of the next name.
         """
         size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
@@ -271,14 +271,14 @@ class DistinctKeys(Generic[_Key]):
                     self._new[name] = key
         except StopIteration:
             pass
-        except Exception as error:  # noqa: BLE001 - raised after the results of what was read before
+        except Exception as error:  # noqa: BLE001 - raised after earlier results
             self._keys = iter(())
             self.waiting.append(UNREADABLE_KEY)
             self.failed[UNREADABLE_KEY] = error
 
 
 class ResultFile:
-    """Results by name, in a temporary file, so that a million of them need little memory."""
+    """Results by name, in a temporary file, since there may be a million of them."""
 
     def __init__(self) -> None:
         self._file = tempfile.SpooledTemporaryFile(RESULTS_IN_MEMORY)  # noqa: SIM115 - closed by __exit__
@@ -299,7 +299,7 @@ class ResultFile:
         self._file.write(data)
         self._places[name] = place
 
-    def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - whatever was put there
+    def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - any stored value
         self._file.seek(self._places[name])
         return pickle.load(self._file)  # noqa: S301 - we wrote it
 
@@ -308,34 +308,34 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """The pool of this process, with one worker for each core, started on first use; a fork has its own."""
+    """The pool of this process with a worker for each core, started on first use; a fork has its own."""
     with SHARED_POOL.lock:
         if SHARED_POOL.pool is None:
-            SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # a pool that cannot start is not kept
+            SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # raises if it cannot start
         return SHARED_POOL.pool
 
 
 class SharedPool:
-    """The pool of this process once it is started, and what forks do with it."""
+    """Holds the pool of this process once it is started; a fork starts anew."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()  # held during a fork, so that no pool is half started in the child
+        self.lock = threading.Lock()  # held during a fork, so that no child has half a pool
         self.pool: WorkerPool | None = None
-        self._inherited: list[WorkerPool] = []  # never taken apart: their threads are not here
+        self._inherited: list[WorkerPool] = []  # never freed, since their threads are missing here
         atexit.register(self.end)
         os.register_at_fork(
             before=self.lock.acquire, after_in_parent=self.lock.release, after_in_child=self.begin_anew
         )
 
     def end(self) -> None:
-        """End it."""
+        """End the pool."""
         with self.lock:
             if self.pool is not None:
                 self.pool.close()
                 self.pool = None
 
     def begin_anew(self) -> None:
-        """Let go of it, in the process that was forked."""
+        """Release the pool of the parent, in a forked process."""
         if self.pool is not None:
             self.pool.forget()
             self._inherited.append(self.pool)
@@ -344,7 +344,7 @@ class SharedPool:
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """The number of cores for this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

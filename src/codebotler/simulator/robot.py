@@ -150,7 +150,7 @@ class SimulatedRobot:
         return self.skills.idle - {"is_in_room"} if someone_may_come else self.skills.idle
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill, if its guard allows it; the result of a question is the position of an option."""
+        """Execute one skill if the guard allows it; a question returns the position of an option."""
         if self.guard is not None:
             return self.guard.perform(self, skill, arguments)
         return self.execute(skill, arguments)

@@ -20,7 +20,7 @@ from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 ParameterDescription: TypeAlias = tuple[
     str, str, tuple[Scalar, ...], str
 ]  # name, kind, choices if any, and words
-Description: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
+SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
 OVERRUN = 100  # requests beyond a limit, such as from `finally`, before the child is killed
 
 
@@ -51,7 +51,7 @@ class SkillProtocol:
                 self.child.end()
             raise
         if final is None and self.ledger.limit is None:
-            return self._died(self.child.ended())
+            return self._died(self.child.end_gently())
         self.child.kill()
         self.child.hang_up()
         return self.ledger.outcome_at_end(final or {})
@@ -107,7 +107,7 @@ class SkillProtocol:
         return Outcome(cause, self.robot.trace, error)
 
 
-def describe_skills(robot: SkillPerformer) -> Description:
+def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
     """The skills of a robot for a child: names and parameters."""
     return tuple(
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))

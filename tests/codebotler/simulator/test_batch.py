@@ -22,7 +22,7 @@ from codebotler.core.skills.table import Parameter, Recording, Skill, SkillTable
 from codebotler.core.skills.values import TEXT_TYPE
 from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key_of
+from codebotler.simulator.batches.replay import Replay, Transcript, key_of, parse_transcript
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import MAX_BATCH_KEYS, MAX_KEYS_AHEAD, MIN_BATCH_KEYS, DistinctKeys, WorkerPool
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
@@ -554,7 +554,7 @@ def test_a_child_that_is_not_believed_ends_at_once(monkeypatch: pytest.MonkeyPat
 def follow(
     calls: object, order: object, moments: object = (), settings: SimulationSettings = RULES
 ) -> Replay:
-    transcript = decoded(json.dumps([calls, order, moments, {"end": "finished"}]).encode())
+    transcript = parse_transcript(json.dumps([calls, order, moments, {"end": "finished"}]).encode())
     assert transcript is not None
     replay = Replay(robot(settings=settings))
     replay.follow(transcript)

@@ -21,7 +21,7 @@ LONG_SOURCE = (
     100_000  # characters: a longer program is prepared in a process of its own, more of them one by one
 )
 MAX_PREPARED = 2_000  # programs for each process
-Skills: TypeAlias = tuple[str, ...]  # names
+SkillNames: TypeAlias = tuple[str, ...]  # names
 EXHAUSTED = ("MemoryError", "TimeoutError", "Crash")
 
 
@@ -39,10 +39,10 @@ class Preparer:
     def __init__(self) -> None:
         self._process: IsolatedProcess | None = None
         self._served = 0
-        self._asked: tuple[tuple[str, ...], bool, Skills] | None = None  # the open request
-        self._last: tuple[tuple[str, bool, Skills], Prepared | Outcome] | None = None
+        self._asked: tuple[tuple[str, ...], bool, SkillNames] | None = None  # the open request
+        self._last: tuple[tuple[str, bool, SkillNames], Prepared | Outcome] | None = None
 
-    def prepare(self, source: str, *, lowercase: bool, skills: Skills) -> Prepared | Outcome:
+    def prepare(self, source: str, *, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:
         """A program's code, or the outcome of all its runs if it has none; the last answer is cached."""
         if len(source) > MAX_SOURCE:
             return refused("MemoryError", f"the program is longer than {MAX_SOURCE:,} characters")
@@ -52,7 +52,7 @@ class Preparer:
         return self._last[1]
 
     def prepare_all(
-        self, sources: Sequence[str], *, lowercase: bool, skills: Skills
+        self, sources: Sequence[str], *, lowercase: bool, skills: SkillNames
     ) -> list[Prepared | Outcome]:
         """The code or outcome of several programs, prepared together if they are short."""
         if len(sources) > 1 and sum(map(len, sources)) <= LONG_SOURCE:
@@ -63,7 +63,7 @@ class Preparer:
                 return results
         return [self.prepare(source, lowercase=lowercase, skills=skills) for source in sources]
 
-    def ask_ahead(self, source: str, *, lowercase: bool, skills: Skills) -> None:
+    def ask_ahead(self, source: str, *, lowercase: bool, skills: SkillNames) -> None:
         """Begin with the program of the next `prepare`."""
         is_known = self._last is not None and self._last[0] == (source, lowercase, skills)
         if (
@@ -104,7 +104,7 @@ class Preparer:
         if self._process is not None:
             self._process.hang_up()
 
-    def _prepare(self, source: str, lowercase: bool, skills: Skills) -> Prepared | Outcome:  # noqa: FBT001 - private
+    def _prepare(self, source: str, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:  # noqa: FBT001 - private
         if len(source) > LONG_SOURCE or self._served >= MAX_PREPARED:
             self.close()
         served = self._served
@@ -118,7 +118,7 @@ class Preparer:
             if len(source) > LONG_SOURCE:
                 self.close()
 
-    def _ask(self, sources: Sequence[str], lowercase: bool, skills: Skills) -> list[Prepared | Outcome]:  # noqa: FBT001 - private
+    def _ask(self, sources: Sequence[str], lowercase: bool, skills: SkillNames) -> list[Prepared | Outcome]:  # noqa: FBT001 - private
         """The results for programs, up to the one at which the process ended."""
         asked = tuple(sources), lowercase, skills
         if self._asked is not None and self._asked != asked:  # for a program that was not run
@@ -127,7 +127,7 @@ class Preparer:
             self._send(*asked)
         return self._answers(len(sources))
 
-    def _send(self, sources: tuple[str, ...], lowercase: bool, skills: Skills) -> None:  # noqa: FBT001 - private
+    def _send(self, sources: tuple[str, ...], lowercase: bool, skills: SkillNames) -> None:  # noqa: FBT001 - private
         self.start().send((sources, lowercase, skills), at_once=True)
         self._asked = sources, lowercase, skills
         self._served += len(sources)
@@ -143,7 +143,7 @@ class Preparer:
                 answer = None
             if not answer:
                 self._process, self._served = None, 0
-                status = process.ended()
+                status = process.end_gently()
                 if status == -signal.SIGKILL:
                     raise LostProcessError("the preparer was killed from outside")
                 cause, error = cause_of_death(status)

@@ -42,8 +42,8 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
 
 
 START_LOCK = threading.Lock()
-# Who forks this process in the middle of a start would get half of it: a lock that nobody opens, and the end
-# of a pipe on whose closing the start waits.
+# A fork during a start would inherit half of it: a locked lock, and the end of a pipe whose closing the start
+# waits for.
 os.register_at_fork(
     before=START_LOCK.acquire,
     after_in_parent=START_LOCK.release,
@@ -52,7 +52,7 @@ os.register_at_fork(
 
 
 def compiled_file(role: str) -> IO[bytes]:
-    """A file with the code of the modules that a process in one of the roles runs."""
+    """A file with the code of all modules of a role."""
     with START_LOCK:
         return _written_file(FORK_SERVER if role == LIVE_SERVER else role)
 
@@ -60,13 +60,13 @@ def compiled_file(role: str) -> IO[bytes]:
 @cache
 def _written_file(role: str) -> IO[bytes]:
     codes = compiled_modules(compiled, role)
-    file: IO[bytes] = (  # closed at the end of this process; in memory if possible, since a disk may be full
+    file: IO[bytes] = (  # in memory if possible, since a disk may be full
         os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
     )
     atexit.register(file.close)
     try:
         file.write(codes)
         file.flush()
-    except OSError as error:  # a limit on the size of files holds in memory, too
+    except OSError as error:  # a limit on the size of files counts in memory, too
         raise LostProcessError(f"{error.strerror}; allow larger files with `ulimit -f unlimited`") from None
     return file

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, TypeAlias
 
-    Parameter: TypeAlias = tuple[str, str, tuple[Any, ...], str]  # name, kind, choices if any, and words
-    Skills: TypeAlias = tuple[tuple[str, tuple[Parameter, ...]], ...]
+    ParameterDescription: TypeAlias = tuple[
+        str, str, tuple[Any, ...], str
+    ]  # name, kind, choices if any, and words
+    SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
     RunParameters: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
 
 # A copy of the builtins, which a program cannot change.
@@ -40,7 +42,7 @@ class ProgramRun:
     recursion_limit = PROGRAM_RECURSION_LIMIT
 
     def __init__(self) -> None:
-        self.skills: Skills = ()
+        self.skills: SkillDescriptions = ()
         self.kinds: dict[str, list[str]] = {}  # of the parameters of each skill; `list` means options
         self.now = 0.0
         self.spent = self.entered = False
@@ -52,7 +54,7 @@ class ProgramRun:
         self.namespace = types.ModuleType("__main__")
         vars(builtins).update(self.counters())
 
-    def provide(self, skills: Skills) -> None:
+    def provide(self, skills: SkillDescriptions) -> None:
         """Give the program its names without an import: the skills, `sys` and `time`."""
         names = vars(self.namespace)
         for name, _ in self.skills:
@@ -164,11 +166,11 @@ class ProgramRun:
         """Give back all fuel."""
         self.count = itertools.count(1).__next__
 
-    def skill(self, name: str, parameters: tuple[Parameter, ...]) -> object:
+    def skill(self, name: str, parameters: tuple[ParameterDescription, ...]) -> object:
         """The function that a program calls for a skill."""
         names = ", ".join(parameter[0] for parameter in parameters)
         arguments = "".join(f"{parameter[0]}, " for parameter in parameters)
-        types_: list[tuple[type | str, Parameter]] = [
+        types_: list[tuple[type | str, ParameterDescription]] = [
             (each[1] if each[2] else EXACT_TYPES.get(each[1], each[1]), each) for each in parameters
         ]
         self.kinds[name] = [kind for _, kind, _, _ in parameters]
@@ -186,7 +188,7 @@ class ProgramRun:
         return scope[name]
 
     def perform(
-        self, name: str, parameters: list[tuple[type | str, Parameter]], values: tuple[Any, ...]
+        self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401 - what a skill returns
         """Execute a skill; texts must be exactly `str`, and options exactly a `list`."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
@@ -258,7 +260,7 @@ def _options_text(options: list[Any]) -> str:
     return f"[{','.join(parts)}]"
 
 
-def _check_fit(name: str, parameter: Parameter, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
+def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
     """Raise TypeError or ValueError if a value does not fit a parameter."""
     named, kind, choices, words = parameter
     base = kind[5:-1] if kind[:5] == "list[" else ""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 TASK_NAME = "task_program"
 PROGRAM_TOO_LARGE = "the program is too large, or nested too deeply"
-MAX_DEPTH = 250
+MAX_TREE_DEPTH = 250
 MAX_NESTED_BLOCKS = 20
 BLOCK_NODES = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
 LEAF_FIELDS = frozenset({"ctx", "op", "ops"})  # fields of operators and contexts
@@ -63,7 +63,7 @@ def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
     while waiting:
         node, depth, blocks = waiting.pop()
         kind = type(node)
-        if depth > MAX_DEPTH - (kind in WITH_LEAVES):
+        if depth > MAX_TREE_DEPTH - (kind in WITH_LEAVES):
             raise MemoryError
         if kind in SCOPE_NODES:
             blocks = 0
