@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.kinds import ASK, CHECK, GOTO
+from codebotler.core.skills.kinds import ASK, CHECK
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
@@ -19,7 +19,7 @@ from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World, laid_out
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing, unknown_room
+from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing
 from codebotler.simulator.settings import SimulationSettings, finds
 
 AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves literals unchanged, as on a robot
@@ -270,14 +270,6 @@ class SampledRobot(SimulatedRobot):
         return self.outcomes[statement]
 
     # --- what skills do
-
-    def drive(self, location: str) -> None:
-        """Drive to the first room whose name is in the request; on a guessed map, to any place."""
-        room = self.room_for(location)
-        self.record(GOTO, location, destination=room)
-        if room is None:
-            raise unknown_room(location)
-        self.room = room
 
     def room_for(self, request: str) -> str | None:
         """The room that a request means; on a guessed map, any place."""

@@ -252,7 +252,6 @@ class Worker:
             raise LostProcessError(str(error)) from None
 
     def _fork(self, role: str, prepared: Prepared, robot: SkillPerformer) -> Outcome:
-        """Run a prepared program in a child of one of the fork servers."""
         return SkillProtocol(self._fork_server(role).fork(), prepared.code, robot).outcome()
 
     def _fork_server(self, role: str) -> ForkServer:

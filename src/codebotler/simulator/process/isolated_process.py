@@ -67,13 +67,13 @@ class IsolatedProcess:
             self._send_piece(memoryview(whole)[start : start + size])
 
     def _send_piece(self, rest: memoryview) -> None:
-        watch = StuckDetector(self)
+        used: int | None = None
         while rest:
             began = time.monotonic()
             try:
                 rest = rest[self._channel.send(rest) :]
             except BlockingIOError:  # timed out
-                watch.check()
+                used = self._check_progress(used)
             except OSError:
                 return
             self._be_patient(began)
@@ -96,7 +96,7 @@ class IsolatedProcess:
 
     def receive_bytes(self, most: int) -> bytes | None:
         """Its next frame of at most so many bytes; None when it has hung up."""
-        watch = StuckDetector(self)
+        used: int | None = None
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
@@ -110,7 +110,7 @@ class IsolatedProcess:
             try:
                 piece = self._channel.recv(1 << 16)
             except BlockingIOError:  # timed out
-                watch.check()
+                used = self._check_progress(used)
             except OSError:
                 return None
             else:
@@ -123,6 +123,14 @@ class IsolatedProcess:
         self.patience -= min(time.monotonic() - since, SILENCE_SECONDS)  # more is a delay of this process
         if self.patience < 0:
             raise TimeoutError
+
+    def _check_progress(self, before: int | None) -> int | None:
+        """Return the processor time of a sleeping process; TimeoutError if it is still `before`."""
+        fields = _stat(self.pid)
+        used = int(fields[11]) + int(fields[12]) if fields[:1] == ["S"] else None
+        if used is not None and used == before:
+            raise TimeoutError
+        return used
 
     def kill(self) -> None:
         """End it without waiting for its end."""
@@ -162,25 +170,6 @@ class IsolatedProcess:
         except OSError:
             return False
         return any(mode in status for mode in SECCOMP_MODES)
-
-
-class StuckDetector:
-    """Distinguishes a process that waits for ever from one that computes.
-
-    A process that sleeps at two checks, and used no processor time between them, is stuck.
-    """
-
-    def __init__(self, process: IsolatedProcess) -> None:
-        self._process = process
-        self._used: int | None = None
-
-    def check(self) -> None:
-        """Raise TimeoutError if the process is stuck."""
-        fields = _stat(self._process.pid)
-        used = int(fields[11]) + int(fields[12]) if fields[:1] == ["S"] else None
-        if used is not None and used == self._used:
-            raise TimeoutError
-        self._used = used
 
 
 def _stat(pid: int) -> list[str]:

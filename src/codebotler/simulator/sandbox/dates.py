@@ -41,14 +41,11 @@ class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the name of th
         return cls.fromtimestamp(time.time(), tz)
 
     @classmethod
-    def utcnow(cls) -> datetime:
-        """The time on the simulated clock."""
-        return cls.fromtimestamp(time.time())
-
-    @classmethod
     def today(cls) -> datetime:
         """The time on the simulated clock."""
         return cls.fromtimestamp(time.time())
+
+    utcnow = today
 
     def date(self) -> real.date:
         """The date without the time."""

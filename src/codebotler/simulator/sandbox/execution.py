@@ -261,7 +261,6 @@ def _options_text(options: list[Any]) -> str:
 
 
 def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
-    """Raise TypeError or ValueError if a value does not fit a parameter."""
     named, kind, choices, words = parameter
     base = kind[5:-1] if kind[:5] == "list[" else ""
     if base and given is list:
@@ -279,7 +278,6 @@ def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: ty
 
 
 def _value_text(value: Any) -> str:  # noqa: ANN401 - a scalar or a list of them
-    """A fitting value as JSON."""
     if type(value) is list:
         return f"[{','.join([_value_text(each) for each in value])}]"
     if type(value) is str:
@@ -296,7 +294,6 @@ def _line_at_work() -> int:
 
 
 def _last_line(error: BaseException) -> int | None:
-    """The line of the program at which an exception arose."""
     line, traceback = None, _own(BaseException, "__traceback__", error)
     while traceback is not None:
         if traceback.tb_frame.f_code.co_filename == PROGRAM:

@@ -129,7 +129,6 @@ def _note_entries(statement: ast.stmt) -> None:
 
 
 def _insert_head(node: ast.FunctionDef | ast.AsyncFunctionDef, name: str) -> None:
-    """Call one of our functions at the start of a function, after its docstring."""
     at = 1 if ast.get_docstring(node, clean=False) is not None else 0
     node.body.insert(at, _call(name, node.body[0]))
 

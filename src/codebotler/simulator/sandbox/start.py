@@ -23,7 +23,7 @@ def main(module: str, role: str, descriptors: list[str]) -> None:
         start_again(list(map(int, descriptors)))
     if role not in ("preparer", "batch-fork-server"):
         sys.pycache_prefix = os.devnull  # bytecode that exists only sometimes would move the heap
-    modules = CompiledModules(loads(os.pread(FIRST_DESCRIPTOR, os.fstat(FIRST_DESCRIPTOR).st_size, 0)))  # noqa: S302 - from the engine
+    modules = _CompiledModules(loads(os.pread(FIRST_DESCRIPTOR, os.fstat(FIRST_DESCRIPTOR).st_size, 0)))  # noqa: S302 - from the engine
     sys.meta_path.insert(0, modules)
     os.close(FIRST_DESCRIPTOR)
     serving = __import__(module, fromlist=["serve"])
@@ -32,7 +32,7 @@ def main(module: str, role: str, descriptors: list[str]) -> None:
     serving.serve(*ready)
 
 
-class CompiledModules:
+class _CompiledModules:
     """Importer of modules that the engine has compiled: a compiler would double the size of a fork server.
 
     Modules of the standard library look as if they came from a file.
@@ -42,7 +42,6 @@ class CompiledModules:
         self.codes = codes  # marshalled, by the name of the module
 
     def find_spec(self, name: str, *_: object) -> ModuleSpec | None:
-        """Describe a module to the import system."""
         if name not in self.codes:
             return None
         is_package = any(other.startswith(name + ".") for other in self.codes)

@@ -128,13 +128,12 @@ class ProgramVerifier(ExpressionVerifier):
                 case ast.expr():
                     self._check_value(part)
 
-    def _allow(self, _: ast.AST) -> None:
-        """Allow a statement without parts."""
-
     STATEMENTS: ClassVar[Checks] = {
         **dict.fromkeys((ast.Expr, ast.Assign, ast.AugAssign, ast.While), ExpressionVerifier.check_parts),
-        **dict.fromkeys((ast.If, ast.Return, ast.Assert, ast.Delete), ExpressionVerifier.check_parts),
-        **dict.fromkeys((ast.Pass, ast.Break, ast.Continue), _allow),
+        **dict.fromkeys(
+            (ast.If, ast.Return, ast.Assert, ast.Delete, ast.Pass, ast.Break, ast.Continue),
+            ExpressionVerifier.check_parts,
+        ),
         **dict.fromkeys((ast.Global, ast.Nonlocal), _check_declaration),
         ast.AnnAssign: _check_annotated,
         ast.FunctionDef: _check_function,

@@ -104,7 +104,6 @@ class ExpressionVerifier:
         return name in self.functions or (name in self.skills and not self.is_data(name))
 
     def _is_given(self, name: str, among: frozenset[str]) -> bool:
-        """Whether a name is that of one of these builtins here."""
         return name in among and not self.is_data(name)
 
     def _check_value(self, node: ast.expr) -> None:
@@ -247,7 +246,6 @@ class ExpressionVerifier:
             self._check_value(node)
 
     def _check_display(self, node: ast.List | ast.Tuple) -> None:
-        """Allow a list or a tuple, also as the target of unpacking."""
         for each in node.elts:
             self._check_argument(each)
 
