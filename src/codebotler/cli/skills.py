@@ -23,7 +23,7 @@ from codebotler.core.trace import Event, Option
 from codebotler.core.words import listed
 from codebotler.prompts.rendering import stub
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.sampled_robot import Lot, RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import RandomOutcome, RoomMap, SampledRobot
 
 WORLD_COUNT = 40  # for each skill
 PROMPT_EXAMPLE_ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
@@ -91,7 +91,11 @@ def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
         except RobotError as error:
             outcome = f"fails with {error.kind}: {str(error).removeprefix(f'{row.name}: ')}"
         event = robot.trace[-1] if robot.trace else None
-        drawn = [fact for fact in robot.facts if not (isinstance(fact, Lot) and fact.statement == row.call)]
+        drawn = [
+            fact
+            for fact in robot.facts
+            if not (isinstance(fact, RandomOutcome) and fact.statement == row.call)
+        ]
         facts = tuple(fact.sentence for fact in drawn)
         found.setdefault(outcome, SkillTrial(outcome, facts, event))
     return list(found.values())

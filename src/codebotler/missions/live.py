@@ -20,7 +20,7 @@ from codebotler.missions.progress import POSITION_FEEDBACK
 from codebotler.missions.stop import StopButton
 from codebotler.robots import base
 from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
-from codebotler.simulator.house_rule import NO_GOAL, NO_ROOM, RuleViolationError
+from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, RuleViolationError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.rule_guard import RuleGuard, name_of
 from codebotler.simulator.sampled_robot import RoomMap
@@ -59,7 +59,7 @@ class LiveRobot:
         self._button = button or StopButton(robot)
         self.broken_rule: dict[str, object] = {}  # the log entry of the rule that stopped the mission
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
-        self.rules = SimulationSettings(literals="as-written", limits=ENDLESS, clock_starts=starts)
+        self.settings = SimulationSettings(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # the line of the program that calls the current skill
         self._place, self._held = place, ""
         self._room = place or None  # the current room, as rules name it; None if unknown
@@ -143,12 +143,12 @@ class LiveRobot:
         guard = self._guard
         if guard is None:
             return event.place
-        rules = [rule for rule in guard.rules if self._room is None and event.kind in rule.kinds_in_rooms]
+        rules = [rule for rule in guard.rules if self._room is None and rule.depends_on_room(event)]
         if rules:
             self._room = self._ask_room()
         if rules and self._room is None:
             with self._enforcing():
-                guard.give_up(rules, event, "cannot judge", NO_ROOM)
+                guard.give_up(rules, event, "cannot judge", UNKNOWN_ROOM)
         room = self._room or ""
         texts = dict.fromkeys([event.text, *(self._rooms_meant(event.text) if is_drive else ())])
         with self._enforcing():
@@ -180,7 +180,7 @@ class LiveRobot:
         if self._room is not None:
             return replace(event, text=self._room)
         with self._enforcing():
-            guard.give_up(rules, event, "could not judge", NO_GOAL)
+            guard.give_up(rules, event, "could not judge", AMBIGUOUS_GOAL)
         return possible[0]
 
     def _on_pose(self, at: Point | None) -> None:
@@ -231,7 +231,7 @@ class LiveRobot:
 
     def _rooms_meant(self, request: str) -> list[str]:
         """The rooms that a request may mean, as rules name them."""
-        rooms = [] if self._room_map is None else self._room_map.rooms_meant(request)
+        rooms = [] if self._room_map is None else self._room_map.possible_rooms(request)
         return [*dict.fromkeys(name_of(room, request) for room in rooms)]
 
     def _ask_room(self) -> str | None:

@@ -60,7 +60,7 @@ def check_programs(
         settings = CheckSettings(
             samples=samples,
             seed=seed,
-            rules=suite.rules,
+            simulation=suite.settings,
             skills=suite.skills,
             house_rules=() if suite.house is None else suite.house.rules,
         )

@@ -14,7 +14,7 @@ from codebotler.core.files import Appender, to_text, write_whole
 from codebotler.core.skills.files import files_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import brief
-from codebotler.simulator.settings import PAPER
+from codebotler.simulator.settings import PAPER_SETTINGS
 from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
 from roboeval.evaluation.judge import judgements
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
@@ -104,28 +104,28 @@ def _expect_of_run(
 # --- the suite and tool of an evaluation
 
 
-OPTIONAL_RULES = ("words_for_people", "words_for_yes", "words_for_no")  # left out if empty
+OPTIONAL_SETTINGS = ("words_for_people", "words_for_yes", "words_for_no")  # left out if empty
 
 
 def evaluation_metadata(
     suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
 ) -> dict[str, Any]:
     """Return the content of KEY.json, which identifies what judges the rows of some tasks, or of all."""
-    rules = suite.rules
+    settings = suite.settings
     return {
         "suite": suite.name,
         "version": suite.version,
         "digest": suite.digest,
         **({} if suite.worlds is None else {"worlds": suite.worlds, "seed": suite.seed}),
         "rules": {
-            "literals": rules.literals,
-            "matching": rules.matching,
-            "people": rules.people,
-            **{name: list(words) for name in OPTIONAL_RULES if (words := getattr(rules, name))},
-            **({"events": rules.events} if rules.events != PAPER.events else {}),
-            "limits": {name: getattr(rules.limits, name) for name in ("seconds", "calls", "ticks")},
+            "literals": settings.literals,
+            "matching": settings.matching,
+            "people": settings.people,
+            **{name: list(words) for name in OPTIONAL_SETTINGS if (words := getattr(settings, name))},
+            **({"events": settings.events} if settings.events != PAPER_SETTINGS.events else {}),
+            "limits": {name: getattr(settings.limits, name) for name in ("seconds", "calls", "ticks")},
             "skill_seconds": 0,
-            "clock_starts": rules.clock_starts.isoformat(),
+            "clock_starts": settings.clock_starts.isoformat(),
         },
         **(
             {}

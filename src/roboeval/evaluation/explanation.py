@@ -54,7 +54,7 @@ def completion_data(
         **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
         "suite_instruction": suite_instruction(suite, row["task"], row["prompt"]),
         "reply": reply_data(completion),
-        "lowered": suite is not None and suite.rules.literals == "lowercase",
+        "lowered": suite is not None and suite.settings.literals == "lowercase",
         "worlds": [
             _world_data(verdict, _scenario(suite, row, number, ablated=ablated), budget, suite)
             for number, verdict in enumerate(row["verdicts"])
@@ -108,12 +108,12 @@ def _world_data(
     verdict: Mapping[str, Any], scenario: Scenario | None, budget: ExplanationBudget, suite: Suite | None
 ) -> dict[str, Any]:
     trace, cut = trace_of(verdict), verdict.get("cut")
-    world, rules = None if scenario is None else scenario.world, None if suite is None else suite.rules
+    world, settings = None if scenario is None else scenario.world, None if suite is None else suite.settings
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
         "steps": steps_of(trace, has_places=True),
         **({} if cut is None else {"cut": cut}),
-        "remarks": remarks_on(verdict, trace, world, rules),
+        "remarks": remarks_on(verdict, trace, world, settings),
         "failed_checks": [
             {"check": check, **_explained(check, scenario, verdict, trace, budget)}
             for check in verdict["failed_checks"]

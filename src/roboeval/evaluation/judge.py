@@ -155,7 +155,7 @@ def run_in_worlds(
 def robot_in(world: World, suite: Suite) -> SimulatedRobot:
     """Return a robot in a world, with the rules of a suite and its house."""
     guard = None if suite.house is None else RuleGuard(suite.house.rules)
-    return SimulatedRobot(world, suite.rules, suite.skills, guard=guard)
+    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard)
 
 
 def judge_outcomes(

@@ -19,15 +19,15 @@ MAX_CYCLE_STEPS = 100
 
 
 def remarks_on(
-    verdict: Mapping[str, Any], trace: Trace, world: World | None, rules: SimulationSettings | None
+    verdict: Mapping[str, Any], trace: Trace, world: World | None, settings: SimulationSettings | None
 ) -> list[str]:
     """Return sentences that explain a run in addition to its failed checks."""
     remarks = []
     if verdict["status"] == Status.TIMEOUT and (cycle := cycle_at_end(trace)) is not None:
         more = " times: " if verdict.get("cut") is None else " times or more: "
         remarks.append(cycle.sentence.replace(" times: ", more, 1))
-    if not verdict["satisfied"] and world is not None and rules is not None:
-        remarks += misplaced_questions(trace, world, rules)
+    if not verdict["satisfied"] and world is not None and settings is not None:
+        remarks += misplaced_questions(trace, world, settings)
     return remarks
 
 
@@ -68,7 +68,7 @@ def cycle_at_end(trace: Trace) -> Cycle | None:
 # --- answers in a fixed order
 
 
-def misplaced_questions(trace: Trace, world: World, rules: SimulationSettings) -> Iterator[str]:
+def misplaced_questions(trace: Trace, world: World, settings: SimulationSettings) -> Iterator[str]:
     """Yield a sentence for each room where a question got the answer to another question."""
     for room in world.rooms:
         match room.people:
@@ -76,23 +76,25 @@ def misplaced_questions(trace: Trace, world: World, rules: SimulationSettings) -
                 pass
             case _:  # rows do not say which of several people was asked
                 continue
-        asked = [e for e in trace if e.options and e.place == room.name and not _has_topic(e, person, rules)]
+        asked = [
+            e for e in trace if e.options and e.place == room.name and not _has_topic(e, person, settings)
+        ]
         for number, question in enumerate(asked):
             own = person.answers[min(number, len(person.answers) - 1)]
             others = [answer for answer in person.answers if answer != own]
-            if not _fits(own, question, rules) and any(_fits(each, question, rules) for each in others):
+            if not _fits(own, question, settings) and any(_fits(each, question, settings) for each in others):
                 yield _misplaced(room.name, person, number, question)
                 break
 
 
-def _has_topic(question: Event, person: Person, rules: SimulationSettings) -> bool:
-    return any(finds(question.text, topic, rules.matching) for topic, _ in person.topics)
+def _has_topic(question: Event, person: Person, settings: SimulationSettings) -> bool:
+    return any(finds(question.text, topic, settings.matching) for topic, _ in person.topics)
 
 
-def _fits(answer: Answer, question: Event, rules: SimulationSettings) -> bool:
-    chosen = choose(answer, question.text, question.options, rules)
+def _fits(answer: Answer, question: Event, settings: SimulationSettings) -> bool:
+    chosen = choose(answer, question.text, question.options, settings)
     return chosen is not None and (
-        isinstance(answer, int) or finds(question.options[chosen].text, answer, rules.matching)
+        isinstance(answer, int) or finds(question.options[chosen].text, answer, settings.matching)
     )
 
 

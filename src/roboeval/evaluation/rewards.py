@@ -17,7 +17,7 @@ from typing import Generic, TypeVar
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import AHEAD, LARGEST, shared_pool
+from codebotler.simulator.pool import CALLS_PER_THREAD, MAX_BATCH_KEYS, shared_pool
 from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
 from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -166,7 +166,7 @@ class Rewards:
 
 def split_programs(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
     """Split programs into batches, enough for all workers."""
-    size = max(1, min(LARGEST, -(-len(programs) // (AHEAD * workers))))
+    size = max(1, min(MAX_BATCH_KEYS, -(-len(programs) // (CALLS_PER_THREAD * workers))))
     return [programs[start : start + size] for start in range(0, len(programs), size)]
 
 

@@ -211,7 +211,7 @@ class SimulationFile(StrictForm):
             return {"words_for_people": WORDS_FOR_PEOPLE, **data}
         return data
 
-    def rules(self) -> SimulationSettings:
+    def settings(self) -> SimulationSettings:
         """Convert to simulation settings."""
         values = {name: value for name, value in self if name != "skill_seconds"}
         return SimulationSettings(**values | {"limits": Limits(**dict(self.limits))})

@@ -44,7 +44,7 @@ class Suite:
     name: str  # the name in evaluations
     version: int  # increases when a verdict may change
     about: str  # a description in a sentence
-    rules: SimulationSettings  # how worlds are simulated
+    settings: SimulationSettings  # how worlds are simulated
     tasks: Mapping[str, Task]  # the tasks by name, sorted
     digest: str  # a hash of everything that verdicts and prompts depend on
     folder: Path | None = None  # the folder of its files
@@ -171,7 +171,7 @@ def _build_suite(
         name=head.name,
         version=head.version,
         about=head.about,
-        rules=head.rules.rules(),
+        settings=head.rules.settings(),
         tasks={task.name: task for task in tasks},
         digest=_digest(
             [file, *documents, *(lender for lender in lenders if lender is not None)], tasks, house, own

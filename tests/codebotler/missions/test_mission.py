@@ -33,7 +33,7 @@ from codebotler.robots.base import NotReadyError, Robot, RobotLostError, RobotRe
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator import ledger
-from codebotler.simulator.pool import SHARED
+from codebotler.simulator.pool import SHARED_POOL
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from processes import are_gone, children_of
@@ -677,7 +677,7 @@ def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
 @pytest.fixture(autouse=True)
 def no_threads_are_left() -> Iterator[None]:
     yield
-    checking = () if SHARED.pool is None else SHARED.pool._threads._threads
+    checking = () if SHARED_POOL.pool is None else SHARED_POOL.pool._threads._threads
     for thread in threading.enumerate():
         if (
             thread is not threading.main_thread()

@@ -23,7 +23,7 @@ from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import NO_GOAL, NO_ROOM, Rule
+from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from doubles import Answering
 
@@ -230,7 +230,7 @@ def test_mission_stops_and_says_why_if_nobody_knows_the_room(tmp_path: Path, *, 
         "quiet",
         ["say", "one"],
         True,
-        NO_ROOM,
+        UNKNOWN_ROOM,
     )
     assert line["why"] in event_text(line)
 
@@ -253,7 +253,7 @@ def test_mission_stops_after_a_drive_if_nobody_knows_which_room_was_meant(
     assert robot.cancels
     assert [line["event"] for line in lines].count("skill") == 1
     (line,) = [line for line in lines if line["event"] == "rule"]
-    assert (line["rule"], line["prevented"], line["why"]) == ("after", False, NO_GOAL)
+    assert (line["rule"], line["prevented"], line["why"]) == ("after", False, AMBIGUOUS_GOAL)
 
 
 def test_failed_drive_to_one_room_needs_no_question(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError
 from codebotler.robots.open import check_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATED_RULES
+from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATION
 from codebotler.rtl import parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.house_rule import Rule
@@ -107,10 +107,10 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
         if not scenario.world.may_wait_forever
     ]
     pairs = [(program, world) for _, program, world in tasks]
-    expected = list(run(pairs, workers=1, rules=SIMULATED_RULES))
+    expected = list(run(pairs, workers=1, settings=SIMULATION))
     manipulating = set()
     for (name, program, world), outcome in zip(tasks, expected, strict=True):
-        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=SIMULATED_RULES.clock_starts)
+        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=SIMULATION.clock_starts)
         found = worker.run_live(program, robot)
         assert (found.status, found.error) == (outcome.status, outcome.error), name
         assert found.trace == outcome.trace, name

@@ -84,7 +84,7 @@ def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
 
 def test_process_that_cannot_start_is_no_fault_of_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
     end_all()
-    monkeypatch.setattr("codebotler.simulator.isolated_call.CODE", "raise SystemExit(1)")
+    monkeypatch.setattr("codebotler.simulator.isolated_call.SERVE_CODE", "raise SystemExit(1)")
     with pytest.raises(EngineError):
         closed.echo("a")
 

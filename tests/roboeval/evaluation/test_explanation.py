@@ -401,9 +401,9 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
 
 def test_lowered_texts_are_shown_as_they_are_judged_and_explained() -> None:
     said = Outcome(Status.FINISHED, (GOTO, Event("say", "good day")))
-    for rules in (SimulationSettings(), SimulationSettings(literals="as-written")):
-        suite = replace(SUITE, rules=rules)
+    for settings in (SimulationSettings(), SimulationSettings(literals="as-written")):
+        suite = replace(SUITE, settings=settings)
         written = replace(completion(), program="def task_program():\n    say('Good Day')\n")
         text = printed(completion_view(row(written, said), written, suite), 120)
         assert 'said "good day"' in text
-        assert (LOWERCASED_NOTE in text) is (rules == SimulationSettings())
+        assert (LOWERCASED_NOTE in text) is (settings == SimulationSettings())

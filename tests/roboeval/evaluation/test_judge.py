@@ -12,7 +12,7 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.core.world import Room, World
 from codebotler.rtl import holds
 from codebotler.rtl.formulas import Formula
-from codebotler.simulator.worker import EVENTS
+from codebotler.simulator.worker import run_log
 from roboeval.evaluation.failures import Verdict, failure_of_verdicts
 from roboeval.evaluation.judge import evaluate, judge
 from roboeval.evaluation.result_cache import MAX_RESULT_EVENTS, ResultCache
@@ -74,7 +74,7 @@ def test_a_program_is_judged_by_what_its_prompt_asks_for(
         for prompt in range(3)
         for program in (says, errs)
     ]
-    with caplog.at_level(logging.DEBUG, logger=EVENTS.name):
+    with caplog.at_level(logging.DEBUG, logger=run_log.name):
         rows = list(evaluate(completions, suite))
     assert [row["passed"] for row in rows[::2]] == [True, False, False]
     assert [row["verdicts"][0]["failed_checks"] for row in rows[::2]] == [[], *[['not says("hi")']] * 2]

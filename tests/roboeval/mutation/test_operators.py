@@ -81,7 +81,7 @@ def mutants(operator: Operator, body: str) -> Iterator[str]:
 def outcomes() -> dict[str, Outcome]:
     """How all programs of the examples ended."""
     programs = [program(body) for example in EXAMPLES for body in (example["before"], example["after"])]
-    ended = run(((source, WORLD) for source in programs), workers=2, rules=RULES, skills=TABLE)
+    ended = run(((source, WORLD) for source in programs), workers=2, settings=RULES, skills=TABLE)
     return dict(zip(programs, ended, strict=True))
 
 

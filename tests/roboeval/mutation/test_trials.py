@@ -68,7 +68,7 @@ def program(body: str) -> str:
 
 
 def outcomes_of(source: str, suite: Suite, pool: WorkerPool) -> list[Outcome]:
-    robots = [partial(SimulatedRobot, one.world, suite.rules) for one in suite.task("T").scenarios]
+    robots = [partial(SimulatedRobot, one.world, suite.settings) for one in suite.task("T").scenarios]
     return pool.here().run_all([(source, robots)])[0]
 
 

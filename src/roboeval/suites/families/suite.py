@@ -103,7 +103,7 @@ def _build_suite(which: FamilyTasks, skills: SkillTable) -> Suite:
         name=which.name,
         version=head.version,
         about=f"{counted(which.count, 'task')} of families: split {which.split}, seed {which.seed}",
-        rules=head.rules.rules(),
+        settings=head.rules.settings(),
         tasks={name: _named(name, one) for name, one in made.items()},
         digest=hashlib.sha256("\n".join([str(head.version), *digests]).encode()).hexdigest(),
         skills=skills,

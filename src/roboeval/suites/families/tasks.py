@@ -185,7 +185,7 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
         )
     )
     digest = hashlib.sha256(f"{head.version} {worlds} {seed} {task_file.data}".encode()).hexdigest()
-    suite = Suite(TRAINING_SUITE, head.version, head.about, rules.rules(), {name: task}, digest)
+    suite = Suite(TRAINING_SUITE, head.version, head.about, rules.settings(), {name: task}, digest)
     return TrainedTask(suite, name, form.solution, form.wrong)
 
 
