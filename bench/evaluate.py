@@ -25,7 +25,7 @@ from codebotler.core.world import Room, World
 from codebotler.simulator.batches.replay import REPLAYED
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.settings import PAPER, SimulationSettings
+from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
 from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled
 from roboeval.evaluation.engines import Local, Work
@@ -59,14 +59,14 @@ def pairs(suite: Suite) -> list[Pair]:
 # --- the three ways
 
 
-def isolated(pool: WorkerPool, rules: SimulationSettings, part: Sequence[Pair]) -> list[Status]:
+def isolated(pool: WorkerPool, settings: SimulationSettings, part: Sequence[Pair]) -> list[Status]:
     """Our engine: isolated, a few programs per child process, each in all of its worlds."""
     REPLAYED.clear()  # what other times have left
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
     def run_all(worker: Worker, works: Sequence[Work]) -> list[list[Status]]:
         jobs = [
-            (source, [partial(SimulatedRobot, world, rules) for _, world in programs[int(number)]])
+            (source, [partial(SimulatedRobot, world, settings) for _, world in programs[int(number)]])
             for number, source in works
         ]
         return [[outcome.status for outcome in outcomes] for outcomes in worker.run_all(jobs)]
@@ -88,23 +88,23 @@ def forget(time: int) -> None:  # noqa: ARG001 - once for each time
     compiled.cache_clear()
 
 
-def run_bare(part: Sequence[Pair], time: int = 0, rules: SimulationSettings = PAPER) -> None:
+def run_bare(part: Sequence[Pair], time: int = 0, settings: SimulationSettings = PAPER_SETTINGS) -> None:
     """Run pairs in this process."""
     forget(time)
     for pair in part:
-        reused(NOWHERE).run(pair, rules)
+        reused(NOWHERE).run(pair, settings)
 
 
 NOWHERE = World((Room("nowhere"),), "nowhere")
 
 
 def in_process(
-    processes: ProcessPoolExecutor, times: Iterator[int], rules: SimulationSettings, part: Sequence[Pair]
+    processes: ProcessPoolExecutor, times: Iterator[int], settings: SimulationSettings, part: Sequence[Pair]
 ) -> None:
     """No isolation: the same programs in as many processes."""
     share = -(-len(part) // (8 * WORKERS))
     shares = [part[at : at + share] for at in range(0, len(part), share)]
-    list(processes.map(run_bare, shares, repeat(next(times)), repeat(rules)))
+    list(processes.map(run_bare, shares, repeat(next(times)), repeat(settings)))
 
 
 def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
@@ -137,23 +137,23 @@ def main() -> None:
     processes = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork"))
     list(processes.map(run_bare, [whole[:1]] * 4 * WORKERS))
     with processes, WorkerPool(WORKERS) as pool, ThreadPoolExecutor(WORKERS) as threads:
-        ours = partial(isolated, pool, paper.rules)
+        ours = partial(isolated, pool, paper.settings)
         honest, limited = by_limit(ours, whole)
         numbers = count(1)
         compare(
             honest,
             {
                 "isolated (ours)": ours,
-                "in-process, no isolation": partial(in_process, processes, numbers, paper.rules),
+                "in-process, no isolation": partial(in_process, processes, numbers, paper.settings),
                 "one `python -c pass` a run": partial(fresh_interpreters, threads),
             },
         )
-        ours_plus = partial(isolated, pool, plus.rules)
+        ours_plus = partial(isolated, pool, plus.settings)
         compare(
             by_limit(ours_plus, every_fourth(pairs(plus)))[0],
             {
                 "under plus, isolated (ours)": ours_plus,
-                "under plus, in-process": partial(in_process, processes, numbers, plus.rules),
+                "under plus, in-process": partial(in_process, processes, numbers, plus.settings),
             },
         )
         if limited:

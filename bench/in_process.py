@@ -22,11 +22,11 @@ from codebotler.simulator.ledger import texts_in
 from codebotler.simulator.process.fork_server_client import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
 from codebotler.simulator.robot import Argument, SimulatedRobot
 from codebotler.simulator.sandbox import REFUSED, execution
-from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, LimitReachedError, ProgramRun
+from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.sandbox.preparer import answer
-from codebotler.simulator.settings import PAPER, SimulationSettings
-from codebotler.simulator.skill_protocol import described, settings_of
+from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
+from codebotler.simulator.skill_protocol import describe_skills, run_parameters
 
 CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
@@ -45,8 +45,8 @@ class Bare(ProgramRun):
 
     def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__()
-        self.robot, self.limits = robot, robot.rules.limits
-        self.provide(described(robot))
+        self.robot, self.limits = robot, robot.settings.limits
+        self.provide(describe_skills(robot))
         self.fuel, self.seconds, self.left = self.limits.ticks, self.limits.seconds, self.limits.calls
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - as in ProgramRun
@@ -94,13 +94,13 @@ class Reused(Bare):
         time.sleep = self.sleep
         self.provided = dict(vars(self.namespace))
 
-    def run(self, pair: tuple[str, World], rules: SimulationSettings = PAPER) -> None:
+    def run(self, pair: tuple[str, World], settings: SimulationSettings = PAPER_SETTINGS) -> None:
         """Run a program in a world."""
         source, world = pair
         code = compiled(source)
         if isinstance(code, BaseException):
             return
-        self.robot, self.now, self.spent, self.entered = SimulatedRobot(world, rules), 0.0, False, False
+        self.robot, self.now, self.spent, self.entered = SimulatedRobot(world, settings), 0.0, False, False
         self.codes.clear()
         self.left = self.limits.calls
         self.refuel()
@@ -137,7 +137,7 @@ class Unwalled(Bare):
             super().request(name)
         self.robot.now = float(self.now)
         limit = sys.getrecursionlimit()
-        sys.setrecursionlimit(RECURSION_LIMIT + DEEPER)
+        sys.setrecursionlimit(PROGRAM_RECURSION_LIMIT + DEEPER)
         try:
             return self.robot.perform(name, given)
         except RobotError as error:
@@ -176,7 +176,7 @@ class Unwalled(Bare):
 
     def prepare(self, source: str) -> Outcome | Execution:
         """What to execute; or the outcome of what is no program."""
-        told = answer(source, lowercase=self.robot.rules.literals == "lowercase")
+        told = answer(source, lowercase=self.robot.settings.literals == "lowercase")
         if told[:1] == REFUSED:
             kind, message, line = json.loads(told[1:])
             return Outcome(Status.PYTHON_ERROR, (), RunError(kind, message), line)
@@ -184,7 +184,7 @@ class Unwalled(Bare):
 
     def execution(self, code: bytes) -> Execution:
         """What to execute of a program that parses."""
-        return code, settings_of(self.robot)
+        return code, run_parameters(self.robot)
 
     def ended(self, final: dict[str, Any]) -> Outcome:
         """The outcome of a run that ended like this."""
@@ -209,11 +209,11 @@ class OrdinaryProcess:
     compare outcomes `without_addresses`.
 
     Args:
-        rules: how the worlds are simulated.
+        settings: how the worlds are simulated.
     """
 
-    def __init__(self, rules: SimulationSettings = PAPER) -> None:
-        self.rules = rules
+    def __init__(self, settings: SimulationSettings = PAPER_SETTINGS) -> None:
+        self.settings = settings
         surroundings = {"PYTHONHASHSEED": "0", "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"}
         self._process = subprocess.Popen(
             [sys.executable, "-W", "ignore", str(ORDINARY)],
@@ -236,7 +236,7 @@ class OrdinaryProcess:
         """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        pickle.dump((source, world, self.rules), self._process.stdin)
+        pickle.dump((source, world, self.settings), self._process.stdin)
         self._process.stdin.flush()
         outcome = pickle.load(self._process.stdout)
         assert isinstance(outcome, Outcome)
@@ -275,13 +275,13 @@ def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
 def one_run(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> bool:
     """Fork for one program and wait for it; what it writes to the output is its outcome."""
     try:
-        source, world, rules = pickle.load(input_)
+        source, world, settings = pickle.load(input_)
     except EOFError:
         return False
     pid = os.fork()
     if pid == 0:
         try:
-            child(stand_in, source, SimulatedRobot(world, rules), output)
+            child(stand_in, source, SimulatedRobot(world, settings), output)
         finally:
             os._exit(1)
     return os.waitpid(pid, 0)[1] == 0
@@ -291,7 +291,7 @@ def child(stand_in: StandIn, source: str, robot: SimulatedRobot, output: IO[byte
     """Run the program and say how it ended."""
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    sys.setrecursionlimit(RECURSION_LIMIT)
+    sys.setrecursionlimit(PROGRAM_RECURSION_LIMIT)
     run = stand_in.run = Unwalled(robot)
     what = run.prepare(source)
     outcome = what if isinstance(what, Outcome) else run.ended(json.loads(run.execute(*what)))

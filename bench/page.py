@@ -18,7 +18,7 @@ from statistics import median
 
 from playwright.sync_api import Page, sync_playwright
 
-from codebotler.missions.log import EVENTS, events_of
+from codebotler.missions.log import EVENTS_FILE, read_events
 
 STOPS = int(os.environ.get("STOPS", "20"))
 AIM, AIM_OF_CHECKS = 150.0, 1000.0
@@ -38,8 +38,8 @@ def stopped(page: Page, home: Path, number: int) -> tuple[float, float]:
     time.sleep(0.2)
     start = page.evaluate(CLICK)
     page.locator(".headline.stopped").wait_for()
-    last = max((home / "missions").glob(f"*/{EVENTS}"), key=lambda path: path.stat().st_mtime)
-    events = {line["event"]: line["time"] for line in events_of(last.parent)}
+    last = max((home / "missions").glob(f"*/{EVENTS_FILE}"), key=lambda path: path.stat().st_mtime)
+    events = {line["event"]: line["time"] for line in read_events(last.parent)}
     return events["stop"] - start, events["cancelled"] - start
 
 

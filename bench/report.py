@@ -21,7 +21,7 @@ from codebotler.core.files import to_line, to_text
 from roboeval.evaluation.evaluate import evaluation_metadata
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions
@@ -55,9 +55,9 @@ def recorded() -> list[Completion]:
     return [completion for name in names for completion in recorded_completions(name, load_suite())]
 
 
-def made_up(folder: Path, number: int, suite: Suite) -> Run:
+def made_up(folder: Path, number: int, suite: Suite) -> RunFolder:
     """A run with synthetic completions, judged like the recorded ones that they copy."""
-    run = Run(folder / f"model-{number}")
+    run = RunFolder(folder / f"model-{number}")
     rows = verdicts()
     by_prompt: dict[tuple[str, int], list[int]] = {}
     for at, row in enumerate(rows):
@@ -65,7 +65,7 @@ def made_up(folder: Path, number: int, suite: Suite) -> Run:
     run.rows("paper").parent.mkdir(parents=True)
     about = {"model": f"model-{number}", "settings": {"temperature": 0.2}, "codebotler": "0.1.0"}
     run.about.write_bytes(to_text(about))
-    run.head("paper").write_bytes(to_text(evaluation_metadata(suite)))
+    run.manifest("paper").write_bytes(to_text(evaluation_metadata(suite)))
     with run.completions.open("wb") as completions, run.rows("paper").open("wb") as judged:
         for (task, prompt), those in by_prompt.items():
             for index in range(COMPLETIONS):
@@ -81,7 +81,7 @@ def made_up(folder: Path, number: int, suite: Suite) -> Run:
     return run
 
 
-def read(run: Run, suite: Suite) -> JudgedRun:
+def read(run: RunFolder, suite: Suite) -> JudgedRun:
     """Read a run like the command, with a check that rejects programs that end in an error."""
     results = read_results(run, "paper", suite)
     accepted = pl.col("failure_check").is_not_null() | pl.col("passed")

@@ -18,7 +18,7 @@ from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import overall
 from roboeval.analysis.summary import failures
 from roboeval.evaluation.evaluate import evaluation_metadata
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.rows import Seal
 
 ROWS = int(os.environ.get("ROWS", "100000"))
@@ -33,9 +33,9 @@ def timed(what: str, function: Callable[[], object]) -> float:
     return spent
 
 
-def made_up(folder: Path) -> Run:
+def made_up(folder: Path) -> RunFolder:
     """Create a judged run with a number of rows."""
-    run, suite = Run(folder), load_suite()
+    run, suite = RunFolder(folder), load_suite()
     completions = list(recorded_completions("recorded:hasty", suite))
     rows = list(evaluate(completions, suite, workers=2))
     times = -(-ROWS // len(rows))
@@ -50,7 +50,7 @@ def made_up(folder: Path) -> Run:
     with run.rows("paper").open("rb") as judged:
         for line in judged:
             seal.add(line)
-    run.head("paper").write_bytes(to_text({**evaluation_metadata(suite), **seal.data()}))
+    run.manifest("paper").write_bytes(to_text({**evaluation_metadata(suite), **seal.data()}))
     return run
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from codebotler.simulator.pool import SHARED, WorkerPool, cores
+from codebotler.simulator.pool import SHARED_POOL, WorkerPool, cores
 from completions import models
 from roboeval import Completion, evaluate, load_suite, recorded_completions, reward
 from roboeval.evaluation.runs.completions import read_completions
@@ -69,8 +69,8 @@ def measure_families() -> None:
     for turn in range(TURNS):
         rows = load_prompts("test", count=ROLLOUTS, seed=turn)
         for workers in (1, 2, 4, 8):
-            SHARED.end()
-            SHARED.pool = WorkerPool(workers).__enter__()
+            SHARED_POOL.end()
+            SHARED_POOL.pool = WorkerPool(workers).__enter__()
             rollouts = [rollout(row, f"{turn} {workers}") for row in rows]
             judge(rollouts[:1])
             began = time.monotonic()

@@ -341,7 +341,7 @@ class Measuring:
 
     def robots(self, worlds: Sequence[World]) -> list[partial[SimulatedRobot]]:
         """What makes the robots of some worlds."""
-        return [partial(SimulatedRobot, world, self.suite.rules) for world in worlds]
+        return [partial(SimulatedRobot, world, self.suite.settings) for world in worlds]
 
     def worlds(self, task: str) -> list[World]:
         """The worlds of a task."""

@@ -22,7 +22,7 @@ from statistics import median
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.missions.log import EVENTS, Line, events_of
+from codebotler.missions.log import EVENTS_FILE, LogLine, read_events
 from codebotler.missions.mission import Mission
 from codebotler.robots.base import (
     CancelledError,
@@ -85,7 +85,7 @@ def by_call(home: Path) -> Iterator[Times]:
     for _ in range(STOPS):
         robot, drives = Timed(WORLD), threading.Event()
 
-        def told(line: Line, drives: threading.Event = drives) -> None:
+        def told(line: LogLine, drives: threading.Event = drives) -> None:
             if line["event"] == "feedback":
                 drives.set()
 
@@ -135,7 +135,7 @@ class Server(VirtualRobot):
 
 
 def stopped(
-    robot: Robot, home: Path, drives: threading.Event, told: Callable[[Line], None] = lambda _: None
+    robot: Robot, home: Path, drives: threading.Event, told: Callable[[LogLine], None] = lambda _: None
 ) -> float:
     """When the mission was stopped, which has the robot drive; it has ended.
 
@@ -176,8 +176,8 @@ def by_signal(home: Path) -> Iterator[Times]:
             start = time.time()
             tool.send_signal(signal.SIGINT)
             tool.communicate()
-        last = max((home / "missions").glob(f"*/{EVENTS}"), key=lambda path: path.stat().st_mtime)
-        events = {line["event"]: line for line in events_of(last.parent)}
+        last = max((home / "missions").glob(f"*/{EVENTS_FILE}"), key=lambda path: path.stat().st_mtime)
+        events = {line["event"]: line for line in read_events(last.parent)}
         told = events["stop"]["time"] - start
         yield 1000 * told, 1000 * (events["cancelled"]["time"] - start)
 
@@ -185,10 +185,10 @@ def by_signal(home: Path) -> Iterator[Times]:
 def by_pyrobosim(home: Path) -> Iterator[Times]:
     """Stop missions of a robot in pyrobosim, as their events tell."""
     for _ in range(STOPS):
-        lines: list[Line] = []
+        lines: list[LogLine] = []
         drives = threading.Event()
 
-        def told(line: Line, lines: list[Line] = lines, drives: threading.Event = drives) -> None:
+        def told(line: LogLine, lines: list[LogLine] = lines, drives: threading.Event = drives) -> None:
             lines.append(line)
             if line["event"] == "feedback":
                 drives.set()

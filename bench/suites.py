@@ -30,7 +30,7 @@ def seconds(pool: WorkerPool, suite: Suite, task: str, program: str) -> tuple[fl
     scenarios = suite.tasks[task].scenarios
     start = time.perf_counter()
     for scenario in scenarios:
-        judge(pool.here().run(program, partial(SimulatedRobot, scenario.world, suite.rules)), scenario)
+        judge(pool.here().run(program, partial(SimulatedRobot, scenario.world, suite.settings)), scenario)
     return time.perf_counter() - start, len(scenarios)
 
 

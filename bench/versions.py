@@ -20,7 +20,7 @@ from codebotler.simulator.engine import run
 from codebotler.simulator.settings import Limits, SimulationSettings
 
 PYTHONS_OWN = re.compile("0x[0-9a-f]+|(?<=maximum recursion depth exceeded)[a-z ]+", re.IGNORECASE)
-RULES = SimulationSettings(limits=Limits(ticks=2_000, calls=60))
+SETTINGS = SimulationSettings(limits=Limits(ticks=2_000, calls=60))
 AMY = Person("amy", ("yes", "no", "hello|kitchen", ".*"))
 WORLD = World(
     (
@@ -60,7 +60,7 @@ def compared(outcome: Outcome) -> list[object]:
 
 def outcomes(sources: list[str]) -> list[list[object]]:
     """What comes of programs under this version."""
-    return [compared(outcome) for outcome in run([(s, WORLD) for s in sources], workers=1, rules=RULES)]
+    return [compared(outcome) for outcome in run([(s, WORLD) for s in sources], workers=1, settings=SETTINGS)]
 
 
 def compare(sources: list[str], pythons: list[str]) -> int:

@@ -14,7 +14,7 @@ from codebotler.core.world_file import OptionFile, PersonFile, RoomFile
 from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
 from codebotler.simulator.sandbox.stdlib import LISTED
-from roboeval.linting.findings import Kind
+from roboeval.linting.findings import FindingKind
 from roboeval.suites.schema import (
     Ability,
     AcceptedFinding,
@@ -89,7 +89,7 @@ def keys(*forms: type[BaseModel]) -> set[str]:
 
 @pytest.mark.parametrize(
     ("head", "known"),
-    [("category", get_args(Category)), ("ability", get_args(Ability)), ("finding", get_args(Kind))],
+    [("category", get_args(Category)), ("ability", get_args(Ability)), ("finding", get_args(FindingKind))],
 )
 def test_categories_abilities_and_findings_are_listed(head: str, known: tuple[str, ...]) -> None:
     assert sorted(named(TASKS, head)) == sorted(known)

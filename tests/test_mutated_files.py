@@ -53,7 +53,7 @@ def solutions(file: YamlFile) -> object:
 
 
 def suite(file: YamlFile) -> object:
-    return file.validate(SuiteFile).rules.rules()
+    return file.validate(SuiteFile).rules.settings()
 
 
 Read = Callable[[YamlFile], object]

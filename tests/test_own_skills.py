@@ -18,7 +18,7 @@ from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world_file import read_world
-from codebotler.missions.store import missions
+from codebotler.missions.store import read_missions
 from codebotler.simulator.sampled_robot import RoomMap
 from roboeval.cli.app import app as roboeval
 from roboeval.evaluation.judge import evaluate
@@ -140,7 +140,7 @@ def test_an_instruction_becomes_a_program_and_a_mission(
     assert all(f"def {skill}(" in told for skill in own.skills)
     rules = ["--rules", str(own.folder / "rules.yaml")]
     output = asked("run", instruction, *own.options, *model, *rules, "--yes", "--speed", "0")
-    (mission,) = missions(tmp_path)
+    (mission,) = read_missions(tmp_path)
     assert mission.state == "done", output
     shown = asked("missions", "last", "--skills", str(own.folder / "skills.py"))
     words = {skill.verb.third for skill in own.skills.rows[len(SKILLS) :] if skill.verb}

@@ -19,7 +19,7 @@ from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from command_line import forked
 from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.task import check_label
 from runs_server import serving
 from seals import unseal
@@ -39,7 +39,7 @@ def made(folder: Path, model: str, *arguments: str, count: int = 3) -> Path:
     return path
 
 
-def grown(run: Run, times: int) -> None:
+def grown(run: RunFolder, times: int) -> None:
     """Let a run have each of its completions so many times, with other indices."""
     for path in (run.completions, run.rows("paper")):
         rows = [json.loads(line) for line in path.read_bytes().splitlines()]
@@ -158,7 +158,7 @@ def test_a_line_that_ends_a_program_is_marked(served: PageServer, opened: OpenPa
 def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
     few_runs: Path, opened: OpenPage
 ) -> None:
-    run = Run(few_runs / "hasty")
+    run = RunFolder(few_runs / "hasty")
     said = {"no_program": "cut-off", "finish_reason": "length", "latency_s": 2.5}
     said |= {"usage": {"input_tokens": 900, "output_tokens": 512, "reasoning_tokens": 400}}
     said |= {"reasoning": "Let me think <b>hard</b>.", "raw_reply": "I will"}
@@ -226,7 +226,7 @@ def test_everything_is_reached_with_the_keyboard(served: PageServer, opened: Ope
 
 
 def test_a_long_list_has_few_rows_in_the_page(runs: Path, opened: OpenPage) -> None:
-    grown(Run(runs / "hasty"), 17)
+    grown(RunFolder(runs / "hasty"), 17)
     with serving(runs) as server:
         page = opened(server, "runs/hasty")
         expect(page.locator("#count")).to_have_text("4,080 completions")
@@ -244,7 +244,7 @@ def test_a_long_list_has_few_rows_in_the_page(runs: Path, opened: OpenPage) -> N
 
 def test_a_run_is_followed_while_it_is_made(runs: Path, opened: OpenPage) -> None:
     """The test writes what a model's slow replies would, line by line, under the lock of a writer."""
-    whole, run = Run(runs / "hasty"), Run(runs / "growing")
+    whole, run = RunFolder(runs / "hasty"), RunFolder(runs / "growing")
     lines = {
         path: (whole.path / path).read_bytes().splitlines(keepends=True)
         for path in ("completions.jsonl", "evaluations/paper.jsonl")
@@ -333,7 +333,7 @@ def test_a_run_that_is_deleted_while_it_is_looked_at(few_runs: Path, opened: Ope
 
 
 def test_a_damaged_row_is_said_and_the_others_are_shown(few_runs: Path, opened: OpenPage) -> None:
-    rows = Run(few_runs / "hasty").rows("paper")
+    rows = RunFolder(few_runs / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
     rows.write_bytes(b"".join([*lines[:10], b"{broken\n", *lines[11:]]))
     with serving(few_runs) as server:
@@ -358,7 +358,7 @@ def test_an_address_of_nothing_says_so(served: PageServer, opened: OpenPage) -> 
 # --- texts
 
 
-def changed(run: Run, change: Callable[[dict[str, Any], dict[str, Any]], None]) -> None:
+def changed(run: RunFolder, change: Callable[[dict[str, Any], dict[str, Any]], None]) -> None:
     """Rewrite a run's completions and their rows."""
     completions = [json.loads(line) for line in run.completions.read_bytes().splitlines()]
     rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
@@ -383,7 +383,7 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
     """A program, a model, an instruction, an error, a check, a world, a room, a task, a run, a file."""
     name = "".join(c for c in evil if c.isprintable()).replace("/", "|")[:80].strip()
     whole = evil.encode(errors="replace").decode()  # a name in an address holds no half character
-    run = Run(tmp_path / "runs" / name)
+    run = RunFolder(tmp_path / "runs" / name)
     shutil.copytree(few, run.path)
 
     def make_evil(completion: dict[str, Any], row: dict[str, Any]) -> None:
@@ -406,7 +406,7 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
             row["failure"] |= {"class": whole[:300], "kind": whole[:300], "check": check}
 
     changed(run, make_evil)
-    head = json.loads(run.head("paper").read_text())
+    head = json.loads(run.manifest("paper").read_text())
     shutil.copy(run.rows("paper"), run.rows(name))
     with serving(run.path.parent) as server:
         for size in (DESK, PHONE) if len(evil) > LONGEST else (PHONE,):

@@ -75,11 +75,11 @@ def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, opened: Op
 def test_what_the_robot_does_is_seen(server: PageServer, opened: OpenPage) -> None:
     face = face_of(server, opened)
     server.run(FAR)
-    expect(face.locator("#doing")).to_have_text("On my way: kitchen")
+    expect(face.locator("#doing")).to_have_text("On my way to kitchen")
     expect(face.locator("body[data-doing=moving]")).to_be_visible()
     face.locator("#stop").click()
     expect(face.locator("#stop-told")).to_have_text("The robot has stopped.")
-    expect(face.locator("#doing")).not_to_have_text("On my way: kitchen")
+    expect(face.locator("#doing")).not_to_have_text("On my way to kitchen")
     expect(face.locator("body[data-doing=idle]")).to_be_visible()
     assert server.call("GET", "/api/robot").data["reason"] == "stopped by a person at the face"
 
@@ -87,7 +87,7 @@ def test_what_the_robot_does_is_seen(server: PageServer, opened: OpenPage) -> No
 def test_stop_needs_nothing_of_the_rest_of_the_face(server: PageServer, opened: OpenPage) -> None:
     face = face_of(server, opened)
     server.run(FAR)
-    expect(face.locator("#doing")).to_have_text("On my way: kitchen")
+    expect(face.locator("#doing")).to_have_text("On my way to kitchen")
     held: list[Route] = []
 
     def hold(route: Route) -> None:  # Playwright wants a function of Python's own
@@ -205,7 +205,7 @@ def test_questions_are_answered_by_tab_and_enter(server: PageServer, opened: Ope
 def test_escape_stops_the_robot(server: PageServer, opened: OpenPage) -> None:
     face = face_of(server, opened)
     server.run(FAR)
-    expect(face.locator("#doing")).to_have_text("On my way: kitchen")
+    expect(face.locator("#doing")).to_have_text("On my way to kitchen")
     face.keyboard.press("Escape")
     expect(face.locator("#stop-told")).to_have_text("The robot has stopped.")
 

@@ -91,7 +91,7 @@ def test_from_an_instruction_to_an_answer_on_a_real_graph(
         expect(operator.get_by_text("Checked: no problems.")).to_be_visible()
         expect(operator.get_by_role("button", name="Run it on the robot")).to_be_enabled()
         operator.get_by_role("button", name="Run it on the robot").click()
-        expect(face.locator("#doing")).to_have_text("On my way: study")
+        expect(face.locator("#doing")).to_have_text("On my way to study")
         expect(face.locator("#question")).to_have_text("Would you like tea?")
         face.locator("#options button", has_text="Yes").click()
         expect(operator.locator(".headline")).to_have_text("Done")

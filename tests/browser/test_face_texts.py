@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Page, WebSocketRoute, expect
 
-from codebotler.web.face import words
+from codebotler.web.face import screen_text
 from evil import EVIL, NAMES, OWN_TAGS
 from faces import HEARING, SPEAKING
 from pageserver import PageServer
@@ -61,9 +61,9 @@ def test_no_text_becomes_more_than_text(server: PageServer, opened: OpenPage, ev
     before, beside = face.locator(OWN_TAGS).count(), operator.locator(OWN_TAGS).count()
     server.run(program_of(evil), despite_problems=True)
     expect(face.locator("#options button")).to_have_count(3)
-    shown = squeezed(words(evil[:LONGEST], 300))
-    assert squeezed(face.locator("#said p").last.inner_text())[:200] == squeezed(words(evil))[:200]
-    assert squeezed(face.locator("#question").inner_text())[:200] == squeezed(words(evil))[:200]
+    shown = squeezed(screen_text(evil[:LONGEST], 300))
+    assert squeezed(face.locator("#said p").last.inner_text())[:200] == squeezed(screen_text(evil))[:200]
+    assert squeezed(face.locator("#question").inner_text())[:200] == squeezed(screen_text(evil))[:200]
     assert squeezed(face.locator("#person").inner_text()) == f"For{shown}"
     assert squeezed(face.locator("#options span").first.inner_text()) == shown
     expect(operator.locator(".asking button")).to_have_count(3)

@@ -119,7 +119,7 @@ def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, opened:
     server.run(ASKS)
     until(face, "window.listening.length === 1")
     face.evaluate("hear('I would rather have coffee')")
-    expect(face.locator("#heard-text")).to_contain_text("which is none of the answers")
+    expect(face.locator("#heard-text")).to_contain_text("which is not one of the answers")
     expect(face.locator("#take")).to_be_hidden()
     face.evaluate("hear('oh yes or no thank you', 'yes')")
     expect(face.locator("#heard-text")).to_have_text(
@@ -158,9 +158,7 @@ def test_a_browser_that_may_not_listen_says_so(server: PageServer, opened: OpenP
     face.evaluate("fail('no-speech')")
     expect(voice).to_be_checked()
     face.evaluate("fail('not-allowed')")
-    expect(face.locator("#ended")).to_have_text(
-        "The browser does not let this page listen. Please choose by touch."
-    )
+    expect(face.locator("#ended")).to_have_text("The browser blocks the microphone. Please tap an answer.")
     expect(voice).not_to_be_checked()
     option(face, "Yes").click()
     expect(said(face)).to_have_text("She says Yes")

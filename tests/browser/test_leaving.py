@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from codebotler.missions.store import missions
+from codebotler.missions.store import read_missions
 from pageserver import PageServer
 from viewing import PHONE, OpenPage
 
@@ -52,7 +52,8 @@ def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, 
     expect(face.locator("#doing")).to_have_text("I was stopped.")
     until_over(server)
     assert (
-        missions(server.home)[-1].reason == "stopped by CodeBotler, since the last operator closed the page"
+        read_missions(server.home)[-1].reason
+        == "stopped by CodeBotler, because the last operator closed the page"
     )
 
 

@@ -76,7 +76,7 @@ def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> Non
         page = opened(server)
         page.locator(".picks .pick").first.click()
         page.get_by_role("button", name="Write the program").click()
-        expect(page.get_by_text("Recorded program, no language model.")).to_be_visible()
+        expect(page.get_by_text("A recorded program, not written by a language model.")).to_be_visible()
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         assert page.locator(".strip .scene").count() > 3
         assert "def task_program" in text_of(page)
@@ -172,14 +172,14 @@ def test_only_what_this_browser_shows_is_approved(server: PageServer, opened: Op
     expect(button).to_be_enabled()
     button.evaluate("""(button) => {
         const show = programEditor.show;
-        programEditor.show = (what) => what.anyway && show(what);  // no other word of the tool arrives
+        programEditor.show = (what) => what.force && show(what);  // no other update arrives
         const pane = Object.values(mounted_app.$refs).find((each) => each?.editor);
         pane.emitting = false;
         pane.editor.dispatch({changes: {from: 0, insert: "# something else\\n"}});
         pane.emitting = true;
         button.click();
     }""")
-    expect(page.get_by_text("look at it again")).to_be_visible()
+    expect(page.get_by_text("review it again")).to_be_visible()
     expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
     expect(page.locator(".cm-content")).not_to_contain_text("something else")
 
@@ -282,7 +282,7 @@ def test_a_program_that_is_too_long_is_refused_in_a_sentence(server: PageServer,
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text("# " + "x" * 200_000)
-    expect(page.get_by_text("A program can have at most 200,000 characters")).to_be_visible()
+    expect(page.get_by_text("The limit is 200,000 characters")).to_be_visible()
     expect(page.locator(".cm-content")).to_contain_text("Tea for ann, please")
 
 
@@ -328,7 +328,7 @@ def test_recent_instructions_are_up_to_date(tmp_path: Path, opened: OpenPage) ->
         expect(page.locator(".pick .state")).to_have_count(0)
         page.locator("#stop").click()
         expect(page.locator(".pick .state")).to_have_text("stopped")
-        expect(page.get_by_role("button", name="Prepare it again")).to_be_visible()
+        expect(page.get_by_role("button", name="Prepare another run")).to_be_visible()
         page.context.close()
 
 
@@ -355,7 +355,7 @@ def test_an_empty_editor_says_that_programs_can_be_typed(tmp_path: Path, opened:
         assert "def task_program():" in page.evaluate(shown)
         checked(page, TEA)
         assert page.evaluate(shown) == "none"
-        expect(page.get_by_text("A program of your own, without an instruction.")).to_be_visible()
+        expect(page.get_by_text("Your own program, without an instruction.")).to_be_visible()
         page.context.close()
 
 

@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from made_up_runs import HOSTILE, made_up
-from roboeval.report.page import SCRIPT
+from roboeval.report.page import PAGE_SCRIPT
 from roboeval.report.writing import sections, write_report
 from viewing import chromium
 
@@ -35,7 +35,7 @@ addEventListener("load", () => {
     const cells = [...prompts.tBodies[0].rows].map((row) => row.cells[last].textContent);
     seen.push("missing " + way + ": " + cells);
   }
-  const groups = [...document.querySelectorAll(".cluster")];
+  const groups = [...document.querySelectorAll(".group")];
   const shown = () => groups.filter((one) => one.offsetParent !== null).length;
   const all = shown();
   const [model, , , search] = document.querySelectorAll(".filters select, .filters input");
@@ -142,7 +142,7 @@ def test_nothing_is_cut_off_on_paper(browser: Browser, page: Path) -> None:
 
 def test_without_a_script_it_reads_as_a_document(chromium: str, page: Path, tmp_path: Path) -> None:
     quiet = tmp_path / "quiet.html"
-    quiet.write_text(page.read_text().replace(SCRIPT.read_text(), ""))
+    quiet.write_text(page.read_text().replace(PAGE_SCRIPT.read_text(), ""))
     text = opened(chromium, quiet, tmp_path)
     assert "<button" not in text
     assert 'class="filters"' not in text

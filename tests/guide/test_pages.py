@@ -20,8 +20,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from codebotler.missions.log import State
-from codebotler.missions.wording import EVENTS
+from codebotler.missions.log import MissionState
+from codebotler.missions.wording import _EVENT_WORDERS
 from server import Server
 
 ROOT = Path(__file__).parents[2]
@@ -368,13 +368,14 @@ def test_states_and_events_of_missions_are_documented() -> None:
     assert re.findall(r"^\| `(\w+)` \|", states, re.MULTILINE) == [
         *(
             state
-            for state in State
-            if state not in {State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED}
+            for state in MissionState
+            if state
+            not in {MissionState.DONE, MissionState.FAILED, MissionState.STOPPED, MissionState.INTERRUPTED}
         ),
-        *(State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED),
+        *(MissionState.DONE, MissionState.FAILED, MissionState.STOPPED, MissionState.INTERRUPTED),
     ]
     rows = dict(re.findall(r"^\| `(\w+)` \|(.*)", lines, re.MULTILINE))
-    assert set(re.findall(r"`(\w+)`", rows["event"])) == set(EVENTS)
+    assert set(re.findall(r"`(\w+)`", rows["event"])) == set(_EVENT_WORDERS)
 
 
 @pytest.mark.parametrize("page", ["report.md"])

@@ -16,7 +16,7 @@ import pytest
 from codebotler.core.trace import Outcome
 from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.process.fork_server_client import ForkServer
-from codebotler.simulator.worker import NOTHING, EngineError, Job, Meanwhile, NewRobot, Worker
+from codebotler.simulator.worker import DO_NOTHING, EngineError, Job, Meanwhile, NewRobot, Worker
 
 Started = TypeVar("Started")
 Ran = TypeVar("Ran")
@@ -33,7 +33,9 @@ class SharedWorker(Worker):
         start = self._preparer.start
         self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
-    def run_tame(self, jobs: Sequence[Job], meanwhile: Meanwhile = NOTHING) -> dict[tuple[int, int], Outcome]:
+    def run_tame(
+        self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
+    ) -> dict[tuple[int, int], Outcome]:
         """Run the tame ones of some programs."""
         return self._running(lambda: super(SharedWorker, self).run_tame(jobs, meanwhile))
 

@@ -16,8 +16,8 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Trace
 from codebotler.core.world import World
 from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluation.runs.completions import Completion, Key
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.completions import Completion, CompletionKey
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results, without_other_traces
 from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.table import TableBuilder, keys_where
@@ -36,7 +36,7 @@ VERDICT = {
 }
 
 
-def judged_rows(rows: Iterable[Mapping[str, Any]], programs: Mapping[Key, str] = {}) -> list[Row]:
+def judged_rows(rows: Iterable[Mapping[str, Any]], programs: Mapping[CompletionKey, str] = {}) -> list[Row]:
     """Rows as they are read; what a test leaves out is filled in."""
     return [decode_row(to_line(_whole(row, programs.get(key_of(row), "")))) for row in rows]
 
@@ -80,7 +80,7 @@ def table_of(rows: Iterable[Mapping[str, Any]]) -> pl.DataFrame:
 def results_of(
     rows: Iterable[Mapping[str, Any]],
     suite: Suite | None = None,
-    programs: Mapping[Key, str] = {},
+    programs: Mapping[CompletionKey, str] = {},
     *,
     completions: Iterable[Completion] = (),
     ablated: bool = False,
@@ -108,10 +108,10 @@ def results_of(
             failed[key_of(row)] = without_other_traces(row, failure["world"])
     table = builder.table()
     return Results(
-        run=Run(Path("nowhere")),
+        run=RunFolder(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",
         suite=suite,
-        head=head,
+        manifest=head,
         about={},
         completions=written,
         table=table,

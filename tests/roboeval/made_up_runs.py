@@ -13,7 +13,7 @@ import polars as pl
 from codebotler.simulator.settings import SimulationSettings
 from made_results import VERDICT, results_of
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.report.runs import JudgedRun
 from roboeval.suites.load import Suite
 from small_run import TASK
@@ -101,7 +101,7 @@ def judged(
     ]
     results = replace(
         results_of(rows, suite, completions=completions, head={**HEAD, "suite": suite.name}),
-        run=Run(Path(folder or name.partition("<")[0] or "hostile")),
+        run=RunFolder(Path(folder or name.partition("<")[0] or "hostile")),
         **fields,
     )
     alone = [row for row in rows if row["task"] in ablated]

@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 
 from codebotler.core.files import to_text
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 
 
 def unseal(run: Path, key: str = "paper") -> None:
     """Let an evaluation be one that was not finished, whose rows may be any."""
-    path = Run(run).head(key)
+    path = RunFolder(run).manifest(key)
     head = json.loads(path.read_text())
     path.write_bytes(to_text({name: value for name, value in head.items() if name not in {"rows", "sha256"}}))

@@ -22,7 +22,7 @@ from mcap.reader import make_reader
 from bridges import bridge, over_ros
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.missions.log import events_of
+from codebotler.missions.log import read_events
 from codebotler.robots.base import CameraPicture, CancelledError, Options
 from codebotler.robots.ros import ros1, rosbridge
 from codebotler.robots.ros.connection_file import read_connection
@@ -151,7 +151,7 @@ def test_mission_keeps_what_the_robot_saw(graph: Graph, tmp_path: Path) -> None:
     for text in ("I see the mug", "no cat"):
         others.expect("goal", text)
     (folder,) = (tmp_path / "missions").iterdir()
-    lines = events_of(folder)
+    lines = read_events(folder)
     kinds = [line["event"] for line in lines if line.get("skill") == "is_in_room"]
     assert kinds == ["skill", "picture", "result"] * 2
     assert [line["file"] for line in lines if line["event"] == "picture"] == [

@@ -22,7 +22,7 @@ from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros.virtual import VirtualRobot
-from codebotler.robots.simulated import SIMULATED_RULES, Simulated
+from codebotler.robots.simulated import SIMULATION, Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
@@ -88,7 +88,7 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
     tasks = [(task.name, task.prompts[0], task.scenarios[0].world) for task in paper.tasks.values()]
     programs = [model.solution(instruction, 0).program for _, instruction, _ in tasks]
     worlds = [world for _, _, world in tasks]
-    simulated = list(run(zip(programs, worlds, strict=True), workers=1, rules=SIMULATED_RULES))
+    simulated = list(run(zip(programs, worlds, strict=True), workers=1, settings=SIMULATION))
     assert len(tasks) == 16
 
     virtual = VirtualRobot(worlds[0], speed=SPEED, port=graph.port)
@@ -100,7 +100,7 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
             virtual._body = Simulated(world, speed=SPEED)
             virtual._body.connect()
             robot.connect()
-            live = LiveRobot(robot, lambda *_, **__: None, clock_starts=SIMULATED_RULES.clock_starts)
+            live = LiveRobot(robot, lambda *_, **__: None, clock_starts=SIMULATION.clock_starts)
             outcome = worker.run_live(program, live)
             assert outcome.status == Status.FINISHED == expected.status, (name, outcome)
             assert outcome.trace == expected.trace, name

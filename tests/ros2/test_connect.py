@@ -15,7 +15,7 @@ import pytest
 from codebotler.checking.rules import read_rules
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
-from codebotler.missions.progress import AT
+from codebotler.missions.progress import POSITION_FEEDBACK
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros.connected import ConnectedRobot
 from codebotler.robots.ros.connection_file import read_connection
@@ -245,7 +245,7 @@ def test_planner_keeps_out_of_rooms_that_rules_forbid(robots: Robots) -> None:
     assert [width, height, cells] == [40, 60, 40 * 60]  # 2 m by 3 m
     reported: list[str | CameraPicture] = []
     robot.perform("go_to", ["hall"], reported.append)
-    way = [tuple(map(float, match)) for one in reported for match in re.findall(AT, str(one))]
+    way = [tuple(map(float, match)) for one in reported for match in re.findall(POSITION_FEEDBACK, str(one))]
     assert len(way) > 5
     assert not [(x, y) for x, y in way if 3 < x < 5 and -1.5 < y < 1.5]
     robot.keep_out(())
@@ -314,6 +314,6 @@ def test_robot_that_drives_on_without_a_pose_is_stopped(robots: Robots, tmp_path
     connection = CONNECTION.replace("/amcl_pose", "/once")
     status, said = mission(robots, "    go_to('hall')\n    say('there')\n", connection)
     assert status == 1
-    assert "without telling where" in said
+    assert "stopped reporting its position" in said
     told(nav2, "goal")
     told(nav2, "cancel")

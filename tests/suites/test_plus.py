@@ -42,7 +42,7 @@ def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None)
     scenarios = task.scenarios
     shown = worlds or [scenario.world for scenario in scenarios]
     pairs = [(program, world) for program in programs for world in shown]
-    outcomes = iter([*run(pairs, workers=2, rules=plus().rules)])
+    outcomes = iter([*run(pairs, workers=2, settings=plus().settings)])
     return [[judge(next(outcomes), scenario) for scenario in scenarios] for _ in programs]
 
 

@@ -26,7 +26,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
+from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
 
@@ -93,7 +93,7 @@ def _opened(pool: WorkerPool | None, workers: int | None) -> Iterator[WorkerPool
         try:
             yield shared_pool()
         except KeyboardInterrupt:  # or the program would run on, and hold up the end of this process
-            SHARED.end()
+            SHARED_POOL.end()
             raise
 
 
@@ -105,7 +105,7 @@ def check_on(
 ) -> Check:
     """Check one program on one worker, which belongs to the calling thread, for checks at the same time."""
     how = settings or CheckSettings()
-    worker.begin_to_prepare(program, how.skills, how.rules)
+    worker.begin_to_prepare(program, how.skills, how.simulation)
     run = partial(run_samples, worker, program, settings=how)
     with worker.one_child():
         return _checked(program, room_map or room_map_for(program, skills=how.skills), how, run)

@@ -12,7 +12,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, outcome_data
 from codebotler.core.words import brief, counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.sampled_robot import Fact, RoomMap
+from codebotler.simulator.sampled_robot import RoomMap, SampledFact
 
 
 @dataclass(frozen=True)
@@ -47,19 +47,19 @@ class Sample:
 
     number: int  # of the world, from 0
     outcome: Outcome
-    facts: tuple[Fact, ...] = field(default=(), repr=False)  # about the world, in the order of the run
+    facts: tuple[SampledFact, ...] = field(default=(), repr=False)  # about the world, in the order of the run
     draws: tuple[Draw, ...] = field(default=(), repr=False)  # that settled them, in order
     in_vain: bool = False  # it waited or searched in vain, so that its end says little
     is_chosen: bool = False  # the world was no random one, but chosen for a fact that had not been met
 
     def is_as_in(self, sampler: FactSampler) -> bool:
         """Whether a run in another world would meet the same facts, and so be the same."""
-        return all(draw.is_drawn_by(sampler) for draw in self.draws)
+        return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
     def drawn(self) -> tuple[str, ...]:
         """The facts that chance settled, in words."""
-        return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.by_lot))
+        return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.is_random))
 
     @property
     def world(self) -> str:
@@ -133,7 +133,7 @@ class Check:
             "samples": [
                 {
                     "sample": sample.number,
-                    "world": [{"fact": f.sentence, "drawn": f.by_lot} for f in sample.facts],
+                    "world": [{"fact": f.sentence, "drawn": f.is_random} for f in sample.facts],
                     "in_vain": sample.in_vain,
                     **outcome_data(sample.outcome, skills),
                 }

@@ -18,7 +18,7 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.rule_guard import RuleGuard, name_of
-from codebotler.simulator.sampled_robot import PEOPLE
+from codebotler.simulator.sampled_robot import PERSON_WORDS
 from codebotler.simulator.settings import finds
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
@@ -200,7 +200,11 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         named: list[tuple[str, Text | None, list[str]]] = [("thing", element.holding, things)]
         named.append(("person", element.to, people))
         named.append(("room", None if element.place is None else Regex(element.place), rooms))
-        sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *PEOPLE - {""}]}
+        sorts = {
+            "room": rooms,
+            "object": things,
+            "object or person": [*things, *people, *PERSON_WORDS - {""}],
+        }
         row = by_event(element.kind)
         sort = row.recording.names if row is not None and row.recording is not None else ""
         named.append(

@@ -12,7 +12,7 @@ from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.settings import found_in
+from codebotler.simulator.settings import is_in_request
 
 
 def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
@@ -60,5 +60,5 @@ def may_mean(pattern: str, labels: Iterable[str]) -> bool:
         not texts
         or matches("")
         or matches("\uffff")
-        or any(matches(label) or any(found_in(label, text) for text in texts) for label in labels)
+        or any(matches(label) or any(is_in_request(label, text) for text in texts) for label in labels)
     )

@@ -20,7 +20,7 @@ from codebotler.simulator.process.exit_status import PROCESSOR_TIME
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
 from codebotler.simulator.settings import SimulationSettings
-from codebotler.simulator.worker import NOTHING, Job, Meanwhile, Worker
+from codebotler.simulator.worker import DO_NOTHING, Job, Meanwhile, Worker
 
 SAMPLES, MOST_SAMPLES = 5, 10_000
 EXPLORED = 2  # times as many worlds at most, to meet each fact in every way
@@ -35,7 +35,7 @@ class CheckSettings:
     samples: int = SAMPLES
     seed: int = 0  # of the worlds: the same ones on every machine
     strict: bool = False  # whether to draw also what the program takes for granted
-    rules: SimulationSettings = AS_WRITTEN
+    simulation: SimulationSettings = AS_WRITTEN
     skills: SkillTable = SKILLS
     house_rules: tuple[Rule, ...] = ()  # what a program must keep to in every world
 
@@ -74,7 +74,7 @@ class SampledRuns:
         how = self.settings
         guard = RuleGuard(how.house_rules, self.room_map.plan) if how.house_rules else None
         sampler = self.samplers[number]
-        robot = SampledRobot(self.room_map, sampler, how.rules, how.skills, guard=guard)
+        robot = SampledRobot(self.room_map, sampler, how.simulation, how.skills, guard=guard)
         self._robots[number] = robot
         return robot
 
@@ -86,7 +86,7 @@ def run_samples(
     samplers: Sequence[FactSampler],
     settings: CheckSettings,
     *,
-    meanwhile: Meanwhile = NOTHING,
+    meanwhile: Meanwhile = DO_NOTHING,
 ) -> list[Sample]:
     """Run a program in sampled worlds; of worlds that are alike to it, only the first may be run."""
     if not samplers:
@@ -143,7 +143,7 @@ def unexplored(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactS
     found: list[FactSampler] = []
     for sample, sampler in zip(ran, drew, strict=True):
         for draw in sample.draws:
-            for other in draw.others:
+            for other in draw.alternatives:
                 if (other.method, other.arguments, other.result) not in met:
                     met.add((other.method, other.arguments, other.result))
                     found.append(replace(sampler, forced=(*sampler.forced, other)))

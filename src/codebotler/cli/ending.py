@@ -27,7 +27,7 @@ from codebotler.core.terminal import (
 if TYPE_CHECKING:
     from codebotler.models.recorded import UnknownInstructionError
 
-ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
+IS_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
 USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
 ENVIRONMENT = (*DISK_FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
@@ -41,7 +41,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     The status is 2 for what was asked wrongly, 1 for what the machine could not do.
     """
     if sys.platform == "win32":
-        note(f"{name}: {ON_WINDOWS}")
+        note(f"{name}: {IS_WINDOWS}")
         raise SystemExit(1)
     atexit.register(gc.freeze)  # to look for garbage at the end takes a tenth of the time of a long command
     open_streams()

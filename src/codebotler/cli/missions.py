@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 from codebotler.cli.views import list_view, mission_view
 from codebotler.core.terminal import note, print_json, print_rich
-from codebotler.missions.log import Summary, events_of
-from codebotler.missions.pictures import FOLDER, picture_of
-from codebotler.missions.store import find, missions, recover
+from codebotler.missions.log import MissionSummary, read_events
+from codebotler.missions.pictures import PICTURE_FOLDER, read_picture
+from codebotler.missions.store import find_mission, read_missions, recover_missions
 
 if TYPE_CHECKING:
-    from codebotler.missions.mcap import Clock
+    from codebotler.missions.mcap import TimeSource
 
 
 def show_missions(home: Path, *, json: bool) -> None:
     """Print all missions, the last one last."""
-    recover(home)
-    known = missions(home)
+    recover_missions(home)
+    known = read_missions(home)
     if json:
         print_json([asdict(summary) for summary in known])
     else:
@@ -28,23 +28,23 @@ def show_missions(home: Path, *, json: bool) -> None:
 
 def show_mission(home: Path, name: str, *, json: bool) -> None:
     """Print the events of a mission; `last` names the last one."""
-    recover(home)
-    folder = find(home, name)
-    summary, events = Summary.read(folder), events_of(folder)
+    recover_missions(home)
+    folder = find_mission(home, name)
+    summary, events = MissionSummary.read(folder), read_events(folder)
     if json:
         print_json({**asdict(summary), "events": events})
     else:
         print_rich(mission_view(summary, events))
-        if any(picture_of(folder, line) for line in events):
-            note(f"its pictures are in {folder / FOLDER}")
+        if any(read_picture(folder, line) for line in events):
+            note(f"its pictures are in {folder / PICTURE_FOLDER}")
 
 
-def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
+def write_mission(home: Path, name: str, path: Path, *, clock: TimeSource) -> None:
     """Write a mission as an MCAP file."""
-    from codebotler.missions.mcap import export
+    from codebotler.missions.mcap import export_mcap
 
-    recover(home)
-    folder = find(home, name)
-    summary, events = Summary.read(folder), events_of(folder)
-    export(path, summary, events, clock, folder)
+    recover_missions(home)
+    folder = find_mission(home, name)
+    summary, events = MissionSummary.read(folder), read_events(folder)
+    export_mcap(path, summary, events, clock, folder)
     note(f"wrote {len(events):,} events of mission {summary.id} to {path}")

@@ -174,7 +174,7 @@ def serve_page(
 
     kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
-    access = Access.asked_for(token, face_token, open_to_all=no_token, is_private=place.is_private)
+    access = Access.from_options(token, face_token, open_to_all=no_token, is_private=place.is_private)
     options.note_office(kind, shared["world"])
     models = tuple(model or dict.fromkeys((choose_model().name, "recorded:careful", "recorded:hasty")))
     opened = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))

@@ -23,7 +23,7 @@ from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.simulator.house_rule import Rule
 
-ANY_TEXT = ("", "x")  # in examples, these mean any text
+ANY_ARGUMENT = ("", "x")  # in examples, these mean any text
 WHEN_WORDS = {"always": "at any time", "finally": "at the end"}
 
 
@@ -89,17 +89,19 @@ def step_sentence(event: Event, room: str = "") -> str:
     drives = is_drive(event)
     any_text = "another room" if drives else "something"
     quote = "" if verb(event.kind).object else '"'
-    given = [any_text if t in ANY_TEXT else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)]
+    given = [
+        any_text if t in ANY_ARGUMENT else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)
+    ]
     parts = [verb_phrase(event.kind, "third", given, "")]
-    offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in ANY_TEXT]
+    offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in ANY_ARGUMENT]
     more = len(event.options) - len(offered)
     offered += [f"{more} {'more' if offered else 'options'}"] if more > 1 else []
     parts += [f"offering {listed(offered)}"] if offered else []
-    parts += [f'of "{visible(event.to)}"'] if event.to and event.to not in ANY_TEXT else []
+    parts += [f'of "{visible(event.to)}"'] if event.to and event.to not in ANY_ARGUMENT else []
     where = "from" if drives else "in"
-    is_known = event.place in ANY_TEXT or (drives and event.place == room)
+    is_known = event.place in ANY_ARGUMENT or (drives and event.place == room)
     parts += [] if is_known else [f"{where} {visible(event.place)}"]
-    held = "something" if event.holding in ANY_TEXT else f'"{visible(event.holding)}"'
+    held = "something" if event.holding in ANY_ARGUMENT else f'"{visible(event.holding)}"'
     parts += [f"holding {held}"] if event.holding else []
     if event.found is not None:
         parts.append(f"and {'finds it' if event.found else 'does not find it'}")

@@ -18,11 +18,11 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.core.words import listed
 from codebotler.core.world import World
-from codebotler.missions.log import State
-from codebotler.missions.mission import GRACE, MissionError
+from codebotler.missions.log import MissionState
+from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import recover
-from codebotler.missions.view import Order, SessionView
+from codebotler.missions.store import recover_missions
+from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
@@ -95,8 +95,8 @@ def run(
     """
     program = read_program(request.what) if request.is_program else ""
     tell_missing(robot)
-    recover(home)
-    order = Order(program=program) if program else Order(request.what, request.model)
+    recover_missions(home)
+    order = MissionOrder(program=program) if program else MissionOrder(request.what, request.model)
     checked = checker(robot.skills)
     session = MissionSession(
         robot, home, order, open_model=open_model, check=checked, rules=request.rules, world=world
@@ -113,7 +113,7 @@ def run(
         session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
         session.join(CLEANUP_SECONDS)
         raise
-    session.join(GRACE)
+    session.join(STOP_GRACE_SECONDS)
     return 1
 
 
@@ -183,9 +183,9 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
     if session.error is not None:
         raise session.error
     print_rich(ending_view(view))
-    if view.state is State.STOPPED and got:
+    if view.state is MissionState.STOPPED and got:
         return SIGNAL_EXIT_BASE + got[0]
-    return 0 if view.state is State.DONE else 1
+    return 0 if view.state is MissionState.DONE else 1
 
 
 @contextmanager
@@ -200,7 +200,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
         session.stop_soon(SIGNALS[signal.Signals(number)])
         got.append(number)
         if len(got) > 1:
-            note(f"\nasked the robot to stop; it has {GRACE:g} s to confirm")
+            note(f"\nasked the robot to stop; it has {STOP_GRACE_SECONDS:g} s to confirm")
 
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]

@@ -23,10 +23,10 @@ from codebotler.core.trace import Event, Option
 from codebotler.core.words import listed
 from codebotler.prompts.rendering import stub
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.sampled_robot import Lot, RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import RandomOutcome, RoomMap, SampledRobot
 
 WORLD_COUNT = 40  # for each skill
-EXAMPLE_ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
+PROMPT_EXAMPLE_ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
 SKILLS_TEMPLATE = '''\
 """Further skills of this robot; `codebotler skills {name}` shows them as models see them."""
 
@@ -79,7 +79,7 @@ def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
     found: dict[str, SkillTrial] = {}
     earlier = [one for one in skills.rows[: skills.rows.index(row)] if one not in SKILLS.rows]
     for number in range(WORLD_COUNT):
-        robot = SampledRobot(EXAMPLE_ROOMS, FactSampler(0, number), skills=skills)
+        robot = SampledRobot(PROMPT_EXAMPLE_ROOMS, FactSampler(0, number), skills=skills)
         for one in earlier if number % 2 else ():  # the skill may depend on them
             with suppress(RobotError):
                 robot.perform(one.name, _example(one))
@@ -91,7 +91,11 @@ def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
         except RobotError as error:
             outcome = f"fails with {error.kind}: {str(error).removeprefix(f'{row.name}: ')}"
         event = robot.trace[-1] if robot.trace else None
-        drawn = [fact for fact in robot.facts if not (isinstance(fact, Lot) and fact.statement == row.call)]
+        drawn = [
+            fact
+            for fact in robot.facts
+            if not (isinstance(fact, RandomOutcome) and fact.statement == row.call)
+        ]
         facts = tuple(fact.sentence for fact in drawn)
         found.setdefault(outcome, SkillTrial(outcome, facts, event))
     return list(found.values())

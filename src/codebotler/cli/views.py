@@ -13,18 +13,18 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import console, shortened, visible
-from codebotler.missions.log import Line, State, Summary
+from codebotler.missions.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import event_text, title
 from codebotler.models.chosen import ChosenModel
 from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness
 
-STATE_STYLES: Mapping[State, str] = {
-    State.DONE: "bold green",
-    State.FAILED: "bold red",
-    State.STOPPED: "bold yellow",
-    State.INTERRUPTED: "bold red",
+STATE_STYLES: Mapping[MissionState, str] = {
+    MissionState.DONE: "bold green",
+    MissionState.FAILED: "bold red",
+    MissionState.STOPPED: "bold yellow",
+    MissionState.INTERRUPTED: "bold red",
 }
 EVENT_STYLES: Mapping[str, str] = {
     "feedback": "dim",
@@ -57,7 +57,7 @@ class EventPrinter:
     ) -> None:
         self._end_line()
 
-    def __call__(self, line: Line) -> None:
+    def __call__(self, line: LogLine) -> None:
         """Print an event."""
         text = _event_line(line)
         if not text or line["event"] == "state":
@@ -75,13 +75,13 @@ class EventPrinter:
             self._is_half = False
 
 
-def _time_text(line: Line) -> str:
+def _time_text(line: LogLine) -> str:
     """Return the time of an event by the robot's clock."""
     clock = float(line["clock"])
     return f"{clock:.1f} s" if clock < MAX_PLAIN_SECONDS else f"{clock:.1e} s"
 
 
-def _event_line(line: Line) -> Text:
+def _event_line(line: LogLine) -> Text:
     """Return an event as a styled line; empty if it has no text."""
     text = Text(event_text(line), EVENT_STYLES.get(line["event"], ""))
     if line["event"] == "state":
@@ -91,25 +91,25 @@ def _event_line(line: Line) -> Text:
     return text
 
 
-def ending_view(ended: Summary | SessionView) -> Group:
+def ending_view(ended: MissionSummary | SessionView) -> Group:
     """Show the end of a mission, and the command that shows it again, on one line for copying."""
     state = ended.state
     assert state is not None, "the mission has begun"
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))
-    if state is State.STOPPED:
+    if state is MissionState.STOPPED:
         text.append("\nthe robot has stopped")
     again = f"`codebotler missions {ended.id}` shows this mission again"
     return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
 
 
-def _why(ended: Summary | SessionView) -> str:
+def _why(ended: MissionSummary | SessionView) -> str:
     line = "" if ended.line is None else f" in line {ended.line}"
     if ended.state is not None and ended.reason.startswith(f"{ended.state} "):  # such as `stopped by Ctrl-C`
         return shortened(ended.reason).removeprefix(ended.state) + line
     return f"{line}: {shortened(ended.reason)}" if ended.reason else line
 
 
-def list_view(summaries: Sequence[Summary]) -> RenderableType:
+def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
     """Show all missions, a line each."""
     if not summaries:
         return Text("there are no missions yet", "dim")
@@ -128,7 +128,7 @@ def list_view(summaries: Sequence[Summary]) -> RenderableType:
     return table
 
 
-def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
+def mission_view(summary: MissionSummary, events: Sequence[LogLine]) -> RenderableType:
     """Show a mission with its events."""
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from codebotler.core.skills.declaration import by_event, verb_for
 from codebotler.core.skills.table import Recording
 from codebotler.core.skills.verbs import Verb, VerbForm
+from codebotler.core.terminal import visible
 from codebotler.core.trace import Event, Option
 from codebotler.core.words import brief
 
@@ -59,8 +60,10 @@ def bracketed(options: Sequence[Option], show: Callable[[str], str] = brief) -> 
 
 def verb(kind: str) -> Verb:
     """The verb for a kind of event, also for one that no skill of this process leaves."""
-    other = Verb(f"do {kind}", f"does {kind}", f"did {kind}", f"doing {kind}", f"did {kind}")
-    return verb_for(kind) or other
+    if (known := verb_for(kind)) is not None:
+        return known
+    shown = visible(kind)
+    return Verb(f"do {shown}", f"does {shown}", f"did {shown}", f"doing {shown}", f"did {shown}")
 
 
 def takes_nothing(kind: str) -> bool:

@@ -1,4 +1,4 @@
-"""Messages by whose schemas Foxglove recognises poses, frames, rooms, log lines and pictures."""
+"""Messages in Foxglove's schemas: poses, frames, rooms, log lines and pictures."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from codebotler.core.world import Point, Room
 Schema: TypeAlias = Mapping[str, Any]
 Message: TypeAlias = dict[str, Any]
 
-MAP, ROBOT = "map", "robot"
-"""The frames: rooms and poses are in `map`, which the 3D panel displays by default."""
+MAP_FRAME, ROBOT_FRAME = "map", "robot"
+"""The coordinate frames; `map` is the one that the 3D panel displays by default."""
 
-SECOND = 1_000_000_000  # nanoseconds
-DEBUG, INFO, WARNING, ERROR = 1, 2, 3, 4  # levels of a log line
-LINE_LOOP = 1  # the type of a closed line
-LINE_WIDTH, LETTER_HEIGHT = 0.05, 0.4  # metres
-COLOR = {"r": 0.35, "g": 0.55, "b": 0.8, "a": 1.0}
-FORMATS = {"jpg": "jpeg", "png": "png"}
+SECOND_NS = 1_000_000_000  # nanoseconds
+LEVEL_DEBUG, LEVEL_INFO, LEVEL_WARNING, LEVEL_ERROR = 1, 2, 3, 4
+_LINE_LOOP = 1  # the type of a closed line
+_LINE_WIDTH, _LETTER_HEIGHT = 0.05, 0.4  # metres
+_OUTLINE_COLOR = {"r": 0.35, "g": 0.55, "b": 0.8, "a": 1.0}
+_IMAGE_FORMATS = {"jpg": "jpeg", "png": "png"}
 
 TEXT: Schema = {"type": "string"}
-NUMBER: Schema = {"type": "number"}
-WHOLE: Schema = {"type": "integer"}
-YES_OR_NO: Schema = {"type": "boolean"}
+FLOAT: Schema = {"type": "number"}
+INTEGER: Schema = {"type": "integer"}
+BOOLEAN: Schema = {"type": "boolean"}
 
 
 def _object(title: str = "", **properties: Schema) -> Schema:
@@ -36,96 +36,78 @@ def _array(items: Schema) -> Schema:
     return {"type": "array", "items": items}
 
 
-TIME = _object("time", sec=WHOLE, nsec=WHOLE)
-DURATION = _object("duration", sec=WHOLE, nsec=WHOLE)
-VECTOR = _object(x=NUMBER, y=NUMBER, z=NUMBER)
-QUATERNION = _object(x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER)
-POSE = _object(position=VECTOR, orientation=QUATERNION)
-RGBA = _object(r=NUMBER, g=NUMBER, b=NUMBER, a=NUMBER)
-LINE = _object(
-    type=WHOLE, pose=POSE, thickness=NUMBER, scale_invariant=YES_OR_NO, points=_array(VECTOR), color=RGBA
+_TIME = _object("time", sec=INTEGER, nsec=INTEGER)
+_DURATION = _object("duration", sec=INTEGER, nsec=INTEGER)
+_VECTOR = _object(x=FLOAT, y=FLOAT, z=FLOAT)
+_QUATERNION = _object(x=FLOAT, y=FLOAT, z=FLOAT, w=FLOAT)
+_POSE = _object(position=_VECTOR, orientation=_QUATERNION)
+_RGBA = _object(r=FLOAT, g=FLOAT, b=FLOAT, a=FLOAT)
+_LINE = _object(
+    type=INTEGER, pose=_POSE, thickness=FLOAT, scale_invariant=BOOLEAN, points=_array(_VECTOR), color=_RGBA
 )
-LABEL = _object(
-    pose=POSE, billboard=YES_OR_NO, font_size=NUMBER, scale_invariant=YES_OR_NO, color=RGBA, text=TEXT
+_LABEL = _object(
+    pose=_POSE, billboard=BOOLEAN, font_size=FLOAT, scale_invariant=BOOLEAN, color=_RGBA, text=TEXT
 )
-ENTITY = _object(
-    timestamp=TIME,
+_ENTITY = _object(
+    timestamp=_TIME,
     frame_id=TEXT,
     id=TEXT,
-    lifetime=DURATION,
-    frame_locked=YES_OR_NO,
-    lines=_array(LINE),
-    texts=_array(LABEL),
+    lifetime=_DURATION,
+    frame_locked=BOOLEAN,
+    lines=_array(_LINE),
+    texts=_array(_LABEL),
 )
 
 SCHEMAS: Mapping[str, Schema] = {
-    "foxglove.PoseInFrame": _object(timestamp=TIME, frame_id=TEXT, pose=POSE),
+    "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=TEXT, pose=_POSE),
     "foxglove.FrameTransform": _object(
-        timestamp=TIME,
-        parent_frame_id=TEXT,
-        child_frame_id=TEXT,
-        translation=VECTOR,
-        rotation=QUATERNION,
+        timestamp=_TIME, parent_frame_id=TEXT, child_frame_id=TEXT, translation=_VECTOR, rotation=_QUATERNION
     ),
-    "foxglove.SceneUpdate": _object(entities=_array(ENTITY)),
-    "foxglove.Log": _object(timestamp=TIME, level=WHOLE, message=TEXT, name=TEXT, file=TEXT, line=WHOLE),
+    "foxglove.SceneUpdate": _object(entities=_array(_ENTITY)),
+    "foxglove.Log": _object(timestamp=_TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT, line=INTEGER),
     "foxglove.CompressedImage": _object(
-        timestamp=TIME, frame_id=TEXT, data={**TEXT, "contentEncoding": "base64"}, format=TEXT
+        timestamp=_TIME, frame_id=TEXT, data={**TEXT, "contentEncoding": "base64"}, format=TEXT
     ),
 }
-"""The schemas by name, with the fields that are written here."""
+"""The schemas by name, with only the fields that we write."""
 
 
 def pose_in_frame(at: Point, heading: float, time: int) -> Message:
-    """Where the robot is.
-
-    Args:
-        at: its position in metres.
-        heading: the direction in which it moves, in radians from the x axis.
-        time: nanoseconds since 1970.
-    """
-    return {"timestamp": _time(time), "frame_id": MAP, "pose": _pose(at, heading)}
+    """The robot's pose: position in metres, heading in radians from the x axis, time in ns since 1970."""
+    return {"timestamp": _time(time), "frame_id": MAP_FRAME, "pose": _pose(at, heading)}
 
 
 def frame_transform(at: Point, heading: float, time: int) -> Message:
-    """The robot's frame in the frame of the map; the arguments are those of `pose_in_frame`."""
+    """The robot's frame relative to the map; takes the arguments of `pose_in_frame`."""
     pose = _pose(at, heading)
     return {
         "timestamp": _time(time),
-        "parent_frame_id": MAP,
-        "child_frame_id": ROBOT,
+        "parent_frame_id": MAP_FRAME,
+        "child_frame_id": ROBOT_FRAME,
         "translation": pose["position"],
         "rotation": pose["orientation"],
     }
 
 
 def scene_update(rooms: Iterable[Room], time: int) -> Message:
-    """The outlines and names of rooms that have a footprint and a point where the robot stops."""
+    """The outlines and names of rooms that were laid out."""
     return {"entities": [_entity(room, time) for room in rooms]}
 
 
 def log_line(level: int, message: str, name: str, line: int | None, time: int) -> Message:
-    """A line of the log.
-
-    Args:
-        level: DEBUG, INFO, WARNING or ERROR.
-        message: what happened.
-        name: the skill, or the kind of event.
-        line: the line of the program, if known.
-        time: nanoseconds since 1970.
-    """
+    """A log line: `name` is a skill or a kind of event, `line` the program's, `time` in ns since 1970."""
     where = {"file": "", "line": 0} if line is None else {"file": "program.py", "line": line}
     return {"timestamp": _time(time), "level": level, "message": message, "name": name, **where}
 
 
 def compressed_image(kind: str, data: bytes, time: int) -> Message:
-    """A picture: its kind is `jpg` or `png`, its time is in nanoseconds since 1970."""
+    """A picture; `kind` is `jpg` or `png`, `time` is in ns since 1970."""
     encoded = base64.b64encode(data).decode()
-    return {"timestamp": _time(time), "frame_id": "", "data": encoded, "format": FORMATS[kind]}
+    return {"timestamp": _time(time), "frame_id": "", "data": encoded, "format": _IMAGE_FORMATS[kind]}
 
 
 def _time(time: int) -> Message:
-    return {"sec": time // SECOND, "nsec": time % SECOND}
+    return {"sec": time // SECOND_NS, "nsec": time % SECOND_NS}
 
 
 def _vector(at: Point) -> Message:
@@ -141,26 +123,26 @@ def _entity(room: Room, time: int) -> Message:
     assert room.footprint is not None, "rooms are laid out"
     assert room.stand_at is not None, "rooms are laid out"
     outline = {
-        "type": LINE_LOOP,
+        "type": _LINE_LOOP,
         "pose": _pose((0.0, 0.0)),
-        "thickness": LINE_WIDTH,
+        "thickness": _LINE_WIDTH,
         "scale_invariant": False,
         "points": [*map(_vector, room.footprint)],
-        "color": COLOR,
+        "color": _OUTLINE_COLOR,
     }
     label = {
         "pose": _pose(room.stand_at),
         "billboard": True,
-        "font_size": LETTER_HEIGHT,
+        "font_size": _LETTER_HEIGHT,
         "scale_invariant": False,
-        "color": COLOR,
+        "color": _OUTLINE_COLOR,
         "text": room.name,
     }
     return {
         "timestamp": _time(time),
-        "frame_id": MAP,
+        "frame_id": MAP_FRAME,
         "id": room.name,
-        "lifetime": {"sec": 0, "nsec": 0},  # until another one replaces it
+        "lifetime": {"sec": 0, "nsec": 0},  # until it is replaced
         "frame_locked": True,
         "lines": [outline],
         "texts": [label],

@@ -1,4 +1,4 @@
-"""The files of a mission: a log with a line for each event as it happens, and a summary."""
+"""The files of a mission: a log with one line per event, and a summary."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from typing import Any, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 
-EVENTS, SUMMARY = "events.jsonl", "mission.json"
+EVENTS_FILE, SUMMARY_FILE = "events.jsonl", "mission.json"
 
-Line: TypeAlias = dict[str, Any]
-"""An event: `time` (seconds since 1970), `clock` (the robot's, in seconds), `event` (what kind), and more."""
+LogLine: TypeAlias = dict[str, Any]
+"""An event: `time` (seconds since 1970), `clock` (robot seconds), `event` (its kind), and its data."""
 
-TEXTS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")  # of a summary
-HAS: Mapping[str, frozenset[str]] = {
+_TEXT_FIELDS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
+_REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "state": frozenset({"state"}),
     "skill": frozenset({"number", "skill", "arguments"}),
     "feedback": frozenset({"number", "skill", "text"}),
@@ -34,10 +34,10 @@ HAS: Mapping[str, frozenset[str]] = {
     "log": frozenset({"text"}),
     "map": frozenset({"rooms", "robot"}),
 }
-"""What belongs to each kind of event."""
+"""The keys of each kind of event."""
 
 
-class State(StrEnum):
+class MissionState(StrEnum):
     """The states of a mission."""
 
     DRAFTING = "drafting"
@@ -53,47 +53,48 @@ class State(StrEnum):
     @property
     def is_open(self) -> bool:
         """Whether the program can still be replaced."""
-        return self in {State.DRAFTING, State.CHECKED}
+        return self in {MissionState.DRAFTING, MissionState.CHECKED}
 
     @property
     def is_moving(self) -> bool:
-        """Whether the robot works, or ends what it did."""
-        return self in {State.RUNNING, State.STOPPING}
+        """Whether the robot works or is stopping."""
+        return self in {MissionState.RUNNING, MissionState.STOPPING}
 
     @property
     def is_final(self) -> bool:
         """Whether no other state follows."""
-        return self not in TRANSITIONS
+        return self not in NEXT_STATES
 
 
-TRANSITIONS: dict[State, frozenset[State]] = {
-    State.DRAFTING: frozenset({State.DRAFTING, State.CHECKED, State.FAILED, State.STOPPED}),
-    State.CHECKED: frozenset(
-        {State.DRAFTING, State.CHECKED, State.APPROVED, State.FAILED, State.STOPPED},
-    ),
-    State.APPROVED: frozenset({State.RUNNING, State.FAILED, State.STOPPED}),
-    State.RUNNING: frozenset({State.DONE, State.FAILED, State.STOPPING}),
-    State.STOPPING: frozenset({State.STOPPED, State.FAILED}),
+NEXT_STATES = {
+    MissionState(state): frozenset(map(MissionState, following.split()))
+    for state, following in {
+        "drafting": "drafting checked failed stopped",
+        "checked": "drafting checked approved failed stopped",
+        "approved": "running failed stopped",
+        "running": "done failed stopping",
+        "stopping": "stopped failed",
+    }.items()
 }
-"""The states that may follow each state; the others are final. A tool that dies leaves it interrupted."""
+"""The possible next states; the other states are final. A mission whose process died becomes interrupted."""
 
 
 @dataclass
-class Summary:
-    """A mission in short."""
+class MissionSummary:
+    """The main facts of a mission."""
 
-    id: str  # by which it is found
-    state: State
-    robot: str  # its kind
+    id: str
+    state: MissionState
+    robot: str  # the kind of robot
     created: float  # seconds since 1970
     instruction: str = ""  # empty if the program did not come from one
-    model: str = ""  # that wrote the program, if one did
+    model: str = ""  # the program's author; empty for a person
     program: str = ""
-    problems: tuple[str, ...] = ()  # found by the check, in sentences
-    reason: str = ""  # for its state, in a sentence
-    line: int | None = None  # of the program, at which it ended
+    problems: tuple[str, ...] = ()  # sentences from the check
+    reason: str = ""  # why it is in its state
+    line: int | None = None  # the program's line at which it ended
     ended: float | None = None  # seconds since 1970
-    if_tool_dies: str = ""  # what becomes of the robot then
+    if_tool_dies: str = ""  # what the robot does if CodeBotler ends unexpectedly
 
     @property
     def has_ended(self) -> bool:
@@ -101,39 +102,39 @@ class Summary:
         return self.state.is_final
 
     @classmethod
-    def read(cls, folder: Path) -> Summary:
-        """The summary of a mission, or a UserError."""
-        path = folder / SUMMARY
+    def read(cls, folder: Path) -> MissionSummary:
+        """Read the summary of a mission; raises UserError if it is damaged."""
+        path = folder / SUMMARY_FILE
         try:
             data = json.loads(path.read_bytes())
             summary = cls(**{field.name: data[field.name] for field in fields(cls) if field.name in data})
-            summary.state, summary.problems = State(summary.state), tuple(summary.problems)
+            summary.state, summary.problems = MissionState(summary.state), tuple(summary.problems)
             datetime.fromtimestamp(summary.created, UTC)
-            "".join((*summary.problems, *(getattr(summary, name) for name in TEXTS)))
+            "".join((*summary.problems, *(getattr(summary, name) for name in _TEXT_FIELDS)))
         except (ValueError, TypeError, OverflowError, RecursionError):
             raise UserError("this is not the summary of a mission; remove its folder", file=path) from None
         return summary
 
     def write(self, folder: Path) -> None:
-        """Write it whole, or leave what was there."""
-        write_whole(folder / SUMMARY, json.dumps(asdict(self), indent=1).encode())
+        """Replace the file in one step."""
+        write_whole(folder / SUMMARY_FILE, json.dumps(asdict(self), indent=1).encode())
 
 
-def log_of(folder: Path) -> Appender:
-    """The log of a mission, locked until it is closed; BlockingIOError if another process has it open."""
-    return Appender(folder / EVENTS, exclusive=True)
+def open_log(folder: Path) -> Appender:
+    """Open and lock the log of a mission; raises BlockingIOError if another process has it open."""
+    return Appender(folder / EVENTS_FILE, exclusive=True)
 
 
-def add_event(log: Appender, event: str, clock: float, **data: object) -> Line:
-    """Write an event at this moment, and return it."""
+def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLine:
+    """Write an event with the current time, and return it."""
     line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
     log.append(to_line(line))
     return line
 
 
-def events_of(folder: Path) -> list[Line]:
-    """The events of a mission, without a torn last line; UserError if a line is something else."""
-    path, events = folder / EVENTS, []
+def read_events(folder: Path) -> list[LogLine]:
+    """Read the events of a mission, except a torn last line; raises UserError if a line is no event."""
+    path, events = folder / EVENTS_FILE, []
     for number, line in read_rows(path, growing=True):
         if not _is_event(line):
             raise UserError("this is not an event of a mission; remove the line", file=path, line=number)
@@ -141,24 +142,24 @@ def events_of(folder: Path) -> list[Line]:
     return events
 
 
-def _is_event(line: Line) -> bool:
+def _is_event(line: LogLine) -> bool:
     try:
         kind, is_moment = line["event"], 0 <= line["time"] + line["clock"] < math.inf
     except (KeyError, TypeError):
         return False
-    return is_moment and isinstance(kind, str) and HAS.get(kind, frozenset()) <= line.keys()
+    return is_moment and isinstance(kind, str) and _REQUIRED_KEYS.get(kind, frozenset()) <= line.keys()
 
 
-SKILL_ENDS = frozenset({"result", "error", "cancelled", "late"})
-"""The events with which a skill ends."""
+SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
+"""The kinds of events that end a skill."""
 
 
-def doing(events: Iterable[Line]) -> Line | None:
-    """The skill that went on when the events broke off, if one did."""
-    going: Line | None = None
+def find_unfinished_skill(events: Iterable[LogLine]) -> LogLine | None:
+    """Return the event of the last skill that has not ended, if any."""
+    going: LogLine | None = None
     for line in events:
         if line["event"] == "skill":
             going = line
-        elif line["event"] in SKILL_ENDS:
+        elif line["event"] in SKILL_END_EVENTS:
             going = None
     return going

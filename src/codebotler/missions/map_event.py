@@ -1,4 +1,4 @@
-"""The event `map`: the rooms of a mission's world with their places in metres, and back."""
+"""Convert the map of a mission's world to and from the event `map`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from codebotler.core.world import Point, Room, World, laid_out
 
 
 def map_data(world: World) -> dict[str, Any]:
-    """The rooms of a world, each with its corners and the point where the robot stops, in metres."""
+    """Return the rooms of a world, each with its corners and its stopping point, in metres."""
     rooms = [
         {"name": room.name, "footprint": room.footprint, "stand_at": room.stand_at}
         for room in laid_out(world).rooms
@@ -18,16 +18,12 @@ def map_data(world: World) -> dict[str, Any]:
 
 
 def map_from(data: Mapping[str, Any]) -> World:
-    """The world of an event `map`: only its rooms, and the room in which the robot starts."""
+    """Return the world of an event `map`, with only its rooms and the robot's starting room."""
     rooms = [
-        Room(room["name"], footprint=_points(room["footprint"]), stand_at=_point(room["stand_at"]))
+        Room(room["name"], footprint=tuple(map(_point, room["footprint"])), stand_at=_point(room["stand_at"]))
         for room in data["rooms"]
     ]
     return World(tuple(rooms), data["robot"])
-
-
-def _points(pairs: Iterable[Iterable[float]]) -> tuple[Point, ...]:
-    return tuple(map(_point, pairs))
 
 
 def _point(pair: Iterable[float]) -> Point:

@@ -1,4 +1,4 @@
-"""Missions as MCAP files, for Foxglove and other tools of roboticists."""
+"""Export missions as MCAP files, for Foxglove and other robotics tools."""
 
 from __future__ import annotations
 
@@ -17,42 +17,31 @@ from codebotler import __version__
 from codebotler.core.files import expect_replaceable, written_whole
 from codebotler.core.world import Point, World
 from codebotler.missions import foxglove
-from codebotler.missions.foxglove import (
-    DEBUG,
-    ERROR,
-    INFO,
-    NUMBER,
-    SECOND,
-    TEXT,
-    WARNING,
-    WHOLE,
-    Message,
-    Schema,
-)
-from codebotler.missions.log import Line, State, Summary
+from codebotler.missions.foxglove import FLOAT, INTEGER, SECOND_NS, TEXT, Message, Schema
+from codebotler.missions.log import LogLine, MissionSummary
 from codebotler.missions.map_event import map_from
-from codebotler.missions.pictures import picture_of
-from codebotler.missions.progress import Progress, position
+from codebotler.missions.pictures import read_picture
+from codebotler.missions.progress import Progress, position_on_map
 from codebotler.missions.wording import event_text
 from codebotler.simulator.sampled_robot import RoomMap
 
-Clock: TypeAlias = Literal["wall", "robot"]
+TimeSource: TypeAlias = Literal["wall", "robot"]
 
-LATEST = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
-STATES, NOTES, POSE, FRAMES, ROOMS = "/mission/state", "/mission/log", "/robot/pose", "/tf", "/rooms"
-DETAILS = ("text", "message", "file")
-"""The keys of a skill's events that hold text."""
-LEVELS = {"feedback": DEBUG, "error": ERROR, **dict.fromkeys(("rule", "stop", "cancelled", "late"), WARNING)}
-"""The levels of log lines, by kind of event; for others it is INFO."""
-STATE_SCHEMA: Schema = {
-    "type": "object",
-    "properties": {"state": TEXT, "reason": TEXT, "clock": NUMBER},
+MAX_TIME_NS = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
+_TEXT_KEYS = ("text", "message", "file")
+"""The keys under which a skill's events hold text."""
+_LOG_LEVELS = {
+    "feedback": foxglove.LEVEL_DEBUG,
+    "error": foxglove.LEVEL_ERROR,
+    **dict.fromkeys(("rule", "stop", "cancelled", "late"), foxglove.LEVEL_WARNING),
 }
-TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
+"""Log levels by kind of event; others have INFO."""
+_STATE_SCHEMA: Schema = {"type": "object", "properties": {"state": TEXT, "reason": TEXT, "clock": FLOAT}}
+_JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
-class Item(NamedTuple):
-    """A message for a topic; a schema of Foxglove's goes by its name, others by their topic."""
+class TopicMessage(NamedTuple):
+    """A message and its topic; `schema` is the name of a Foxglove schema, or our own schema."""
 
     topic: str
     message: Message
@@ -61,26 +50,26 @@ class Item(NamedTuple):
 
 def write_mcap(
     file: IO[bytes],
-    summary: Summary,
-    events: Sequence[Line],
+    summary: MissionSummary,
+    events: Sequence[LogLine],
     *,
     folder: Path | None = None,
-    clock: Clock = "wall",
+    clock: TimeSource = "wall",
 ) -> None:
-    """Write a mission: a topic for each skill, and topics for states, the log, the robot's pose and rooms.
+    """Write a mission: one topic per skill, and topics for states, the log, the robot's pose and the rooms.
 
-    The program is attached. Messages are timed by the clock on the wall, or by the robot's, put to start with
-    the mission. Pictures lie in its `folder`; None leaves them out.
+    The program is an attachment. Times come from the wall clock, or from the robot's clock counted from the
+    beginning of the mission. Pictures are read from `folder`; None leaves them out.
     """
-    began = round(min(summary.created * SECOND, LATEST))
+    began = round(min(summary.created * SECOND_NS, MAX_TIME_NS))
     writer = Writer(file)
     writer.start(profile="", library=f"codebotler {__version__}")
     channels: dict[str, int] = {}
-    skills, way = _Skills(events), _Way()
+    skills, path = _SkillMessages(events), _RobotPath()
 
-    def time(line: Line) -> int:
+    def time(line: LogLine) -> int:
         seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
-        return round(min(seconds * SECOND, LATEST))
+        return round(min(seconds * SECOND_NS, MAX_TIME_NS))
 
     def add(topic: str, message: Message, schema: Schema | str, at: int) -> None:
         if topic not in channels:
@@ -92,41 +81,45 @@ def write_mcap(
 
     for line in events:
         at = time(line)
-        for item in (*_items(line, skills, at), *_pictures(line, folder, at), *way.items(line, at)):
+        for item in (
+            *_about_event(line, skills, at),
+            *_about_picture(line, folder, at),
+            *path.messages(line, at),
+        ):
             add(*item, at)
     last = time(events[-1]) if events else began
     program = summary.program.encode(errors="surrogatepass")
     writer.add_attachment(began, last, "program.py", "text/x-python", program)
-    writer.add_metadata("mission", _about(summary))
+    writer.add_metadata("mission", _metadata(summary))
     writer.finish()  # type: ignore[no-untyped-call]  # theirs
 
 
-def _items(line: Line, skills: _Skills, at: int) -> Iterator[Item]:
-    """The messages about an event: of its skill, of the state, and a line of the log."""
+def _about_event(line: LogLine, skills: _SkillMessages, at: int) -> Iterator[TopicMessage]:
+    """Yield the messages for an event: its skill, its state, and a log line."""
     event = line["event"]
     if "skill" in line:
-        yield skills.item(line)
+        yield skills.message(line)
     if event == "state":
         message = {"state": line["state"], "reason": line.get("reason", ""), "clock": line["clock"]}
-        yield Item(STATES, message, STATE_SCHEMA)
+        yield TopicMessage("/mission/state", message, _STATE_SCHEMA)
     text = event_text(line)
     if not text or (event == "sleep" and not line["seconds"]):
         return
-    level = ERROR if line.get("state") == State.FAILED else LEVELS.get(event, INFO)
-    name = str(line.get("skill", event))
-    yield Item(NOTES, foxglove.log_line(level, text, name, line.get("line"), at), "foxglove.Log")
+    level = _LOG_LEVELS.get("error" if line.get("state") == "failed" else event, foxglove.LEVEL_INFO)
+    message = foxglove.log_line(level, text, str(line.get("skill", event)), line.get("line"), at)
+    yield TopicMessage("/mission/log", message, "foxglove.Log")
 
 
-def _pictures(line: Line, folder: Path | None, at: int) -> Iterator[Item]:
-    if folder is not None and (picture := picture_of(folder, line)) is not None:
+def _about_picture(line: LogLine, folder: Path | None, at: int) -> Iterator[TopicMessage]:
+    if folder is not None and (picture := read_picture(folder, line)) is not None:
         image = foxglove.compressed_image(*picture, at)
-        yield Item(f"/skill/{line['skill']}/picture", image, "foxglove.CompressedImage")
+        yield TopicMessage(f"/skill/{line['skill']}/picture", image, "foxglove.CompressedImage")
 
 
-class _Skills:
-    """The messages of skills, with schemas of the arguments and results that these events have."""
+class _SkillMessages:
+    """Creates skill messages, with schemas inferred from all arguments and results."""
 
-    def __init__(self, events: Sequence[Line]) -> None:
+    def __init__(self, events: Sequence[LogLine]) -> None:
         arguments: dict[str, dict[str, list[object]]] = {}
         results: dict[str, list[object]] = {}
         for line in events:
@@ -140,43 +133,43 @@ class _Skills:
         }
         self._results = {skill: schema_of(values) for skill, values in results.items()}
 
-    def item(self, line: Line) -> Item:
-        """The message of a skill's event."""
+    def message(self, line: LogLine) -> TopicMessage:
+        """Return the message for a skill's event."""
         skill = line["skill"]
         arguments, result = self._arguments.get(skill, {}), self._results.get(skill)
         message = {"number": line["number"], "event": line["event"], "clock": line["clock"]}
         if "arguments" in line:
             given = line["arguments"].items()
-            message["arguments"] = {name: _fitting(value, arguments[name]) for name, value in given}
+            message["arguments"] = {name: _fit_schema(value, arguments[name]) for name, value in given}
         if result is not None and line.get("result") is not None:
-            message["result"] = _fitting(line["result"], result)
-        text = next((str(line[key]) for key in DETAILS if key in line), None)
+            message["result"] = _fit_schema(line["result"], result)
+        text = next((str(line[key]) for key in _TEXT_KEYS if key in line), None)
         if text is not None:
             message["text"] = f"{line['kind']}: {text}" if "kind" in line else text
         properties = {
-            "number": WHOLE,
+            "number": INTEGER,
             "event": TEXT,
-            "clock": NUMBER,
+            "clock": FLOAT,
             "text": TEXT,
             "arguments": {"type": "object", "properties": arguments},
             **({} if result is None else {"result": result}),
         }
-        return Item(f"/skill/{skill}", message, {"type": "object", "properties": properties})
+        return TopicMessage(f"/skill/{skill}", message, {"type": "object", "properties": properties})
 
 
-class _Way:
-    """The rooms, and the robot's way through them."""
+class _RobotPath:
+    """Creates messages for the rooms and the robot's poses."""
 
     def __init__(self) -> None:
         self._progress = Progress()
         self._world: World | None = None
         self._at: Point | None = None
 
-    def items(self, line: Line, at: int) -> Iterator[Item]:
-        """The messages of an event that tells of rooms, or after which the robot is elsewhere."""
+    def messages(self, line: LogLine, at: int) -> Iterator[TopicMessage]:
+        """Yield messages if an event contains the map or changes the robot's position."""
         if line["event"] == "map":
             self._world = map_from(line)
-            yield Item(ROOMS, foxglove.scene_update(self._world.rooms, at), "foxglove.SceneUpdate")
+            yield TopicMessage("/rooms", foxglove.scene_update(self._world.rooms, at), "foxglove.SceneUpdate")
         else:
             self._progress = self._progress.after(line)
         now, before = self._position(), self._at
@@ -184,43 +177,43 @@ class _Way:
             return
         self._at = now
         heading = 0.0 if before is None else math.atan2(now[1] - before[1], now[0] - before[0])
-        yield Item(POSE, foxglove.pose_in_frame(now, heading, at), "foxglove.PoseInFrame")
-        yield Item(FRAMES, foxglove.frame_transform(now, heading, at), "foxglove.FrameTransform")
+        yield TopicMessage("/robot/pose", foxglove.pose_in_frame(now, heading, at), "foxglove.PoseInFrame")
+        yield TopicMessage("/tf", foxglove.frame_transform(now, heading, at), "foxglove.FrameTransform")
 
     def _position(self) -> Point | None:
         if self._world is None:
             return self._progress.at
-        return position(self._progress, self._world, RoomMap.of(self._world))
+        return position_on_map(self._progress, self._world, RoomMap.of(self._world))
 
 
 def schema_of(values: Sequence[object]) -> dict[str, Any]:
-    """The schema of arguments or results; text where their types differ, since Foxglove takes no unions."""
+    """Infer a schema from values; mixed types become text, because Foxglove has no union types."""
     lists = [value for value in values if isinstance(value, list)]
     if len(lists) == len(values):
-        return {"type": "array", "items": {"type": _type([one for each in lists for one in each])}}
-    return {"type": _type(values)}
+        return {"type": "array", "items": {"type": _json_type([one for each in lists for one in each])}}
+    return {"type": _json_type(values)}
 
 
-def _type(values: Sequence[object]) -> str:
-    types = {_type_of(value) for value in values}
+def _json_type(values: Sequence[object]) -> str:
+    types = {_json_type_of(value) for value in values}
     if types == {"integer", "number"}:
         return "number"
     return types.pop() if len(types) == 1 else "string"
 
 
-def _type_of(value: object) -> str:
-    is_endless = isinstance(value, float) and not math.isfinite(value)  # JSON has no such numbers
-    return "string" if is_endless else TYPES.get(type(value), "string")
+def _json_type_of(value: object) -> str:
+    is_infinite = isinstance(value, float) and not math.isfinite(value)  # JSON has neither inf nor nan
+    return "string" if is_infinite else _JSON_TYPES.get(type(value), "string")
 
 
-def _fitting(value: object, schema: Mapping[str, Any]) -> object:
-    """The value, as text where the schema says so."""
+def _fit_schema(value: object, schema: Mapping[str, Any]) -> object:
+    """Convert a value to text where the schema requires it."""
     if schema["type"] == "array" and isinstance(value, list):
-        return [_fitting(one, schema["items"]) for one in value]
+        return [_fit_schema(one, schema["items"]) for one in value]
     return value if schema["type"] != "string" or isinstance(value, str) else str(value)
 
 
-def _about(summary: Summary) -> dict[str, str]:
+def _metadata(summary: MissionSummary) -> dict[str, str]:
     began = datetime.fromtimestamp(summary.created).astimezone()
     names = ("id", "state", "reason", "robot", "instruction", "model")
     about = {name: str(getattr(summary, name)) for name in names}
@@ -228,22 +221,22 @@ def _about(summary: Summary) -> dict[str, str]:
     return {name: text.encode(errors="backslashreplace").decode() for name, text in about.items()}
 
 
-def export(
+def export_mcap(
     path: Path,
-    summary: Summary,
-    events: Sequence[Line],
-    clock: Clock,
+    summary: MissionSummary,
+    events: Sequence[LogLine],
+    clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""
+    """Write an MCAP file in one step; raises UserError rather than overwrite a file of another kind."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
-    path.parent.stat()  # no folder is created where a name is mistyped
+    path.parent.stat()  # do not create folders for a mistyped name
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)
     if path.exists() and not path.is_file():
         path.write_bytes(whole.getvalue())
         return
-    temporary = path.with_name(f".{uuid4().hex}.mcap")  # no file of the user's, and no name that is too long
+    temporary = path.with_name(f".{uuid4().hex}.mcap")
     with written_whole(path, temporary) as file:
         file.write(whole.getvalue())

@@ -1,4 +1,4 @@
-"""The state machine of a mission: drafted, checked, approved, run on a robot, stopped at any moment."""
+"""The state machine of a mission: drafted, checked, approved, run on a robot, stopped at any time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
 from datetime import datetime
+from itertools import chain, count
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeAlias
@@ -16,9 +17,9 @@ from codebotler.core.terminal import visible
 from codebotler.core.trace import RunError, Status, Trace
 from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event, log_of
+from codebotler.missions.log import NEXT_STATES, LogLine, MissionState, MissionSummary, add_event, open_log
 from codebotler.missions.map_event import map_data
-from codebotler.missions.pictures import Pictures
+from codebotler.missions.pictures import PictureStore
 from codebotler.missions.stop import StopButton
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
@@ -28,42 +29,42 @@ from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
-GRACE = 10.0
-"""Real seconds that a robot has to confirm a stop."""
+STOP_GRACE_SECONDS = 10.0
+"""Real seconds within which a robot must confirm a stop."""
 
-SHUTTING_DOWN = "CodeBotler, shutting down"
-"""Who stops a mission that is still going on when the program ends."""
+BY_SHUTDOWN = "CodeBotler, shutting down"
+"""Named in the log when CodeBotler ends during a mission."""
 
-UNCONFIRMED = (
+UNCONFIRMED_STOP = (
     "the robot has not confirmed the stop; check it now, and press its emergency stop if it still moves"
 )
 
 
 class MissionError(Exception):
-    """A mission cannot do that now."""
+    """A mission does not allow this now."""
 
     @property
     def sentence(self) -> str:
-        """Why."""
+        """The message."""
         return str(self)
 
 
-EventListener: TypeAlias = Callable[[Line], None]
-"""Called with each event after it was written, one at a time, from any thread."""
+EventListener: TypeAlias = Callable[[LogLine], None]
+"""Called with each written event, one at a time, from any thread."""
 
 
 class Mission:
-    """One mission; leaving it as a context manager ends it.
+    """One mission; as a context manager, it ends at the end of the block.
 
     Args:
-        home: the folder of missions.
+        home: the folder that contains `missions`.
         robot: the kind of robot.
-        instruction: in plain words; empty where the program did not come from one.
+        instruction: in plain words; empty if there is none.
         on_event: called with each event.
-        stop_button: stops the mission and its robot; a new one by default.
+        stop_button: stops the mission and its robot; by default, a new one.
 
     Raises:
-        OSError: the folder cannot be written.
+        OSError: the folder is not writable.
     """
 
     def __init__(
@@ -74,20 +75,22 @@ class Mission:
         on_event: EventListener = lambda _: None,
         stop_button: StopButton | None = None,
     ) -> None:
-        self.folder = _new_folder(home / "missions")
-        self._log: Appender | None = log_of(self.folder)
-        self._pictures = Pictures(self.folder)
+        self.folder = _make_mission_folder(home / "missions")
+        self._log: Appender | None = open_log(self.folder)
+        self._pictures = PictureStore(self.folder)
         self.on_event = on_event
         self.stop_button = stop_button or StopButton()
-        self._writing = threading.RLock()  # held while an event is written; a stop waits for it last
-        self._has_program = False  # which may be empty
+        self._writing = threading.RLock()  # held while an event is written; a robot is cancelled without it
+        self._has_program = False  # even an empty one
         self._live: LiveRobot | None = None
         self._logged_rule: dict[str, object] = {}
         self._is_over = threading.Event()
         self._fault: Exception | None = None
         self.trace: Trace = ()
-        self.summary = Summary(self.folder.name, State.DRAFTING, robot, time.time(), instruction)
-        self._write("state", state=State.DRAFTING)
+        self.summary = MissionSummary(
+            self.folder.name, MissionState.DRAFTING, robot, time.time(), instruction
+        )
+        self._write("state", state=MissionState.DRAFTING)
         self.stop_button.on_press(self._log_stop)
 
     def __enter__(self) -> Self:
@@ -97,7 +100,7 @@ class Mission:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self._log_stop()  # the thread that stops the robot may not have come to it
+            self._log_stop()  # the thread that pressed STOP may not have logged it yet
             if not self.has_ended:
                 self._leave(error)
         finally:
@@ -105,12 +108,12 @@ class Mission:
 
     @property
     def id(self) -> str:
-        """Its name."""
+        """The name of its folder."""
         return self.summary.id
 
     @property
-    def state(self) -> State:
-        """Its state."""
+    def state(self) -> MissionState:
+        """The current state."""
         return self.summary.state
 
     @property
@@ -119,79 +122,56 @@ class Mission:
         return self.summary.has_ended
 
     def draft(self, program: str, model: str = "") -> None:
-        """Take a program, the first one or another, which is not checked yet.
-
-        Args:
-            program: its source.
-            model: the model that wrote it, if one did.
-
-        Raises:
-            MissionError: it is too late for that.
-        """
+        """Set or replace the program, and the model that wrote it; raises MissionError after the approval."""
         with self._writing:
-            self._step(State.DRAFTING, "take another program", program=program, model=model, problems=())
+            self._step(
+                MissionState.DRAFTING, "take another program", program=program, model=model, problems=()
+            )
             self._has_program = True
 
     def check(self, problems: Sequence[str]) -> None:
-        """Take the problems that a check found, in sentences.
-
-        Raises:
-            MissionError: it took no program, or it is too late for that.
-        """
+        """Record the problems that a check found; raises MissionError if there is no program to check."""
         with self._writing:
             if not self._has_program:
                 raise MissionError(f"mission {self.id} has no program to check")
-            self._step(State.CHECKED, "be checked", problems=tuple(problems))
+            self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
-        """Take a person's approval of the program.
-
-        Args:
-            despite_problems: whether they approve it although the check found problems.
-
-        Raises:
-            MissionError: the program was not checked, or has problems.
-        """
+        """Approve the program; raises MissionError if it is unchecked, or has unaccepted problems."""
         with self._writing:
-            if self.state is State.CHECKED and self.summary.problems and not despite_problems:
+            if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(
                     f"the program of mission {self.id} has problems; approve it despite them, or change it"
                 )
-            self._step(State.APPROVED, "be approved")
+            self._step(MissionState.APPROVED, "be approved")
 
     def fail(self, reason: str) -> None:
-        """Fail before running.
-
-        Raises:
-            MissionError: it runs, or has ended.
-        """
+        """Fail before running; raises MissionError if the mission runs or has ended."""
         with self._writing:
             if self.state.is_moving:
                 raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
-            self._step(State.FAILED, "fail", reason=reason)
+            self._step(MissionState.FAILED, "fail", reason=reason)
 
     def note(self, text: str) -> None:
         """Log a sentence."""
         self._write("log", text=text)
 
     def show_map(self, world: World) -> None:
-        """Log where the rooms are."""
+        """Log the map of the rooms."""
         self._write("map", **map_data(world))
 
     def stop(self, by: str = "somebody") -> None:
-        """Stop the robot and the program, from any thread; nothing else starts.
-
-        Returns when the robot was stopped and that is logged; `run` returns when all has ended.
+        """Stop the robot and the program, from any thread; `run` returns once they have ended.
 
         Args:
-            by: the person or thing that stops it, in words such as `Ctrl-C`.
+            by: the source of the stop, such as `Ctrl-C`, for the log.
 
         Raises:
-            MissionError: it has ended.
+            MissionError: the mission has ended.
         """
         had_ended = self.has_ended
         self.stop_button.press(by)
-        if had_ended or self.state not in {State.STOPPING, State.STOPPED}:
+        if had_ended or self.state not in {MissionState.STOPPING, MissionState.STOPPED}:
             raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
 
     def run(
@@ -201,69 +181,70 @@ class Mission:
         *,
         rules: Sequence[Rule] = (),
         room_map: RoomMap | None = None,
-    ) -> State:
-        """Run the program on a robot, and return when all has ended.
+    ) -> MissionState:
+        """Run the program on a robot until both have ended; return done, failed or stopped.
 
-        If a robot that was stopped does not confirm it within `GRACE` seconds, the mission fails.
+        The mission fails if the robot does not confirm a stop within `STOP_GRACE_SECONDS`.
 
         Args:
             reserved: the robot.
-            place: the room it is in, if known.
-            rules: what it must keep to; a call that breaks one stops the mission.
+            place: its current room, if known.
+            rules: the house rules; a broken one stops the mission.
             room_map: the rooms that the robot knows.
 
-        Returns:
-            done, failed or stopped.
-
         Raises:
-            MissionError: it is not approved.
-            NotReadyError: the robot is on another mission, or was.
-            OSError: an event could not be written or printed, so the robot was stopped.
+            MissionError: the program is not approved.
+            NotReadyError: the reservation is in use, or was used.
+            OSError: an event could not be logged or printed, so the robot was stopped.
         """
         guard = RuleGuard(rules, () if room_map is None else room_map.plan) if rules else None
         live = LiveRobot(
             reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
         )
         with self._writing:
-            if self.state is State.APPROVED:
+            if self.state is MissionState.APPROVED:
                 reserved.use()
                 self._live, self.stop_button.robot = live, reserved.robot
-            self._step(State.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
+            self._step(MissionState.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
         threading.Thread(target=self._execute, args=(live,), name=self.id, daemon=True).start()
         try:
             self.stop_button.ended.wait()
         except BaseException:
             with suppress(MissionError):
-                self.stop(SHUTTING_DOWN)
+                self.stop(BY_SHUTDOWN)
             raise
         finally:
-            if not self._is_over.wait(GRACE):
-                self._end(live, State.FAILED, UNCONFIRMED, None, is_lost=True)
+            if not self._is_over.wait(STOP_GRACE_SECONDS):
+                self._end(live, MissionState.FAILED, UNCONFIRMED_STOP, None, is_lost=True)
         if self._fault is not None:
             raise self._fault
         return self.state
 
     def _execute(self, live: LiveRobot) -> None:
-        """Run the program, on a thread of its own: a robot may never return from a skill."""
+        """Run the program on its own thread, because a skill may never return."""
         try:
             with closing(Worker()) as worker:
                 self.stop_button.on_press(worker.stop)
                 if self.stop_button.ended.is_set():
-                    raise StoppedError  # noqa: TRY301 - it ends like any other error
+                    raise StoppedError  # noqa: TRY301 - handled like any other error
                 outcome = worker.run_live(self.summary.program, live)
-        except BaseException as error:  # noqa: BLE001 - whatever it is, the robot must not go on
+        except BaseException as error:  # noqa: BLE001 - any error must stop the robot
             try:
                 live.stop()
             finally:
-                self._end(live, State.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError))
+                self._end(
+                    live, MissionState.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError)
+                )
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
             reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"
-            self._end(live, State.DONE if done else State.FAILED, reason, outcome.line, is_lost=False)
+            self._end(
+                live, MissionState.DONE if done else MissionState.FAILED, reason, outcome.line, is_lost=False
+            )
 
-    def _end(self, live: LiveRobot, state: State, reason: str, line: object, *, is_lost: bool) -> None:
-        """End, unless it has ended; a mission that ends after a stop is stopped, if the robot is not lost."""
+    def _end(self, live: LiveRobot, state: MissionState, reason: str, line: object, *, is_lost: bool) -> None:
+        """Enter a final state once: after a stop, it is `stopped` unless the robot is lost."""
         why = "" if is_lost else self.stop_button.why_unstopped()
         try:
             with self._writing:
@@ -271,27 +252,31 @@ class Mission:
                     return
                 self.trace = live.trace
                 self._log_stop()
-                if self.state is State.STOPPING and why:
-                    state, reason = State.FAILED, why
-                elif self.state is State.STOPPING and not is_lost:
-                    state, reason, line = State.STOPPED, self.summary.reason, live.broken_rule.get("line")
+                if self.state is MissionState.STOPPING and why:
+                    state, reason = MissionState.FAILED, why
+                elif self.state is MissionState.STOPPING and not is_lost:
+                    state, reason, line = (
+                        MissionState.STOPPED,
+                        self.summary.reason,
+                        live.broken_rule.get("line"),
+                    )
                 self._step(state, "end", reason=reason, line=line)
-        except Exception as error:  # noqa: BLE001 - raised by `run`
+        except Exception as error:  # noqa: BLE001 - `run` raises it
             self._fault = error
         finally:
             self._is_over.set()
             self.stop_button.ended.set()
 
     def _log_stop(self) -> None:
-        """Log who stopped it and which rule was broken, each once: after the stop, and before the end."""
+        """Log the source of the stop and the broken rule, once each."""
         with self._writing:
             by = self.stop_button.by
-            if by is not None and self.state is State.RUNNING:
+            if by is not None and self.state is MissionState.RUNNING:
                 seconds = round(self.stop_button.seconds, 6)
                 self._write("stop", by=by, seconds_to_cancel=seconds)
-                self._step(State.STOPPING, "be stopped", reason=stop_text(by))
+                self._step(MissionState.STOPPING, "be stopped", reason=stop_text(by))
             elif by is not None and not (self.state.is_moving or self.has_ended):
-                self._step(State.STOPPED, "be stopped", reason=f"{stop_text(by)} before it ran")
+                self._step(MissionState.STOPPED, "be stopped", reason=f"{stop_text(by)} before it ran")
             rule = {} if self._live is None else self._live.broken_rule
             if rule != self._logged_rule:
                 self._logged_rule = rule
@@ -299,15 +284,15 @@ class Mission:
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state.is_moving:
-            self.stop(SHUTTING_DOWN)
+            self.stop(BY_SHUTDOWN)
         elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
             self.stop("CodeBotler")
         else:
             self.fail(visible(str(error)) or type(error).__name__)
 
-    def _step(self, to: State, what: str, **changes: object) -> None:
-        """Go to a state and log it; the caller has the lock."""
-        if to not in TRANSITIONS.get(self.state, ()):
+    def _step(self, to: MissionState, what: str, **changes: object) -> None:
+        """Change the state and log it; the caller holds the lock."""
+        if to not in NEXT_STATES.get(self.state, ()):
             raise MissionError(f"mission {self.id} cannot {what}: its state is {self.state}")
         self.summary.state = to
         for name, value in changes.items():
@@ -326,7 +311,7 @@ class Mission:
             self._log = None
 
     def _write(self, event: str, /, **data: object) -> None:
-        """Log an event and report it; events after the end are dropped."""
+        """Log an event and call the listener; events after the end are dropped."""
         clock = 0.0 if self._live is None else self._live.now
         with self._writing:
             if self._log is None:
@@ -346,14 +331,11 @@ def _reason(error: BaseException) -> str:
     return sentence if isinstance(error, EngineError) else f"{type(error).__name__}: {sentence}"
 
 
-def _new_folder(missions: Path) -> Path:
-    """A new folder, named by the time."""
+def _make_mission_folder(missions: Path) -> Path:
     make_folder(missions)
     name = f"{datetime.now().astimezone():%Y%m%d-%H%M%S}"
-    number = 1
-    while True:
-        folder = missions / (name if number == 1 else f"{name}-{number}")
+    for suffix in chain([""], map("-{}".format, count(2))):
         with suppress(FileExistsError):
-            folder.mkdir()
+            (folder := missions / f"{name}{suffix}").mkdir()
             return folder
-        number += 1
+    raise AssertionError("there are endless names")

@@ -1,4 +1,4 @@
-"""The pictures of a mission, each in a file of its own."""
+"""The pictures of a mission, one file each."""
 
 from __future__ import annotations
 
@@ -9,46 +9,45 @@ from typing import Any
 
 from codebotler.core.files import write_whole
 
-FOLDER = "pictures"
-MOST_BYTES = 2_000_000  # of one picture
-MOST_IN_ALL = 200_000_000  # bytes of all pictures of a mission
-KINDS: Mapping[str, bytes] = {"jpg": b"\xff\xd8\xff", "png": b"\x89PNG\r\n\x1a\n"}
-"""The first bytes of each kind of file."""
-NAME = re.compile(rf"{FOLDER}/\d+\.(?:{'|'.join(KINDS)})")
+PICTURE_FOLDER = "pictures"
+MAX_STORED_PICTURE_BYTES = 2_000_000
+MAX_MISSION_PICTURE_BYTES = 200_000_000
+_SIGNATURES: Mapping[str, bytes] = {"jpg": b"\xff\xd8\xff", "png": b"\x89PNG\r\n\x1a\n"}
+"""The first bytes of each file format."""
+_PICTURE_PATH = re.compile(rf"{PICTURE_FOLDER}/\d+\.(?:{'|'.join(_SIGNATURES)})")
 
 
-class Pictures:
-    """Keeps the pictures of a mission as they came; only their first bytes are read."""
+class PictureStore:
+    """Stores the pictures of a mission unchanged."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._count = self._bytes = 0
 
     def keep(self, data: bytes) -> dict[str, str]:
-        """Write a picture, and return its event's `file`, or a `text` that says why it was not kept."""
-        kind = next((kind for kind, start in KINDS.items() if data.startswith(start)), None)
+        """Write a picture, and return its event's `file`, or a `text` that says why it was not stored."""
+        kind = next((kind for kind, start in _SIGNATURES.items() if data.startswith(start)), None)
         if kind is None:
-            return _left_out(f"its {len(data):,} bytes are neither JPEG nor PNG")
-        if len(data) > MOST_BYTES:
-            return _left_out(f"it has {len(data):,} bytes; at most {MOST_BYTES:,} are allowed")
-        if self._bytes + len(data) > MOST_IN_ALL:
-            return _left_out(f"a mission keeps at most {MOST_IN_ALL:,} bytes of pictures")
-        name = f"{FOLDER}/{self._count + 1}.{kind}"
-        path = self._folder / name
-        write_whole(path, data)
+            return _explain_loss(f"its {len(data):,} bytes are neither JPEG nor PNG")
+        if len(data) > MAX_STORED_PICTURE_BYTES:
+            return _explain_loss(f"it has {len(data):,} bytes; the limit is {MAX_STORED_PICTURE_BYTES:,}")
+        if self._bytes + len(data) > MAX_MISSION_PICTURE_BYTES:
+            return _explain_loss(f"the limit for a mission is {MAX_MISSION_PICTURE_BYTES:,} bytes")
+        name = f"{PICTURE_FOLDER}/{self._count + 1}.{kind}"
+        write_whole(self._folder / name, data)
         self._count += 1
         self._bytes += len(data)
         return {"file": name}
 
 
-def _left_out(why: str) -> dict[str, str]:
-    return {"text": f"a picture was not kept: {why}"}
+def _explain_loss(why: str) -> dict[str, str]:
+    return {"text": f"a picture was not stored: {why}"}
 
 
-def picture_of(folder: Path, line: Mapping[str, Any]) -> tuple[str, bytes] | None:
-    """The kind and the bytes of an event's picture, if there is one."""
+def read_picture(folder: Path, line: Mapping[str, Any]) -> tuple[str, bytes] | None:
+    """Return the file extension and the bytes of an event's picture, if any."""
     name = line.get("file")
-    if line["event"] != "picture" or not isinstance(name, str) or not NAME.fullmatch(name):
+    if line["event"] != "picture" or not isinstance(name, str) or not _PICTURE_PATH.fullmatch(name):
         return None
     try:
         return name.rpartition(".")[2], (folder / name).read_bytes()

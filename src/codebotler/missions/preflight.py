@@ -1,4 +1,4 @@
-"""Before a robot moves: the rooms it knows, the room it is in, and the skills it lacks."""
+"""Questions to a robot before it moves: its rooms, its current room, and its missing skills."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.world import Room, World, laid_out
-from codebotler.missions.live import answered
+from codebotler.missions.live import check_answer
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
-MOST_ROOMS = 1_000
-"""Of a robot, for a check, which compares each drive with all of them."""
+MAX_CHECKED_ROOMS = 1_000
+"""A check compares each drive with all rooms."""
 
 
-def preflight(
+def ask_rooms(
     robot: Robot, remark: Callable[[str], None], world: World | None = None
 ) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms, which a map may place, and for its own; mistakes are remarks.
+    """Ask a connected robot for its rooms and its current room; `remark` gets likely mistakes.
 
     Returns:
-        the rooms, None if it does not list them; and the room it is in, empty if it does not say.
+        the rooms, with footprints from `world`, or None if the robot does not list them; and its current
+        room, empty if it does not say.
 
     Raises:
-        NotReadyError: it does not answer, or not as the skill demands.
+        NotReadyError: the robot gives no valid answer.
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
@@ -39,7 +40,7 @@ def preflight(
         if skill not in can:
             return None
         try:
-            return answered(robot.skills[skill], robot.perform(skill, ()))
+            return check_answer(robot.skills[skill], robot.perform(skill, ()))
         except RobotError as error:
             remark(f"the robot did not report {what}: {visible(str(error))}")
             return None
@@ -54,7 +55,7 @@ def preflight(
     if not isinstance(rooms, list) or not rooms:
         return None, place
     if place and place not in rooms:
-        remark(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
+        remark(shortened(f'the robot says it is in "{place}", which is not in its list of rooms'))
     listed = list(map(str, rooms))
     names = dict.fromkeys([*listed, place] if place else listed)
     plan = () if world is None else _plan(robot, world)
@@ -62,14 +63,14 @@ def preflight(
 
 
 def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
-    """The rooms of a map; one without a footprint has that of the grid only where the robot lives in it."""
+    """The rooms of a map; only robots that use our grid get its default footprints."""
     rooms = laid_out(world).rooms if robot.rooms_are_regexes else world.rooms
     is_straight = robot.name == "simulated"
     return tuple(Room(r.name, (), (), r.footprint, r.stand_at if is_straight else None) for r in rooms)
 
 
 def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) -> None:
-    """Raise NotReadyError if a rule is about where the robot is, and that or a footprint is not known."""
+    """Raise NotReadyError if a rule needs the robot's position or a footprint that is unknown."""
     known = room_map or RoomMap((), "")
     outlined = {room.name for room in known.plan if room.footprint is not None}
     for rule, element in ((one, element) for one in rules for element in one.inside):
@@ -82,19 +83,19 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
             raise NotReadyError(f'the rule "{rule.name}" needs {what}')
 
 
-def rooms_to_check(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
-    """The rooms for a check; None, with a remark, if there are too many."""
-    if room_map is None or len(room_map.rooms) <= MOST_ROOMS:
+def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
+    """Return the rooms for a check, or None, with a remark, if there are too many."""
+    if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(
-        f"the robot lists {len(room_map.rooms):,} rooms, more than the {MOST_ROOMS:,} that a check supports; "
-        "it uses only the rooms that the program names"
+        f"the robot lists {len(room_map.rooms):,} rooms; a check supports {MAX_CHECKED_ROOMS:,}, "
+        "so it uses only the rooms that the program names"
     )
     return None
 
 
 def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) -> list[str]:
-    """A sentence for each room that a program names and the robot does not know."""
+    """Return a sentence for each room in the program that the robot does not know."""
 
     def is_part(name: str) -> bool:
         return any(name.casefold() in room.casefold() for room in room_map.rooms)
@@ -104,26 +105,25 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
 
 
 def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
-    """The instructions that the recorded models know and whose rooms are there, with a program each."""
+    """Return the recorded instructions, each with a program, whose rooms exist here."""
     replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
-    if room_map is None:
-        return known
-    return {
-        instruction: program
-        for instruction, program in known.items()
-        if named_rooms(tree_of(program)) and not unknown_rooms(program, room_map)
-    }
+
+    def is_possible(program: str) -> bool:
+        has_rooms = bool(named_rooms(tree_of(program)))
+        return room_map is None or (has_rooms and not unknown_rooms(program, room_map))
+
+    return {instruction: program for instruction, program in known.items() if is_possible(program)}
 
 
 def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) -> UnknownInstructionError:
-    """The same error, with the closest instructions whose rooms are there."""
+    """Return the same error with the closest instructions whose rooms exist here."""
     closest = find_closest(error.instruction, known_instructions(room_map))
     return UnknownInstructionError(error.model, error.instruction, closest)
 
 
 def missing_skills(program: str, robot: Robot) -> list[str]:
-    """A sentence for each skill that a program calls and a connected robot lacks."""
+    """Return a sentence for each skill in the program that the connected robot lacks."""
     called = called_skills(tree_of(program), robot.skills)
     return [
         f"line {line}: this robot has no `{skill}` skill: {visible(robot.missing[skill])}"

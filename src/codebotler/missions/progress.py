@@ -1,4 +1,4 @@
-"""What a robot is doing, where it is and what was said, derived from a mission's events."""
+"""The progress of a mission, derived from its events: activity, position, conversation."""
 
 from __future__ import annotations
 
@@ -11,74 +11,72 @@ from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.table import Recording
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point, World, laid_out
-from codebotler.missions.log import SKILL_ENDS, Line, State
+from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
 from codebotler.missions.wording import activity, event_text, stop_text
 from codebotler.simulator.sampled_robot import RoomMap
 
-AT = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
-MOST, MOST_STEPS = 200, 60  # moments, and drives, looks and finds, that are kept
-NEAR = 0.05  # metres; a robot that moves less stays where it is
-ANSWER = "answer"  # the kind of moment at which the robot hears something
-STOPS = frozenset(
-    {State.STOPPING, State.STOPPED}
-)  # which the tool notes some time after the robot has stopped
+POSITION_FEEDBACK = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
+_MAX_MOMENTS, _MAX_STEPS = 200, 60
+_MIN_MOVE_METRES = 0.05  # shorter moves are not added to the trail
+ANSWER = "answer"  # the kind of a moment in which the robot hears an answer
+_STOP_STATES = frozenset({MissionState.STOPPING, MissionState.STOPPED})  # logged after the robot has stopped
 
 
 @dataclass(frozen=True)
 class Moment:
-    """Something that happened, in words."""
+    """An entry of the activity list."""
 
     clock: float  # seconds by the robot's clock since the program began
-    kind: str  # of the event; the skill's own, such as `say`, for what is spoken, and `ANSWER`
+    kind: str  # of the event; for speech a skill's, such as `say`, or `ANSWER`
     text: str
 
 
 @dataclass(frozen=True)
 class Find:
-    """Something or somebody that the robot has met."""
+    """A thing or a person that the robot has found."""
 
-    room: str  # in the program's words; empty for where the robot began
+    room: str  # in the program's words; empty for the starting room
     name: str
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a mission has come."""
+    """The progress of a mission."""
 
-    has_begun: bool = False  # to run on the robot
-    doing: str = ""  # now, in words
-    skill: str = ""  # the skill under way
+    has_begun: bool = False  # on the robot
+    doing: str = ""  # the current skill or pause in words; empty between them
+    skill: str = ""  # the current skill
     subject: str = ""  # its first argument
-    activity: str = ""  # the skill in words, such as `driving to supply room`, also once it is cancelled
-    line: int | None = None  # of the program, that waits for a skill or sleeps; None if unknown
+    activity: str = ""  # such as `driving to supply room`; kept after a cancellation
+    line: int | None = None  # the program's current line, if known
     clock: float = 0.0  # seconds by the robot's clock since the program began
-    room: str = ""  # the destination, or the last that was reached, in the program's words
-    left: str = ""  # the room before it, in which the robot still is if it cannot go
-    at: Point | None = None  # the position in metres, if known
+    room: str = ""  # the destination or current room, in the program's words
+    left: str = ""  # the room before `room`, where a failed drive leaves the robot
+    at: Point | None = None  # the position in metres, if reported
     is_driving: bool = False  # to `room`
-    is_between: bool = False  # somewhere on the way from `room`, where a drive was cut short
-    visited: tuple[str, ...] = ()  # the destinations that were reached, in the program's words
-    looks: tuple[tuple[str, bool], ...] = ()  # what was looked for, and whether it was found
-    answers: tuple[str | None, ...] = ()  # to questions; None where one failed
-    trail: tuple[Point, ...] = ()  # the last 200 positions
-    finds: tuple[Find, ...] = ()  # what was seen, and who was asked, by room; each once
-    held: str = ""  # what the robot holds
-    moments: tuple[Moment, ...] = ()  # the last 200
+    is_between: bool = False  # between rooms, after a cancelled drive
+    visited: tuple[str, ...] = ()  # completed drives, in the program's words
+    looks: tuple[tuple[str, bool], ...] = ()  # objects, and whether they were found
+    answers: tuple[str | None, ...] = ()  # None for a question that failed
+    trail: tuple[Point, ...] = ()  # the latest positions
+    finds: tuple[Find, ...] = ()  # objects seen and people asked, once each
+    held: str = ""  # the object in the robot's hand
+    moments: tuple[Moment, ...] = ()  # the latest ones
 
-    def after(self, line: Line) -> Progress:
-        """The progress after one more event."""
+    def after(self, line: LogLine) -> Progress:
+        """Return the progress after an event."""
         event = line["event"]
         if event == "state":
-            return self.with_state(State(line["state"]), line["clock"])
+            return self.with_state(MissionState(line["state"]), line["clock"])
         now = replace(self, clock=max(self.clock, line["clock"]))
         if event == "feedback":
-            place = AT.search(line["text"])
-            return now.moved((float(place[1]), float(place[2]))) if place else now
+            place = POSITION_FEEDBACK.search(line["text"])
+            return now.with_position((float(place[1]), float(place[2]))) if place else now
         if event == "skill":
             now = now.with_skill(line)
         elif event == "sleep" and line["seconds"]:
             now = replace(now, doing=event_text(line), activity=activity(line), line=line.get("line"))
-        elif event in SKILL_ENDS:
+        elif event in SKILL_END_EVENTS:
             now = now.with_result(line["result"]) if event == "result" else now.with_failure(event)
             still = self.activity if event == "cancelled" else ""
             now = replace(now, doing="", skill="", line=None, is_driving=False, activity=still)
@@ -87,15 +85,15 @@ class Progress:
             text = stop_text(line["by"], self.activity)
         if not text or (event == "sleep" and not line["seconds"]):
             return now
-        return replace(now, moments=(*now.moments, _moment(line, text))[-MOST:])
+        return replace(now, moments=(*now.moments, _moment(line, text))[-_MAX_MOMENTS:])
 
-    def with_state(self, state: State, clock: float) -> Progress:
-        """The progress when the mission comes to a state."""
-        clock = self.clock if state in STOPS else max(self.clock, clock)
-        return replace(self, clock=clock, has_begun=self.has_begun or state is State.RUNNING)
+    def with_state(self, state: MissionState, clock: float) -> Progress:
+        """Return the progress after a change of state."""
+        clock = self.clock if state in _STOP_STATES else max(self.clock, clock)
+        return replace(self, clock=clock, has_begun=self.has_begun or state is MissionState.RUNNING)
 
-    def with_skill(self, line: Line) -> Progress:
-        """The progress when a skill begins."""
+    def with_skill(self, line: LogLine) -> Progress:
+        """Return the progress after the start of a skill."""
         name = line["skill"]
         recording = _recording(name)
         drives = recording is not None and recording.is_drive
@@ -111,51 +109,51 @@ class Progress:
         )
         return replace(now, room=now.subject, left=self.room) if drives else now
 
-    def moved(self, at: Point) -> Progress:
-        """The progress when the robot is somewhere."""
+    def with_position(self, at: Point) -> Progress:
+        """Return the progress after a reported position."""
         now = replace(self, at=at, is_between=self.is_between or self.is_driving)
-        if self.trail and math.dist(self.trail[-1], at) < NEAR:
+        if self.trail and math.dist(self.trail[-1], at) < _MIN_MOVE_METRES:
             return now
-        return replace(now, trail=(*self.trail, at)[-MOST:])
+        return replace(now, trail=(*self.trail, at)[-_MAX_MOMENTS:])
 
     def with_result(self, result: object) -> Progress:
-        """The progress when the skill under way has ended well."""
+        """Return the progress after the current skill's success."""
         recording = _recording(self.skill)
         now = self
         match recording and recording.kind:
             case kinds.GOTO:
-                visited = (*self.visited, self.subject)[:MOST_STEPS]
+                visited = (*self.visited, self.subject)[:_MAX_STEPS]
                 now = replace(self, visited=visited, is_between=False)
             case kinds.PICK:
                 now = replace(self, held=self.subject)
             case kinds.PLACE:
                 now = replace(self, held="")
             case kinds.CHECK:
-                now = self._found(Find(self.room, self.subject)) if result is True else self
-                now = replace(now, looks=(*self.looks, (self.subject, result is True))[:MOST_STEPS])
+                now = self._with_find(Find(self.room, self.subject)) if result is True else self
+                now = replace(now, looks=(*self.looks, (self.subject, result is True))[:_MAX_STEPS])
             case kinds.ASK:
-                now = self._found(Find(self.room, self.subject)) if self.subject else self
-                now = replace(now, answers=(*now.answers, str(result))[:MOST_STEPS])
+                now = self._with_find(Find(self.room, self.subject)) if self.subject else self
+                now = replace(now, answers=(*now.answers, str(result))[:_MAX_STEPS])
         return now
 
     def with_failure(self, event: str) -> Progress:
-        """The progress when the skill under way has failed or was cut short."""
+        """Return the progress after the current skill's failure or cancellation."""
         recording = _recording(self.skill)
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")
         if recording is not None and recording.options and event == "error":
-            return replace(self, answers=(*self.answers, None)[:MOST_STEPS])
+            return replace(self, answers=(*self.answers, None)[:_MAX_STEPS])
         return self
 
-    def _found(self, find: Find) -> Progress:
+    def _with_find(self, find: Find) -> Progress:
         known = [one for one in self.finds if (one.room, one.name) != (find.room, find.name)]
-        return replace(self, finds=(*known, find)[-MOST_STEPS:])
+        return replace(self, finds=(*known, find)[-_MAX_STEPS:])
 
 
-def position(progress: Progress, world: World, room_map: RoomMap | None) -> Point | None:
-    """Where the robot is on a map, in metres; None if that is not known.
+def position_on_map(progress: Progress, world: World, room_map: RoomMap | None) -> Point | None:
+    """Return the robot's position on a map, in metres; None if unknown.
 
-    Until the robot reports a position, it is where robots stop in its room.
+    Before the first reported position, it is the stopping point of the robot's room.
     """
     if progress.at is not None:
         return progress.at
@@ -171,7 +169,7 @@ def _recording(name: str) -> Recording | None:
     return None if skill is None else skill.recording
 
 
-def _moment(line: Line, words: str) -> Moment:
+def _moment(line: LogLine, text: str) -> Moment:
     event, clock = line["event"], line["clock"]
     recording = _recording(line.get("skill", ""))
     spoken = recording if recording is not None and recording.is_spoken else None
@@ -182,4 +180,4 @@ def _moment(line: Line, words: str) -> Moment:
         return Moment(clock, spoken.kind, shortened(f"{arguments.get(spoken.text, '')}{offered}"))
     if event == "result" and spoken and spoken.options:
         return Moment(clock, ANSWER, shortened(str(line["result"])))
-    return Moment(clock, event, words)
+    return Moment(clock, event, text)

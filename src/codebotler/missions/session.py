@@ -1,6 +1,6 @@
-"""`MissionSession`: takes one mission from writing through checking and approval to its end.
+"""`MissionSession`: leads one mission through writing, checking, approval and execution.
 
-The command line and the page drive a session, and observe it; it prints nothing and knows no page.
+The command line and the page control and observe it.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
-from codebotler.missions.log import Line, State
+from codebotler.missions.log import LogLine, MissionState
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
+    ask_rooms,
     expect_poses,
+    limit_rooms,
     missing_skills,
-    preflight,
-    rooms_to_check,
     unknown_rooms,
     with_closest_here,
 )
 from codebotler.missions.stop import StopButton
-from codebotler.missions.view import CHECKING, Order, SessionView, digest
+from codebotler.missions.view import CHECKING, MissionOrder, SessionView, program_digest
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.robots.base import CancelledError, NotReadyError, Robot
@@ -41,22 +41,22 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError
 
-LOG = logging.getLogger("codebotler.missions")
-EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
+_logger = logging.getLogger("codebotler.missions")
+_EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
 
 
 class MissionSession:
-    """Drives one mission on a thread of its own, with a robot that is connected while the session lasts.
+    """Leads one mission on its own thread, with a robot that is connected for the duration of the session.
 
-    `check` gets a program, the robot's rooms and the rules in force; `changed` is called at each change of
-    the view and must return at once; `before` is the session to wait for; `world` is the map, if any.
+    `check` takes a program, the robot's rooms and the rules in force; `changed` is called at each change of
+    the view and must return at once; `before` is a session to wait for; `world` is the map, if any.
     """
 
     def __init__(
         self,
         robot: Robot,
         home: Path,
-        order: Order,
+        order: MissionOrder,
         *,
         open_model: Callable[[str], Model],
         check: Callable[[str, RoomMap | None, tuple[Rule, ...]], Check],
@@ -70,8 +70,8 @@ class MissionSession:
         self._check, self._changed, self._before, self._world = check, changed, before, world
         self._author = ModelAuthor(open_model, order.model)
         self._stop_button = StopButton()
-        self._lock = threading.Condition()  # held for moments; never while a mission is asked for something
-        self._editing = threading.Lock()  # held while a program is replaced or approved
+        self._lock = threading.Condition()  # held briefly, never during a call of the mission
+        self._editing = threading.Lock()  # held while the program is replaced or approved
         self._view = SessionView(
             number,
             instruction=order.instruction,
@@ -82,30 +82,30 @@ class MissionSession:
             rules=rules,
             is_over=False,
         )
-        self._events: list[Line] = []
+        self._events: list[LogLine] = []
         self._mission: Mission | None = None
-        self._wish: Callable[[Mission], None] | None = (  # of a person, for the session's own thread
+        self._next_task: Callable[[Mission], None] | None = (  # the next task for the session's own thread
             partial(self._take, program=order.program)
             if order.has_program
             else partial(self._ask, repair=False)
         )
         self._stop_button.on_press(self._end_waiting)
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
-        self.on_event: Callable[[Line], None] = lambda _: None  # what it raises stops the robot
-        self.error: Exception | None = None  # that ended it, once it is over
+        self.on_event: Callable[[LogLine], None] = lambda _: None  # an error in it stops the robot
+        self.error: Exception | None = None  # set if an error ended the session
 
     def start(self) -> None:
-        """Begin."""
+        """Start the session's thread."""
         self._thread.start()
 
     def join(self, seconds: float | None = None) -> None:
-        """Wait for its end."""
+        """Wait for the end of the session."""
         self._thread.join(seconds)
 
-    def wait_until(self, holds: Callable[[SessionView], bool]) -> SessionView:
-        """Wait for a view of which something holds, or for the last one; signals are handled meanwhile."""
+    def wait_until(self, is_met: Callable[[SessionView], bool]) -> SessionView:
+        """Wait for a view that meets a condition, or for the last one; signals are handled meanwhile."""
         with self._lock:
-            self._lock.wait_for(lambda: self._view.is_over or holds(self._view))
+            self._lock.wait_for(lambda: self._view.is_over or is_met(self._view))
             return self._view
 
     @property
@@ -113,27 +113,22 @@ class MissionSession:
         """The current view."""
         return self._view
 
-    def events(self, start: int = 0) -> list[Line]:
-        """The events of the mission, from one on."""
+    def events(self, start: int = 0) -> list[LogLine]:
+        """The events of the mission from a position on."""
         return self._events[start:]
 
     def edit(self, program: str) -> None:
-        """Replace the program, and have it checked; MissionError if it is too late, or a model is writing."""
+        """Replace and check the program; raises MissionError after the approval, or while a model writes."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
-            self._wish = partial(self._take, program=program)
-            self._change(program=program, author="", disabled_rules=(), **UNCHECKED)
+            self._next_task = partial(self._take, program=program)
+            self._change(program=program, author="", disabled_rules=(), **_UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
-        """Leave out a rule for this program in this mission only, and check it again.
-
-        Args:
-            name: of the rule.
-            reason: why, which is logged.
-        """
+        """Switch off a rule for this program only, log the reason, and check the program again."""
         if not any(letter.isalnum() for letter in reason):
-            raise MissionError("say why the rule does not count for this program")
+            raise MissionError("say why this program may break the rule")
         with self._editing:
             view, mission = self._view, self._mission
             if mission is None or not view.may_be_approved:
@@ -142,31 +137,29 @@ class MissionSession:
                 raise MissionError(f'there is no rule "{name}" in force')
             mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             with self._lock:
-                self._wish = partial(self._take, program=view.program)
-                self._change(disabled_rules=(*view.disabled_rules, name), **UNCHECKED)
+                self._next_task = partial(self._take, program=view.program)
+                self._change(disabled_rules=(*view.disabled_rules, name), **_UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
-        """Have the model write another program.
+        """Have the model write another program; for a repair, it gets its program with the problems.
 
-        Args:
-            repair: whether it is shown this program with its problems, or why its reply holds none.
-            max_tokens: another limit for this reply and later ones, in tokens; None for the last one.
+        `max_tokens` is a new limit for this reply and later ones; None keeps the limit.
         """
         with self._editing, self._lock:
             if not self._view.may_be_asked_again:
                 raise MissionError("the model cannot be asked again now")
             self._author.max_tokens = max_tokens or self._author.max_tokens
-            self._wish = partial(self._ask, repair=repair)
+            self._next_task = partial(self._ask, repair=repair)
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="", disabled_rules=())
 
     def approve(self, seen: str, *, despite_problems: bool = False) -> None:
-        """Let the robot run the program that the person saw, which is named by its digest."""
+        """Approve the program that the person saw, identified by its digest."""
         with self._editing:
             view, mission = self._view, self._mission
             if mission is None or view.busy:
                 raise MissionError("the program has not been checked yet")
-            if seen != view.digest or seen != digest(mission.summary.program):
-                raise MissionError("the program has changed; look at it again")
+            if seen != view.digest or seen != program_digest(mission.summary.program):
+                raise MissionError("the program has changed; review it again")
             mission.approve(despite_problems=despite_problems)
 
     def reject(self, reason: str) -> None:
@@ -175,16 +168,16 @@ class MissionSession:
         self._mission.fail(reason)
 
     def stop(self, by: str) -> None:
-        """Stop the robot, and then whatever else goes on; returns when the robot has the request."""
+        """Stop the robot, then all other work; returns once the robot has the request."""
         if not self._view.is_over:
             self._stop_button.press(by)
 
     def stop_soon(self, by: str) -> None:
-        """Stop it from where nothing may wait, such as a signal handler or the loop of a server."""
+        """Stop without waiting, for signal handlers and event loops."""
         threading.Thread(target=self.stop, args=(by,), daemon=True).start()
 
     def _end_waiting(self) -> None:
-        """Let the session's own thread see that the stop button was pressed."""
+        """Wake the session's own thread after a press of the stop button."""
         self._author.cancel()
         with self._lock:
             self._lock.notify_all()
@@ -203,10 +196,10 @@ class MissionSession:
             self.error = with_closest_here(error, self._view.room_map)
             self._show(error=_sentence(error), suggestions=self.error.closest)
         except Exception as error:
-            if not isinstance(error, EXPECTED):
-                LOG.exception("a mission failed unexpectedly")
+            if not isinstance(error, _EXPECTED_ERRORS):
+                _logger.exception("a mission failed unexpectedly")
             if isinstance(error, NotReadyError) and self._is_stopped:
-                return  # the robot gives no answers any more
+                return  # a stopped robot answers no questions
             self.error = error
             self._show(error=_sentence(error))
         finally:
@@ -216,45 +209,44 @@ class MissionSession:
         with Reservation(self._robot, self._home) as reserved:
             self._stop_button.attach(self._robot)
             name, instruction = self._robot.name, self._order.instruction
-            with Mission(self._home, name, instruction, self._note, self._stop_button) as mission:
+            with Mission(self._home, name, instruction, self._add_event, self._stop_button) as mission:
                 self._mission = mission
                 self._show(id=mission.id)
                 if self._world is not None:
                     mission.show_map(self._world)
-                room_map, place = self._look_around()
-                self._get_approved(mission)
-                if mission.state is State.APPROVED:
+                room_map, place = self._prepare_rooms()
+                self._await_approval(mission)
+                if mission.state is MissionState.APPROVED:
                     self._run_approved(mission, reserved, place, room_map)
 
-    def _look_around(self) -> tuple[RoomMap | None, str]:
-        """Ask the robot for its rooms and where it is, and refuse rules that it cannot keep to."""
-        room_map, place = preflight(self._robot, self._remark, self._world)
-        self._show(room_map=rooms_to_check(room_map, self._remark))
+    def _prepare_rooms(self) -> tuple[RoomMap | None, str]:
+        """Ask the robot for its rooms and its current room; refuse rules that cannot be enforced."""
+        room_map, place = ask_rooms(self._robot, self._add_remark, self._world)
+        self._show(room_map=limit_rooms(room_map, self._add_remark))
         rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
         regexes = () if room_map is None or room_map.plain else rooms
         expect_rooms(rules, rooms)
         expect_poses(rules, self._robot, room_map)
         for sentence in evasions(rules, regexes, self._robot.skills):
-            self._remark(sentence)
+            self._add_remark(sentence)
         return room_map, place
 
-    def _get_approved(self, mission: Mission) -> None:
-        """Have programs written and checked until a person approves one or ends the mission."""
+    def _await_approval(self, mission: Mission) -> None:
+        """Write and check programs until a person approves one or ends the mission."""
         while mission.state.is_open:
             with self._lock:
-                self._lock.wait_for(lambda: self._wish is not None or not mission.state.is_open)
-                wish, self._wish = self._wish, None
-            if wish is not None:
-                wish(mission)
+                self._lock.wait_for(lambda: self._next_task is not None or not mission.state.is_open)
+                task, self._next_task = self._next_task, None
+            if task is not None:
+                task(mission)
 
     def _run_approved(
         self, mission: Mission, reserved: Reservation, place: str, room_map: RoomMap | None
     ) -> None:
-        """Run the approved program."""
         for sentence in (*self._view.missing_skills, *self._view.unknown_rooms):
             mission.note(f"before the robot moves: {sentence}")
         rules = self._view.rules_in_force
-        keep_out = getattr(self._robot, "keep_out", None)  # which robots with a planner have
+        keep_out = getattr(self._robot, "keep_out", None)  # optional: robots with a path planner
         with suppress(MissionError, CancelledError):  # it was stopped before it could run
             if keep_out is not None:
                 keep_out(rules)
@@ -265,10 +257,10 @@ class MissionSession:
         return self._stop_button.by is not None
 
     def _ask(self, mission: Mission, *, repair: bool) -> None:
-        """Have the model write a program, and take it; without one, go on as before."""
+        """Have the model write a program, and check it; if there is none, keep the previous one."""
         before = self._view
         writing = {"busy": f"asking {before.model}", "is_written": True}
-        self._show(**UNCHECKED | writing, program="", reply="", error="")
+        self._show(**_UNCHECKED | writing, program="", reply="", error="")
         try:
             prompt = prompt_of(before, self._robot, repair=repair)
             author, made = self._author.write(prompt, self._add_to_reply)
@@ -292,8 +284,8 @@ class MissionSession:
         self._take(mission, made.program)
 
     def _restore(self, before: SessionView) -> None:
-        """Show what was there before: no other program was written."""
-        kept = {name: getattr(before, name) for name in (*UNCHECKED, "program", "author")}
+        """Show the previous program again."""
+        kept = {name: getattr(before, name) for name in (*_UNCHECKED, "program", "author")}
         self._show(**kept | {"busy": ""}, is_written=False, reply="")
 
     def _add_to_reply(self, piece: str) -> None:
@@ -301,11 +293,11 @@ class MissionSession:
             self._change(reply=self._view.reply + piece)
 
     def _take(self, mission: Mission, program: str) -> None:
-        """Make a program the mission's, and check it, unless another one was typed meanwhile."""
+        """Check a program for the mission, unless a newer one is waiting."""
         with self._lock:
-            if self._wish is not None:
+            if self._next_task is not None:
                 return
-            self._change(program=program, error="", reply="", **UNCHECKED)
+            self._change(program=program, error="", reply="", **_UNCHECKED)
             view = self._view
         try:
             mission.draft(program, view.author)
@@ -320,18 +312,18 @@ class MissionSession:
                 raise
             return
         with self._lock:
-            if self._wish is None:
+            if self._next_task is None:
                 self._change(**found)
 
-    # --- what observers see
+    # --- the view
 
-    def _remark(self, sentence: str) -> None:
-        assert self._mission is not None, "it has begun when the robot is asked"
+    def _add_remark(self, sentence: str) -> None:
+        assert self._mission is not None, "the mission exists before questions to the robot"
         self._mission.note(sentence)
         self._show(remarks=(*self._view.remarks, sentence))
 
-    def _note(self, line: Line) -> None:
-        """Take an event of the mission, which holds its lock meanwhile."""
+    def _add_event(self, line: LogLine) -> None:
+        """Add an event of the mission, which holds its own lock meanwhile."""
         with self._lock:
             self._events.append(line)
             self._change(progress=self._view.progress.after(line))
@@ -342,7 +334,7 @@ class MissionSession:
             self._change(**changes)
 
     def _change(self, **changes: object) -> None:
-        """Change the view, and have it follow the mission's state; the caller has the lock."""
+        """Change the view, including the mission's state; the caller holds the lock."""
         if self._mission is not None:
             now = self._mission.summary
             changes |= {"state": now.state, "reason": now.reason, "line": now.line}
@@ -353,14 +345,14 @@ class MissionSession:
         self._changed()
 
 
-UNCHECKED: dict[str, object] = {
+_UNCHECKED: dict[str, object] = {
     "check": None,
     "missing_skills": (),
     "unknown_rooms": (),
     "programless": None,
     "busy": CHECKING,
 }
-"""What a view shows of a program before its check."""
+"""The view's fields for an unchecked program."""
 
 
 def _sentence(error: Exception) -> str:
@@ -369,4 +361,4 @@ def _sentence(error: Exception) -> str:
     if isinstance(error, OSError) and error.filename is not None:
         return system_sentence(error)
     sentence = visible(str(error))
-    return sentence if isinstance(error, EXPECTED) else f"{type(error).__name__}: {sentence}"
+    return sentence if isinstance(error, _EXPECTED_ERRORS) else f"{type(error).__name__}: {sentence}"

@@ -1,4 +1,4 @@
-"""`StopButton`: the one way in which a mission's robot is stopped."""
+"""`StopButton`: the only way to stop the robot of a mission."""
 
 from __future__ import annotations
 
@@ -10,32 +10,24 @@ from contextlib import ExitStack
 
 from codebotler.robots.base import Robot
 
-CONFIRMS = 6.0
-"""Seconds that a request to stop may take to reach a robot, before its answer is read."""
+STOP_REQUEST_SECONDS = 6.0
+"""Seconds that a stop request may take to reach the robot."""
 
 
 class StopButton:
-    """Stops a robot first, and then all else that listens; from any thread, any number of times.
-
-    Args:
-        robot: the robot, or None until it is connected.
-    """
+    """Stops a robot first, then calls its listeners; from any thread, any number of times."""
 
     def __init__(self, robot: Robot | None = None) -> None:
         self.robot = robot
-        self.by: str | None = None  # the person or thing that pressed it first
-        self.ended = threading.Event()  # set before the robot is stopped; no skill starts from then on
+        self.by: str | None = None  # the source of the first press
+        self.ended = threading.Event()  # set before the robot is cancelled; no skill starts afterwards
         self._has_reached = threading.Event()
         self._pressed_at, self._reached_at = 0.0, math.inf
         self._listeners: list[Callable[[], None]] = []
-        self._lock = threading.Lock()  # held for moments only
+        self._lock = threading.Lock()  # held briefly
 
     def press(self, by: str) -> None:
-        """Stop the robot, then call all listeners, the newest first; an error of one delays no other.
-
-        Args:
-            by: the person or thing that stops it, in words such as `Ctrl-C`.
-        """
+        """Stop the robot, then call all listeners, newest first, even if one fails; `by` is for the log."""
         now = time.monotonic()
         with ExitStack() as afterwards:
             with self._lock:
@@ -46,7 +38,7 @@ class StopButton:
             self.cancel_robot()
 
     def cancel_robot(self) -> None:
-        """Cancel the robot's work and let no skill start, without a mark of who wanted it."""
+        """Cancel the robot's work and let no skill start, without recording a source."""
         self.ended.set()
         robot = self.robot
         if robot is None:
@@ -59,13 +51,13 @@ class StopButton:
             self._has_reached.set()
 
     def attach(self, robot: Robot) -> None:
-        """Take a robot that was connected, and cancel it at once if the button was pressed before."""
+        """Take a connected robot, and cancel it at once if the button was already pressed."""
         self.robot = robot
         if self.by is not None:
             self.cancel_robot()
 
     def on_press(self, listener: Callable[[], None]) -> None:
-        """Call a function at each press, and now if the button was pressed before."""
+        """Call a function at each press, and now if the button was already pressed."""
         with self._lock:
             self._listeners.append(listener)
             is_pressed = self.by is not None
@@ -78,7 +70,7 @@ class StopButton:
         return max(0.0, min(self._reached_at, time.monotonic()) - self._pressed_at)
 
     def why_unstopped(self) -> str:
-        """Return why the robot could not be stopped after a request; empty if it was, as far as it knows."""
+        """Return why the robot did not accept a stop request; empty if it did, or reports nothing."""
         if self.ended.is_set():
-            self._has_reached.wait(CONFIRMS)
-        return str(getattr(self.robot, "failed_stop", ""))  # which some robots have
+            self._has_reached.wait(STOP_REQUEST_SECONDS)
+        return str(getattr(self.robot, "failed_stop", ""))  # optional

@@ -1,4 +1,4 @@
-"""Past missions on the disk: listed, found, and closed if the tool died."""
+"""Past missions on disk: list and find them, and close interrupted ones."""
 
 from __future__ import annotations
 
@@ -11,35 +11,46 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.skills.values import written_call
 from codebotler.core.terminal import note, system_sentence, visible
-from codebotler.missions.log import SUMMARY, Line, State, Summary, add_event, doing, events_of, log_of
+from codebotler.missions.log import (
+    SUMMARY_FILE,
+    LogLine,
+    MissionState,
+    MissionSummary,
+    add_event,
+    find_unfinished_skill,
+    open_log,
+    read_events,
+)
 
-ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
+_MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
 
-def missions(home: Path) -> list[Summary]:
-    """All missions, oldest first; raises UserError if one cannot be read."""
-    return sorted(map(Summary.read, _folders(home)), key=lambda summary: (summary.created, summary.id))
+def read_missions(home: Path) -> list[MissionSummary]:
+    """Read the summaries of all missions, oldest first; raises UserError if one is damaged."""
+    return sorted(
+        map(MissionSummary.read, _mission_folders(home)), key=lambda summary: (summary.created, summary.id)
+    )
 
 
-def find(home: Path, name: str) -> Path:
-    """The folder of a mission, by its name or `last`; raises UserError if there is none."""
-    if name == "last" and (known := missions(home)):
+def find_mission(home: Path, name: str) -> Path:
+    """Return the folder of a mission, given its name or `last`; raises UserError if there is none."""
+    if name == "last" and (known := read_missions(home)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
-    if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
+    if not _MISSION_ID.fullmatch(name) or not (folder / SUMMARY_FILE).is_file():
         raise UserError(f'there is no mission "{name}"; `codebotler missions` lists them')
     return folder
 
 
-def recover(home: Path) -> list[Summary]:
-    """Close and note the missions that were interrupted because the tool died; unreadable ones are left."""
-    found: list[Summary] = []
-    for folder in _folders(home):
+def recover_missions(home: Path) -> list[MissionSummary]:
+    """Close the missions whose process died, and report them; damaged ones are skipped."""
+    found: list[MissionSummary] = []
+    for folder in _mission_folders(home):
         try:
-            found += _interrupted(folder)
+            found += _close_interrupted(folder)
         except UserError:
             continue
-        except OSError as error:  # such as a full disk, which stops no robot
+        except OSError as error:  # such as a full disk; it must not keep CodeBotler from starting
             why = system_sentence(error)
             note(f"mission {folder.name} may have been interrupted, but cannot be closed: {why}")
     for summary in found:
@@ -47,8 +58,7 @@ def recover(home: Path) -> list[Summary]:
     return found
 
 
-def _folders(home: Path) -> list[Path]:
-    """The folders of missions."""
+def _mission_folders(home: Path) -> list[Path]:
     folder = home / "missions"
     try:
         found = sorted(folder.iterdir())
@@ -58,41 +68,39 @@ def _folders(home: Path) -> list[Path]:
         raise UserError(
             "this is a file, not a folder of missions; set CODEBOTLER_HOME to another folder", file=folder
         ) from None
-    return [path for path in found if os.path.exists(path / SUMMARY)]  # noqa: PTH110 - raises nothing
+    return [path for path in found if os.path.exists(path / SUMMARY_FILE)]  # noqa: PTH110 - raises nothing
 
 
-def _interrupted(folder: Path) -> list[Summary]:
-    """The mission, if it was interrupted and not closed."""
-    if Summary.read(folder).has_ended:
+def _close_interrupted(folder: Path) -> list[MissionSummary]:
+    if MissionSummary.read(folder).has_ended:
         return []
     try:
-        log = log_of(folder)
+        log = open_log(folder)
     except BlockingIOError:
-        return []  # another tool is on it
+        return []  # another process runs it
     with closing(log):
-        summary, events = Summary.read(folder), events_of(folder)
+        summary, events = MissionSummary.read(folder), read_events(folder)
         if summary.has_ended:
             return []
         last = next((line for line in reversed(events) if line["event"] == "state"), None)
-        if last is not None and State(last["state"]).is_final:
-            summary.state, summary.reason = State(last["state"]), last.get("reason", "")
+        if last is not None and MissionState(last["state"]).is_final:
+            summary.state, summary.reason = MissionState(last["state"]), last.get("reason", "")
             summary.ended = last["time"]
             summary.write(folder)
             return []
-        summary.reason, clock = _how(summary, events), events[-1]["clock"] if events else 0.0
-        summary.state, summary.ended = State.INTERRUPTED, time.time()
+        summary.reason, clock = _interruption_reason(summary, events), events[-1]["clock"] if events else 0.0
+        summary.state, summary.ended = MissionState.INTERRUPTED, time.time()
         add_event(log, "state", clock, state=summary.state, reason=summary.reason)
         summary.write(folder)
         return [summary]
 
 
-def _how(summary: Summary, events: list[Line]) -> str:
+def _interruption_reason(summary: MissionSummary, events: list[LogLine]) -> str:
     if not summary.state.is_moving:
         return f"CodeBotler ended unexpectedly while the mission was {summary.state}; the robot had not moved"
-    skill = doing(events)
+    skill = find_unfinished_skill(events)
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"
     going = written_call(skill["skill"], list(skill["arguments"].values()))
-    where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
-    where = f" ({where})" if where else ""
+    where = next((f" ({e['text']})" for e in reversed(events) if e["event"] == "feedback"), "")
     return f"CodeBotler ended unexpectedly during {going}{where}; {summary.if_tool_dies}"

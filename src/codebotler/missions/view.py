@@ -1,4 +1,4 @@
-"""A mission session at one moment, for the command line, the page and the API."""
+"""A snapshot of a mission session, for the command line, the page and the API."""
 
 from __future__ import annotations
 
@@ -9,32 +9,28 @@ from typing import Literal, TypeAlias
 from codebotler.checking.problems import Check
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
-from codebotler.missions.log import State
+from codebotler.missions.log import MissionState
 from codebotler.missions.progress import Progress
 from codebotler.prompts import stated
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
-UNREADABLE = frozenset({"SyntaxError", "IndentationError", "TabError"})
-"""Problems with which a program never begins."""
+_SYNTAX_ERRORS = frozenset({"SyntaxError", "IndentationError", "TabError"})
+"""Problems that keep a program from starting."""
 
-CHECKING = "checking"  # what a session is busy with
+CHECKING = "checking"  # a value of `SessionView.busy`
 
-Phase: TypeAlias = State | Literal["", "starting", "writing", "checking", "no-program"]
+Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking", "no-program"]
 
 
 @dataclass(frozen=True)
-class Order:
-    """What a person asks for: an instruction and the model that writes the program, or a program.
-
-    Raises:
-        UserError: it says nothing.
-    """
+class MissionOrder:
+    """A request for a mission: an instruction for a model, or a program; one is required (UserError)."""
 
     instruction: str = ""
-    model: str = ""  # its name; empty where none may be asked
+    model: str = ""  # empty if none may be asked
     program: str = ""
-    author: str = ""  # the model that wrote the program, if one did
+    author: str = ""  # the model that wrote the program, if any
 
     def __post_init__(self) -> None:
         if not self.has_program:
@@ -42,68 +38,68 @@ class Order:
 
     @property
     def has_program(self) -> bool:
-        """Whether the program comes with the order, so that no model writes it."""
+        """Whether the order contains the program, so that no model writes it."""
         return bool(self.program.strip())
 
 
 @dataclass(frozen=True)
 class SessionView:
-    """A session at one moment, the same for all who observe it."""
+    """An immutable snapshot of a session, the same for all observers."""
 
-    number: int = 0  # of the session, from 1; 0 before the first
-    id: str = ""  # of the mission; empty until it exists
-    state: State | None = None  # of the mission
-    reason: str = ""  # why it came to that state
-    line: int | None = None  # of the program, where it failed
-    busy: str = ""  # what goes on before the robot moves, such as `checking`
-    error: str = ""  # why it could not go on, in a sentence
-    suggestions: tuple[str, ...] | None = None  # instructions that the model does know
+    number: int = 0  # counts sessions from 1; 0 before the first
+    id: str = ""  # the mission's; empty until it exists
+    state: MissionState | None = None  # the mission's
+    reason: str = ""  # why it is in that state
+    line: int | None = None  # the program's line at which it failed
+    busy: str = ""  # the work before the robot moves, such as `checking`
+    error: str = ""  # the last error, as a sentence
+    suggestions: tuple[str, ...] | None = None  # similar instructions that a recorded model knows
     instruction: str = ""
-    model: str = ""  # its name; empty where none may be asked
+    model: str = ""  # empty if none may be asked
     program: str = ""
-    reply: str = ""  # while a model writes, as much as has arrived
-    programless: ProgramlessReply | None = None  # the model's last reply, if that holds no program
-    author: str = ""  # the model that wrote it; empty if a person did
+    reply: str = ""  # received so far, while a model writes
+    programless: ProgramlessReply | None = None  # the model's last reply, if it contains no program
+    author: str = ""  # the model that wrote the program; empty for a person
     is_written: bool = False  # whether a model is writing now
-    check: Check | None = None  # of this very program
-    missing_skills: tuple[str, ...] = ()  # that the program calls and the robot lacks, in sentences
-    unknown_rooms: tuple[str, ...] = ()  # that the program names and the robot does not know, in sentences
-    room_map: RoomMap | None = None  # of the robot, as far as it says
-    remarks: tuple[str, ...] = ()  # likely mistakes about the robot, in sentences
-    rules: tuple[Rule, ...] = ()  # house rules
-    disabled_rules: tuple[str, ...] = ()  # names of those that a person has switched off for this program
+    check: Check | None = None  # of exactly this program
+    missing_skills: tuple[str, ...] = ()  # sentences about skills that the robot lacks
+    unknown_rooms: tuple[str, ...] = ()  # sentences about rooms that the robot does not know
+    room_map: RoomMap | None = None  # the robot's rooms, if it lists them
+    remarks: tuple[str, ...] = ()  # sentences about likely mistakes in the robot's setup
+    rules: tuple[Rule, ...] = ()
+    disabled_rules: tuple[str, ...] = ()  # the names of rules switched off for this program
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What speaks against running the program, in sentences."""
+        """Sentences about problems of the program."""
         found = () if self.check is None else self.check.problems
         return (*(problem.sentence for problem in found), *self.missing_skills)
 
     @property
     def rules_in_force(self) -> tuple[Rule, ...]:
-        """The rules that count in this mission."""
+        """The rules that are not switched off."""
         return tuple(rule for rule in self.rules if rule.name not in self.disabled_rules)
 
     @property
     def can_run(self) -> bool:
-        """Whether the program, right or wrong, can run at all."""
-        return self.check is None or not any(one.kind in UNREADABLE for one in self.check.problems)
+        """Whether the program can start, despite its problems."""
+        return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
     def arriving(self) -> PartialReply:
-        """The reply that a model is writing, as much as has arrived."""
+        """The part of the reply that a model has sent so far."""
         return split_partial(self.reply)
 
     @property
     def digest(self) -> str:
-        """Names this program and no other, for those who approve it."""
-        return digest(self.program)
+        """Identifies exactly this program, for approvals."""
+        return program_digest(self.program)
 
     @property
     def phase(self) -> Phase:
-        """What goes on, or how it ended."""
+        """The current phase, or the final state."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:
@@ -116,35 +112,35 @@ class SessionView:
 
     @property
     def is_running(self) -> bool:
-        """Whether the robot works, or ends what it did."""
+        """Whether the robot works or is stopping."""
         return self.state is not None and self.state.is_moving and not self.is_over
 
     @property
     def may_be_approved(self) -> bool:
-        """Whether the program can be approved as it stands."""
-        return self.state is State.CHECKED and not self.is_over and not self.busy
+        """Whether the program can be approved now."""
+        return self.state is MissionState.CHECKED and not self.is_over and not self.busy
 
     @property
     def waits_for_program(self) -> bool:
-        """Whether a person has to go on, since a model has replied without a program."""
-        is_open = self.state is State.DRAFTING and not self.is_over and not self.busy
+        """Whether a model replied without a program, so that a person must decide."""
+        is_open = self.state is MissionState.DRAFTING and not self.is_over and not self.busy
         return is_open and self.programless is not None
 
     @property
     def may_be_asked_again(self) -> bool:
-        """Whether the model can write another program."""
+        """Whether the model can write another program now."""
         is_waiting = self.may_be_approved or self.waits_for_program
         return is_waiting and bool(self.instruction and self.model)
 
     @property
     def may_be_edited(self) -> bool:
-        """Whether another program can replace this one."""
+        """Whether the program can be replaced now."""
         if self.is_over or self.is_written:
             return self.is_over
-        waits = self.state is None and bool(self.program)  # for the robot; nothing typed is lost
+        waits = self.state is None and bool(self.program)  # for the robot; typed text is kept
         return waits or (self.state is not None and self.state.is_open)
 
 
-def digest(program: str) -> str:
-    """A short name of a program, by its content."""
+def program_digest(program: str) -> str:
+    """Return a short hash of a program."""
     return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()[:16]

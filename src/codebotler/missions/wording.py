@@ -1,4 +1,4 @@
-"""What happens in a mission, event by event, in English."""
+"""The events of a mission, in English."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import attempted, options_of, trace_from
 from codebotler.core.words import brief
-from codebotler.missions.log import Line, Summary
+from codebotler.missions.log import LogLine, MissionSummary
 
-PAGE = "the page"  # as whoever presses STOP there is logged
-FIRST_CALLS = 2  # of a program, in the title of its mission
-MOST_ACTIVITY = 100  # characters of each text
+BY_PAGE = "the page"  # the source of a stop, in the log
+_TITLE_CALLS = 2
+_MAX_ACTIVITY_CHARACTERS = 100
 
 
-def event_text(line: Line) -> str:
-    """An event as people read it, such as `drives to "kitchen"`; empty if there is nothing to read."""
-    words = EVENTS.get(line["event"])
+def event_text(line: LogLine) -> str:
+    """Return an event in words, such as `drives to "kitchen"`; empty if there are none."""
+    words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
 
-def activity(line: Line) -> str:
-    """What a robot does during a skill or a pause of the program, such as `going to "supply room"`."""
+def activity(line: LogLine) -> str:
+    """Return a skill or pause in words, such as `going to "supply room"`."""
     if line["event"] == "sleep":
         return f"waiting for {line['seconds']:g} s"
-    return skill_text(line, "ing", MOST_ACTIVITY) or f"executing {visible(line['skill'])}"
+    return skill_text(line, "ing", _MAX_ACTIVITY_CHARACTERS) or f"executing {visible(line['skill'])}"
 
 
-def skill_text(line: Line, form: VerbForm, most: int = 500) -> str:
-    """The call of a skill in words; empty for a skill that has none in this process."""
+def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
+    """Return the call of a skill in words; empty for a skill without a verb."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
         return ""
@@ -47,25 +47,25 @@ def skill_text(line: Line, form: VerbForm, most: int = 500) -> str:
 
 
 def stop_text(by: str, doing: str = "") -> str:
-    """A stop in words, and what it interrupted, such as `driving to supply room`, if anything."""
+    """Return a stop in words, with the activity that it interrupted, if any."""
     during = f" while {doing}" if doing else ""
-    return f"stopped {'from' if by == PAGE else 'by'} {visible(by)}{during}"
+    return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}{during}"
 
 
 def state_text(state: str, reason: str) -> str:
-    """A state and why it was reached, such as `stopped by rule vault` or `failed: the door is shut`."""
+    """Return a state and its reason, such as `stopped by rule vault` or `failed: the door is shut`."""
     if not reason or reason.startswith(state):
         return shortened(reason) or state
     return f"{state}: {shortened(reason)}"
 
 
 def reason_text(reason: str, line: int | None) -> str:
-    """Why a mission ended, with the line of the program if one is to blame."""
+    """Return the reason with the program's line, if known."""
     return reason if line is None else f"line {line}: {reason}"
 
 
-def title(summary: Summary) -> str:
-    """The instruction of a mission, or else the first skills that its program calls."""
+def title(summary: MissionSummary) -> str:
+    """Return the instruction of a mission, or the first skills that its program calls."""
     if summary.instruction:
         return summary.instruction
     calls = [
@@ -74,17 +74,17 @@ def title(summary: Summary) -> str:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and by_name(node.func.id)
     ]
     calls.sort(key=lambda call: (call.lineno, call.col_offset))
-    shown = [brief(ast.get_source_segment(summary.program, call) or "") for call in calls[:FIRST_CALLS]]
-    more = ["…"] * (len(calls) > FIRST_CALLS)
+    shown = [brief(ast.get_source_segment(summary.program, call) or "") for call in calls[:_TITLE_CALLS]]
+    more = ["…"] * (len(calls) > _TITLE_CALLS)
     return f"typed: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
 
 
-def _skill(line: Line) -> str:
+def _skill(line: LogLine) -> str:
     arguments = list(line["arguments"].values())
     return skill_text(line, "third") or shortened(written_call(line["skill"], arguments))
 
 
-def _result(line: Line) -> str:
+def _result(line: LogLine) -> str:
     match line["result"]:
         case None:
             return ""
@@ -97,18 +97,17 @@ def _result(line: Line) -> str:
             return f"→ {shortened(str(result))}"
 
 
-def _rule(line: Line) -> str:
-    """A rule that was enforced, broken, or not kept at the end."""
+def _rule(line: LogLine) -> str:
     rule, says = f'the rule "{visible(str(line["rule"]))}"', shortened(str(line["says"]))
     if "what" not in line:
-        return f"not kept: {rule}: {says}"
+        return f"{rule} was broken at the end: {says}"
     what = visible(phrase(trace_from([line["what"]])[0], "ing"))
     if line.get("why"):
         return f"{rule} cannot judge {what}, {visible(str(line['why']))}: {says}"
     return f"{rule} prevented {what}: {says}" if line.get("prevented") else f"{what} broke {rule}: {says}"
 
 
-EVENTS: Mapping[str, Callable[[Line], str]] = {
+_EVENT_WORDERS: Mapping[str, Callable[[LogLine], str]] = {
     "skill": _skill,
     "result": _result,
     "state": lambda line: state_text(line["state"], line.get("reason", "")),
@@ -123,4 +122,4 @@ EVENTS: Mapping[str, Callable[[Line], str]] = {
     "log": lambda line: shortened(line["text"]),
     "map": lambda _: "",
 }
-"""The text of each kind of event."""
+"""Functions that word each kind of event."""

@@ -26,7 +26,7 @@ from codebotler.robots.clock import Clock
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import ENDLESS, WORDS_FOR_PEOPLE, SimulationSettings, resolve_room
 
-SIMULATED_RULES = SimulationSettings(
+SIMULATION = SimulationSettings(
     literals="as-written", people="own-name-or-word", words_for_people=WORDS_FOR_PEOPLE, limits=ENDLESS
 )
 METRES_PER_SECOND = 0.5
@@ -64,12 +64,12 @@ class Simulated:
         self.skills, self.clock = skills, Clock(speed)
         self._world, self._pace = world, metres_per_second
         self._stands_at = {room.name: room.stand_at or (0.0, 0.0) for room in laid_out(world).rooms}
-        self._robot = SimulatedRobot(world, SIMULATED_RULES, skills)
+        self._robot = SimulatedRobot(world, SIMULATION, skills)
         self._place = self._stands_at[world.robot]
 
     def connect(self) -> None:
         """Put the robot and all objects at their places in the world."""
-        self._robot = SimulatedRobot(self._world, SIMULATED_RULES, self.skills)
+        self._robot = SimulatedRobot(self._world, SIMULATION, self.skills)
         self._place = self._stands_at[self._world.robot]
         self.clock.restart()
 

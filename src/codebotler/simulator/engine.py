@@ -1,4 +1,4 @@
-"""Runs programs in worlds, in isolation; equal pairs run once, and results come in order."""
+"""Runs programs in worlds, in isolation; equal pairs run once, and outcomes keep the order of the pairs."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from codebotler.core.trace import Outcome
 from codebotler.core.world import World
 from codebotler.simulator.pool import WorkerPool, cores
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.settings import PAPER, SimulationSettings
+from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
 
 
 def run(
     pairs: Iterable[tuple[str, World]],
     *,
     workers: int | None = None,
-    rules: SimulationSettings = PAPER,
+    settings: SimulationSettings = PAPER_SETTINGS,
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
-    """Run programs in worlds, read as they are needed, and yield their outcomes in the order of the pairs."""
+    """Run programs in worlds lazily, and yield their outcomes in the order of the pairs."""
     with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:
             jobs = [
-                (source, [partial(SimulatedRobot, world, rules, skills) for _, world in same])
+                (source, [partial(SimulatedRobot, world, settings, skills) for _, world in same])
                 for source, same in groupby(pairs, key=itemgetter(0))
             ]
             return [outcome for outcomes in pool.here().run_all(jobs) for outcome in outcomes]
@@ -45,7 +45,7 @@ def run(
 
 
 def digest(*texts: str) -> bytes:
-    """A short name for texts, which no other texts have."""
+    """A hash of some texts, each with its length."""
     hashed = hashlib.sha256()
     for text in texts:
         data = text.encode(errors="surrogatepass")

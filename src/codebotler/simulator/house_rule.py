@@ -1,4 +1,4 @@
-"""`Rule`: what a house demands of every program; and the error of an event that a rule does not allow."""
+"""`Rule`: a requirement on every program; and the error of an event that a rule does not allow."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from codebotler.rtl.semantics import is_match
 
 Objection: TypeAlias = Literal["forbids", "cannot judge", "is broken by", "could not judge"]
 
-NO_TEXT = "which offers an option that is no text"
-NO_ROOM = "since the robot does not say which room it is in"
-NO_GOAL = "since it may mean several rooms, and the robot does not say which"
+# Why a rule cannot be judged, as the end of a sentence.
+NON_TEXT_OPTION = "which offers an option that is no text"
+UNKNOWN_ROOM = "since the robot does not say which room it is in"
+AMBIGUOUS_GOAL = "since it may mean several rooms, and the robot does not say which"
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What must hold whatever the instruction is.
+    """A requirement on every program, whatever the instruction is.
 
     Args:
         name: how messages name it.
         says: the rule for people and models, in a sentence.
         formula: the rule as a formula.
         when: `always`, of every prefix of a trace, or `finally`, when the mission ends.
-        refuse: whether the program goes on without what it was refused; else the mission ends.
+        refuse: whether the program goes on without the refused action; else the mission ends.
         any_room: whether it may name rooms that a house lacks.
     """
 
@@ -43,35 +44,32 @@ class Rule:
     any_room: bool = False
 
     @cached_property
+    def elements(self) -> tuple[EventPattern, ...]:
+        """All patterns of events in its formula."""
+        return tuple(elements(self.formula))
+
+    @cached_property
     def inside(self) -> tuple[EventPattern, ...]:
-        """Its elements that are about the rooms which the robot's pose enters."""
-        return tuple(element for element in elements(self.formula) if element.kind == INSIDE)
+        """Its patterns of the rooms that the robot's pose enters."""
+        return tuple(element for element in self.elements if element.kind == INSIDE)
 
-    @cached_property
-    def kinds_in_rooms(self) -> frozenset[str]:
-        """The kinds of events of which it compares the room where they happen."""
-        return frozenset(one.kind for one in elements(self.formula) if one.place is not None)
-
-    @cached_property
-    def _results_compared(self) -> tuple[frozenset[str], frozenset[str]]:
-        """The kinds of events of which it compares what a look finds, and what somebody answers."""
-        compared = [*elements(self.formula)]
-        found = frozenset(one.kind for one in compared if one.found is not None)
-        return found, frozenset(one.kind for one in compared if one.answer is not None)
+    def depends_on_room(self, event: Event) -> bool:
+        """Whether it compares the room in which such an event happens."""
+        return any(one.place is not None for one in self.elements if one.kind == event.kind)
 
     def results(self, attempt: Event) -> Sequence[Event]:
-        """Return an event with each result that it may have, as far as this rule compares results."""
-        found, answered = self._results_compared
-        if attempt.kind in found:
+        """Return an event with each result that it may have, if this rule compares results."""
+        compared = [one for one in self.elements if one.kind == attempt.kind]
+        if any(one.found is not None for one in compared):
             return [replace(attempt, found=True), replace(attempt, found=False)]
-        if attempt.kind in answered and attempt.options:
+        if attempt.options and any(one.answer is not None for one in compared):
             return [replace(attempt, answer=option.text) for option in attempt.options]
         return (attempt,)
 
     def tells_apart(self, events: Iterable[Event]) -> bool:
         """Whether it matters to this rule which of some events happened."""
         events = tuple(events)
-        return any(len({is_match(one, event, 0) for event in events}) > 1 for one in elements(self.formula))
+        return any(len({is_match(one, event, 0) for event in events}) > 1 for one in self.elements)
 
 
 class RuleViolationError(RobotError):
@@ -79,7 +77,7 @@ class RuleViolationError(RobotError):
 
     Args:
         rule: the rule.
-        event: what would break it, or has broken it; None at the end of a mission.
+        event: the event that would break it, or has broken it; None at the end of a mission.
         objection: what the rule has to do with the event.
         why: why it cannot be judged, as the end of a sentence.
     """
@@ -103,4 +101,4 @@ class RuleViolationError(RobotError):
     @property
     def ends_run(self) -> bool:
         """Whether the program cannot go on, whatever it catches."""
-        return self.is_late or self.why == NO_ROOM or not self.rule.refuse
+        return self.is_late or self.why == UNKNOWN_ROOM or not self.rule.refuse

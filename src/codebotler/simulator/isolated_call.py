@@ -1,8 +1,8 @@
-"""Calls our own functions on text that others wrote, in closed processes with limits.
+"""Calls our own functions on text of others, in closed processes with limits.
 
 CPython's compiler needs minutes and gigabytes for some short texts, in one call that nothing interrupts and
-that lets no other thread run, not even the one that stops a robot. Such text is therefore compiled, or read
-by code whose time may grow faster than the text, only in these processes. They never execute it.
+that blocks all threads, even the one that stops a robot. Only these processes compile text of others, or read
+it with code of more than linear time. They never execute it.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.process.spawn import ONE_AT_A_TIME
+from codebotler.simulator.process.spawn import START_LOCK
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 
 MAX_RESULT = 64_000_000  # bytes of JSON
 RESULT, FAILURE = b"+", b"-"  # first byte of an answer
-CODE = f"import sys; sys.path[:] = sys.argv[3:]; from {__name__} import serve; serve(*sys.argv[1:3])"
+SERVE_CODE = f"import sys; sys.path[:] = sys.argv[3:]; from {__name__} import serve; serve(*sys.argv[1:3])"
 
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
 class IsolatedCallError(Exception):
@@ -53,15 +53,15 @@ class IsolatedCallError(Exception):
         return f"{self.kind}: {self.message}"
 
 
-class IsolatedFunction(Generic[Arguments, Result]):
+class IsolatedFunction(Generic[_Arguments, _Result]):
     """A function that is called in a closed process; `isolated` makes one."""
 
-    def __init__(self, function: Callable[Arguments, Result], rehearsal: tuple[Any, ...]) -> None:
-        self.function, self._rehearsal = function, rehearsal
+    def __init__(self, function: Callable[_Arguments, _Result], rehearsal: tuple[Any, ...]) -> None:
+        self.function, self.rehearsal = function, rehearsal
         self.__doc__, self.__wrapped__ = function.__doc__, function
         self.__module__, self.__name__ = function.__module__, function.__name__
 
-    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+    def __call__(self, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
         """Call the function in a closed process, and in a new one if a used one fails.
 
         Raises:
@@ -69,7 +69,7 @@ class IsolatedFunction(Generic[Arguments, Result]):
             EngineError: no process can be started.
         """
         call = (self.__name__, pickle.dumps((args, kwargs)))
-        idle = IDLE.setdefault(self.__module__, [])
+        idle = IDLE_PROCESSES.setdefault(self.__module__, [])
         with suppress(IndexError, IsolatedCallError, LostProcessError):
             return self._call(idle.pop(), call)
         try:
@@ -77,39 +77,31 @@ class IsolatedFunction(Generic[Arguments, Result]):
                 return self._call(ClosedProcess(self.__module__), call)
             return self._call(ClosedProcess(self.__module__), call)
         except (LostProcessError, OSError) as error:
-            from codebotler.simulator.worker import EngineError  # noqa: PLC0415 - which these processes lack
+            from codebotler.simulator.worker import EngineError  # noqa: PLC0415 - too large for these processes
 
             raise EngineError(f"an isolated process was lost twice: {error}") from None
 
-    def rehearse(self) -> None:
-        """Call the function here, so that whatever it imports is imported."""
-        self.function(*self._rehearsal)  # type: ignore[call-arg]  # a rehearsal is a call that fits
-
-    def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> Result:
+    def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> _Result:
         try:
             result = process.call(*call)
-        except BaseException:  # even an interrupt, since the answer to this call must not reach the next one
+        except BaseException:  # such as an interrupt: this answer must not reach the next call
             process.end()
             raise
-        IDLE[self.__module__].append(process)
-        return result  # type: ignore[no-any-return]  # which came as JSON
+        IDLE_PROCESSES[self.__module__].append(process)
+        return result  # type: ignore[no-any-return]  # from JSON
 
 
 def isolated(
     *rehearsal: object,
-) -> Callable[[Callable[Arguments, Result]], IsolatedFunction[Arguments, Result]]:
+) -> Callable[[Callable[_Arguments, _Result]], IsolatedFunction[_Arguments, _Result]]:
     """Have a module's function called in a closed process.
 
-    The process gets pickled arguments, and answers with plain data, as JSON has it: tuples become lists.
+    The process gets pickled arguments, and returns JSON data: tuples become lists.
 
     Args:
         rehearsal: arguments with which each new process calls the function before it is closed.
     """
-
-    def decorate(function: Callable[Arguments, Result]) -> IsolatedFunction[Arguments, Result]:
-        return IsolatedFunction(function, rehearsal)
-
-    return decorate
+    return lambda function: IsolatedFunction(function, rehearsal)
 
 
 class ClosedProcess:
@@ -117,11 +109,11 @@ class ClosedProcess:
 
     def __init__(self, module: str) -> None:
         flags = ["-S", "-s", "-P", "-W", "ignore", *(["-B"] if sys.dont_write_bytecode else [])]
-        path = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path would follow links
+        path = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path.resolve follows links
         ours, theirs = socket.socketpair()
-        with theirs, ONE_AT_A_TIME:
+        with theirs, START_LOCK:
             self._process = subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
-                [sys.executable, *flags, "-c", CODE, module, str(theirs.fileno()), *path],
+                [sys.executable, *flags, "-c", SERVE_CODE, module, str(theirs.fileno()), *path],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -137,7 +129,7 @@ class ClosedProcess:
             self.end()
             raise LostProcessError("a closed process does not start")
 
-    def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - whatever the function returns
+    def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - any result
         """Call a function, and return its result."""
         self._channel.send((name, arguments), at_once=True)
         try:
@@ -146,7 +138,7 @@ class ClosedProcess:
             raise IsolatedCallError(type(silence).__name__, "the process does not answer") from None
         self._channel.reset_patience()
         if not answer:
-            status = self._channel.ended()
+            status = self._channel.end_gently()
             if status == -signal.SIGKILL:
                 raise LostProcessError("it was killed from outside")
             _, error = cause_of_death(status)
@@ -157,29 +149,29 @@ class ClosedProcess:
         return data
 
     def end(self) -> None:
-        """End it, also in the middle of a call."""
+        """End the process, even during a call."""
         self._channel.end()
 
     def forget(self) -> None:
-        """Close its channel in a forked process, whose child it is not."""
+        """Close the channel in a forked process, which is not its parent."""
         self._process.returncode = 0
         self._channel.hang_up()
 
 
-IDLE: dict[str, list[ClosedProcess]] = {}
-"""The processes that wait for a call, by the module whose functions they call."""
+IDLE_PROCESSES: dict[str, list[ClosedProcess]] = {}
+"""The processes that wait for a call, by the module of their functions."""
 
 
 def end_all() -> None:
-    """End the processes that wait; nobody may be calling."""
-    for processes in IDLE.values():
+    """End all waiting processes; no call may be in progress."""
+    for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().end()
 
 
 def forget_all() -> None:
-    """Let go of the processes of the parent, in a forked process."""
-    for processes in IDLE.values():
+    """Release the processes of the parent, in a forked process."""
+    for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().forget()
 
@@ -192,14 +184,14 @@ os.register_at_fork(after_in_child=forget_all)
 
 
 def serve(module: str, descriptor: str) -> NoReturn:
-    """Call functions of a module for as long as anybody asks."""
-    import unicodedata as _  # noqa: F401, PLC0415 - for "\N{...}" in a text, which the parser imports too late
+    """Call functions of a module until the engine hangs up."""
+    import unicodedata as _  # noqa: F401, PLC0415 - for "\N{...}": the parser would import it too late
 
     functions = {
         name: one for name, one in vars(import_module(module)).items() if isinstance(one, IsolatedFunction)
     }
-    for function in functions.values():
-        function.rehearse()
+    for function in functions.values():  # so that their imports are complete
+        function.function(*function.rehearsal)
     give_up_rights()
     seccomp = usable_filter()
     os.dup2(int(descriptor), CHANNEL)
@@ -215,5 +207,5 @@ def _answer(function: IsolatedFunction[..., object], call: bytes) -> bytes:
     try:
         args, kwargs = pickle.loads(call)  # noqa: S301 - from our own process
         return RESULT + json.dumps(function.function(*args, **kwargs)).encode()
-    except Exception as error:  # noqa: BLE001 - a function may fail on a text in any way
+    except Exception as error:  # noqa: BLE001 - a function may raise any error
         return FAILURE + json.dumps([type(error).__name__, str(error)[:1000]]).encode()

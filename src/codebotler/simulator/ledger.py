@@ -1,4 +1,4 @@
-"""The limits of one run: counts what it asks of its robot, and ends it at a limit."""
+"""The limits of one run: counts its requests to the robot, and ends it at a limit."""
 
 from __future__ import annotations
 
@@ -13,52 +13,52 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.settings import Limits, SimulationSettings
 
-FEW = 50  # calls of which nothing is remembered
-OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
+UNREMEMBERED_CALLS = 50  # calls of a run before any answer is remembered
+OPTION_OVERHEAD = 10  # characters added for each option, since empty ones take memory, too
 WAITS = "it waits for something that can never come"
-LAST_LINE = 1_000_000
-LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
+MAX_LINE = 1_000_000
+MAX_MESSAGE = 1_000  # characters; a robot's error may quote a whole request
 SkillAnswer: TypeAlias = tuple[str, Any]
-"""`ok` and a result, `error` and its number, kind and message, or `stop` and whether a rule is the reason."""
+"""`ok` and a result; `error` and its number, kind and message; or `stop` and whether a rule is the reason."""
 STOP: SkillAnswer = ("stop", None)
-REFUSED: SkillAnswer = ("stop", True)
+STOPPED_BY_RULE: SkillAnswer = ("stop", True)
 
 
 class SkillPerformer(Protocol):
-    """A robot, as a run needs it; executing a skill may take as long as it likes."""
+    """A robot that a run can use; a skill may take any time."""
 
-    rules: SimulationSettings
+    settings: SimulationSettings
     skills: SkillTable
-    is_live: bool  # time passes by itself: sleeping takes it, and each skill refuels the program
-    line: int | None  # of a live program, which asks for something there
+    is_live: bool  # time is real, and each skill refuels the program
+    line: int | None  # of a live program, at its current request
 
     @property
     def now(self) -> float:
-        """What the program's clock shows, in seconds since the start."""
+        """The program's clock, in seconds since the start."""
 
     @property
     def trace(self) -> Trace:
-        """What it has done so far."""
+        """Its trace so far."""
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill, or raise RobotError."""
 
     def sleep_until(self, now: float) -> None:
-        """Let time pass, until `now` seconds since the start; back at once when it is to stop."""
+        """Let time pass until `now` seconds since the start, or until the robot is stopped."""
 
 
 class Ledger:
-    """What one run has asked of its robot, and how much it may still ask."""
+    """The requests of one run to its robot, and the limit that they reach."""
 
     def __init__(self, robot: SkillPerformer) -> None:
-        self.robot, self.limits = robot, robot.rules.limits
+        self.robot, self.limits = robot, robot.settings.limits
         self.calls = self.text = 0  # characters of all texts
-        self.limit: str | None = None  # the one that was reached, in words
+        self.limit: str | None = None  # the reached one, in words
         self.errors: list[RobotError] = []
-        self.broken: RobotError | None = None  # of a rule: it has ended the run
+        self.broken: RobotError | None = None  # the broken rule that ended the run
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
-        """Let the robot execute one skill, unless that goes beyond a limit."""
+        """Let the robot execute one skill, up to the limits."""
         self._spend(arguments)
         if self.limit is not None:
             return STOP
@@ -67,21 +67,21 @@ class Ledger:
         except RobotError as error:
             if error.ends_run:
                 self.broken, self.limit = error, str(error)
-                return REFUSED
+                return STOPPED_BY_RULE
             self.errors.append(error)
             return ("error", (len(self.errors) - 1, error.kind, str(error)))
         return ("ok", result)
 
     def let_time_pass(self, now: float) -> None:
-        """Let simulated time pass, until `now` seconds since the start, or until its limit."""
+        """Let simulated time pass until `now` seconds since the start, or until its limit."""
         if now > self.limits.seconds:
             now = self.limits.seconds
             self.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
-        if now > self.robot.now:  # if it is less, the program has found the channel, and deceives itself
+        if now > self.robot.now:  # an earlier time is the lie of a program that has found the channel
             self.robot.sleep_until(float(now))
 
-    def ended(self, final: Mapping[str, object]) -> Outcome:
-        """The outcome of a run, by what its process said at the end."""
+    def outcome_at_end(self, final: Mapping[str, object]) -> Outcome:
+        """The outcome of a run, by the last message of its process."""
         line = final.get("line")
         if self.limit is not None:
             status = Status.TIMEOUT if self.broken is None else Status.ROBOT_ERROR
@@ -97,7 +97,7 @@ class Ledger:
                 error = self.errors[number]
                 return self.outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
             case {"end": "python-error", "kind": str(kind), "message": str(message)}:
-                is_own = kind.isidentifier() and kind != VIOLATION  # which only rules have
+                is_own = kind.isidentifier() and kind != VIOLATION  # an error of rules only
                 name = kind if is_own else "Exception"
                 return self.outcome(Status.PYTHON_ERROR, name[:100], message, line)
             case _:
@@ -105,8 +105,8 @@ class Ledger:
 
     def outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
         """The outcome of a run that ended in an error."""
-        where = line if type(line) is int and 0 < line <= LAST_LINE else None
-        return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
+        where = line if type(line) is int and 0 < line <= MAX_LINE else None
+        return Outcome(status, self.robot.trace, RunError(kind, message[:MAX_MESSAGE]), where)
 
     def _spend(self, arguments: Sequence[Argument]) -> None:
         limits, size = self.limits, 0
@@ -127,8 +127,8 @@ class Ledger:
             self.limit = f"texts of more than {limits.trace:,} characters in all"
 
 
-def kept(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
-    """The outcome of a run in simulation, which has finished only if all rules are kept at its end."""
+def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
+    """The outcome of a simulated run, which is an error if a rule is not kept at its end."""
     unkept = robot.guard.at_end() if robot.guard is not None and outcome.error is None else None
     if unkept is None:
         return outcome
@@ -136,26 +136,26 @@ def kept(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
 
 
 def too_long(limits: Limits) -> str:
-    """The limit that a text has reached, in words."""
+    """The limit of a text, in words."""
     return f"a text of more than {limits.text:,} characters"
 
 
 def longest(arguments: Sequence[Argument]) -> int:
-    """How many characters the longest text has that a skill is given."""
+    """The number of characters of the longest text among the arguments of a skill."""
     texts = [texts_in(given) if isinstance(given, tuple) else [str(given)] for given in arguments]
     return max((len(text) for each in texts for text in each), default=0)
 
 
 def texts_in(given: tuple[Option, ...] | tuple[Scalar, ...]) -> list[str]:
-    """The texts of options, or of other values."""
+    """The texts of options, or of other arguments."""
     return [each.text if isinstance(each, Option) else str(each) for each in given]
 
 
 class RememberingLedger(Ledger):
-    """The ledger of a run in simulation, which does at once what the robot has just done before.
+    """The ledger of a simulated run, which remembers the answers to calls that change nothing.
 
-    Looking and speaking leave the robot as it is. So a program that waits for something costs little, though
-    it looks a thousand times. Most programs call few skills, and nothing of these is remembered.
+    A program that waits for something may look a thousand times. Most programs call few skills, whose answers
+    are not worth remembering.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:
@@ -165,14 +165,14 @@ class RememberingLedger(Ledger):
 
     @cached_property
     def _idle(self) -> frozenset[str]:
-        if self._simulated.guard is not None:  # which sees each event
+        if self._simulated.guard is not None:  # it must see each event
             return frozenset()
         return self._simulated.idle_skills.difference(self._simulated.own_skills)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
-        """Let the robot execute one skill, unless that goes beyond a limit."""
+        """Let the robot execute one skill, or repeat the answer to an equal call."""
         robot = self._simulated
-        if self.calls < FEW or skill not in self._idle:
+        if self.calls < UNREMEMBERED_CALLS or skill not in self._idle:
             self._same.clear()
             return super().perform(skill, arguments)
         call = (skill, *arguments)

@@ -1,4 +1,4 @@
-"""A pool of workers in threads of this process, and the one that the whole process shares."""
+"""A pool of workers in threads of this process, and the shared pool of the process."""
 
 from __future__ import annotations
 
@@ -20,47 +20,47 @@ from typing import Any, Generic, ParamSpec, Self, TypeVar
 
 from codebotler.simulator.worker import EngineError, Worker
 
-LOG = logging.getLogger("codebotler.engine")
+_log = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses filters of system calls (seccomp)"
 NOT_LINUX = "programs are less isolated here: only Linux has filters of system calls (seccomp)"
-ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
+WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
-IN_MEMORY = 8_000_000  # bytes of results
-UNREADABLE = b""  # in the place of a key that could not be read
-FEW, LARGEST = 16, 64  # keys of the first calls and of the last, and of those between
-HEARD_S = 0.5  # seconds after which a signal is heard at the latest
-AHEAD = 2  # calls for each thread that are under way, so that none waits
-MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
+RESULTS_IN_MEMORY = 8_000_000  # bytes of results
+UNREADABLE_KEY = b""  # in place of the name of a key that raised an error
+MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # of a call: the first and last ones are smaller
+SIGNAL_POLL_SECONDS = 0.5  # of waiting, since polars keeps signals from ending a wait
+CALLS_PER_THREAD = 2  # so that no thread waits
+MAX_KEYS_AHEAD = 4_000  # keys whose results are not yet taken; one thread may be slow for seconds
 
-Key = TypeVar("Key")
-Called = TypeVar("Called")
-Value = TypeVar("Value")
-Arguments = ParamSpec("Arguments")
+_Key = TypeVar("_Key")
+_Called = TypeVar("_Called")
+_Value = TypeVar("_Value")
+_Arguments = ParamSpec("_Arguments")
 
 
 class WorkerPool:
     """Threads that each own one worker; use as a context manager, which waits for the first worker.
 
-    That is started beside whatever the caller does before; with `contextlib.closing`, nothing waits for it
-    but the first call. Where the kernel has no seccomp, this warns, or refuses if isolation is required.
+    The first worker starts in parallel with the caller; with `contextlib.closing`, only the first call waits
+    for it. Where the kernel has no seccomp, this warns, or fails if isolation is required.
     """
 
     def __init__(
         self, workers: int, *, require_isolation: bool = False, one_process_per_run: bool = False
     ) -> None:
         if sys.platform == "win32":
-            raise EngineError(ON_WINDOWS)
+            raise EngineError(WINDOWS_UNSUPPORTED)
         self.workers = workers
         self._local = threading.local()
         self._threads = ThreadPoolExecutor(
             workers, thread_name_prefix="worker", initializer=lambda: setattr(self._local, "is_ours", True)
         )
-        self._takes_turns = one_process_per_run  # a thread and a child, at each skill call
+        self._takes_turns = one_process_per_run  # thread and child run alternately
         self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
         self._workers: list[Worker] = []
         self._idle: list[Worker] = []
         self._stopping = False
-        # In a thread that lives as long as the pool: the processes end with the thread that started them.
+        # In a thread of the pool, since processes end with the thread that started them.
         self._first = self._threads.submit(self._start_first, require_isolation=require_isolation)
 
     def _start_first(self, *, require_isolation: bool) -> None:
@@ -69,7 +69,7 @@ class WorkerPool:
             if require_isolation:
                 first.close()
                 raise EngineError(without_filter())
-            LOG.warning(without_filter())
+            _log.warning(without_filter())
         self._workers.append(first)
         self._idle.append(first)
 
@@ -115,85 +115,87 @@ class WorkerPool:
     def _keep_together(self, worker: Worker) -> None:
         """Keep this thread and the processes of its worker on one core.
 
-        To wake one on another core costs more than a skill call. For that reason, too, this thread does not
-        push a child aside each time that it says something.
+        Waking a process on another core costs more than a skill call. As a batch thread, this one does not
+        preempt the child at each message.
         """
         if sys.platform != "linux":
             return
         cores = sorted(os.sched_getaffinity(0))
         core = cores[(os.getpid() + self._workers.index(worker)) % len(cores)]
-        with contextlib.suppress(OSError):  # only slower without
+        with contextlib.suppress(OSError):  # only slower
             os.sched_setaffinity(0, {core})
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
             worker.stay_on(core)
 
     def submit(
-        self, function: Callable[Arguments, Value], *args: Arguments.args, **kwargs: Arguments.kwargs
-    ) -> Future[Value]:
-        """Call a function in one of the threads, where `here` is its worker; from any thread."""
+        self, function: Callable[_Arguments, _Value], *args: _Arguments.args, **kwargs: _Arguments.kwargs
+    ) -> Future[_Value]:
+        """Call a function in one of the threads, from any thread; `here` is its worker there."""
         return self._threads.submit(function, *args, **kwargs)
 
     @property
     def is_here(self) -> bool:
-        """Whether this is one of the threads, which must not wait for another one."""
+        """Whether this is a thread of the pool, which must not wait for another one."""
         return getattr(self._local, "is_ours", False)
 
-    def call(self, function: Callable[[], Value]) -> Value:
-        """Call a function in one of the threads, this one if it is one of them, and wait for its result."""
+    def call(self, function: Callable[[], _Value]) -> _Value:
+        """Call a function in a thread of the pool, perhaps this one, and wait for its result."""
         return function() if self.is_here else self.submit(function).result()
 
     def forget(self) -> None:
-        """Close the descriptors in a forked process, to which neither the workers nor the threads belong."""
+        """Close the descriptors in a forked process, which has neither the workers nor the threads."""
         for worker in self._workers:
             worker.forget()
 
     def map_distinct(
         self,
-        function: Callable[[Sequence[Key]], Sequence[Called]],
-        keys: Iterable[Key],
+        function: Callable[[Sequence[_Key]], Sequence[_Called]],
+        keys: Iterable[_Key],
         *,
-        name: Callable[[Key], bytes],
-        then: Callable[[Called], Any] = lambda result: result,
+        name: Callable[[_Key], bytes],
+        then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """The results for keys, in their order, calling the function in threads; see `map_batches`."""
-
-        def submit(keys: Sequence[Key]) -> Future[Sequence[Called]]:
-            return self._threads.submit(function, keys)
-
-        return map_batches(submit, keys, workers=self.workers, name=name, then=then)
+        """Call the function in threads, and yield results in the order of the keys; see `map_batches`."""
+        return map_batches(
+            lambda some: self._threads.submit(function, some),
+            keys,
+            workers=self.workers,
+            name=name,
+            then=then,
+        )
 
 
 def map_batches(
-    submit: Callable[[Sequence[Key]], Future[Sequence[Called]]],
-    keys: Iterable[Key],
+    submit: Callable[[Sequence[_Key]], Future[Sequence[_Called]]],
+    keys: Iterable[_Key],
     *,
     workers: int,
-    name: Callable[[Key], bytes],
-    then: Callable[[Called], Any] = lambda result: result,
+    name: Callable[[_Key], bytes],
+    then: Callable[[_Called], Any] = lambda result: result,
 ) -> Iterator[Any]:
-    """The results for keys, in their order, with several calls under way at the same time.
+    """Run several calls at the same time, and yield their results in the order of the keys.
 
-    Equal keys are called once. While the next result is long in coming, more keys are read, so that the
-    other workers have work. What the keys or a call raise comes in its place among the results.
+    Equal keys are called once. While one result is slow, more keys are read, so that the other workers have
+    work. An error of the keys or of a call is raised in the place of the result.
 
     Args:
-        submit: begins a call for a few keys, which gives a result for each.
+        submit: starts a call for a few keys, which returns a result for each.
         keys: read a little ahead.
-        workers: how many calls are carried out at the same time.
-        name: gives each key a short name of its own.
-        then: called with each result in the thread that asks for them; its own result is pickled.
+        workers: the number of simultaneous calls.
+        name: returns a short unique name for each key.
+        then: called with each result in the thread of the caller; its own result is pickled.
     """
     distinct = DistinctKeys(keys, name)
     waiting, failed = distinct.waiting, distinct.failed
-    running: dict[Future[Sequence[Called]], list[bytes]] = {}
-    ended: SimpleQueue[Future[Sequence[Called]]] = SimpleQueue()
-    calls = AHEAD * workers
+    running: dict[Future[Sequence[_Called]], list[bytes]] = {}
+    ended: SimpleQueue[Future[Sequence[_Called]]] = SimpleQueue()
+    calls = CALLS_PER_THREAD * workers
     with ResultFile() as done:
         while True:
             while len(running) < calls and (batch := distinct.batch(workers)):
                 try:
                     future = submit(list(batch.values()))
-                except Exception as error:  # noqa: BLE001 - raised after the results of those before
+                except Exception as error:  # noqa: BLE001 - raised after earlier results
                     failed.update(dict.fromkeys(batch, error))
                     continue
                 running[future] = list(batch)
@@ -210,50 +212,48 @@ def map_batches(
             names = running.pop(future)
             try:
                 results = future.result()
-            except Exception as error:  # noqa: BLE001 - raised where the result is waited for
+            except Exception as error:  # noqa: BLE001 - raised in place of the result
                 failed.update(dict.fromkeys(names, error))
                 continue
             for named, result in zip(names, results, strict=True):
                 try:
                     done[named] = then(result)
-                except Exception as error:  # noqa: BLE001 - the same, for this one alone
+                except Exception as error:  # noqa: BLE001 - raised in place of this result
                     failed[named] = error
 
 
-def _next(queue: SimpleQueue[Value]) -> Value:
-    """What comes next in a queue; signals are heard meanwhile, which polars keeps from ending a wait."""
+def _next(queue: SimpleQueue[_Value]) -> _Value:
     while True:
         with contextlib.suppress(Empty):
-            return queue.get(timeout=HEARD_S)
+            return queue.get(timeout=SIGNAL_POLL_SECONDS)
 
 
 def without_filter() -> str:
-    """Why programs are less isolated here."""
+    """The warning for systems without seccomp."""
     return NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 
 
-class DistinctKeys(Generic[Key]):
-    """Keys with a name each, which are read a little ahead and handed out in batches, equal ones once."""
+class DistinctKeys(Generic[_Key]):
+    """Keys with names, read a little ahead and returned in batches, equal keys once."""
 
-    def __init__(self, keys: Iterable[Key], name: Callable[[Key], bytes]) -> None:
+    def __init__(self, keys: Iterable[_Key], name: Callable[[_Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
         self._seen: set[bytes] = set()
-        self._new: dict[bytes, Key] = {}  # read, and not yet handed out
+        self._new: dict[bytes, _Key] = {}  # not yet in a batch
         self._sent = 0
-        self.waiting: deque[bytes] = deque()  # names of keys that were read, until somebody takes them
+        self.waiting: deque[bytes] = deque()  # names of keys whose results are not yet taken
         self.failed: dict[bytes, BaseException] = {}
 
-    def batch(self, width: int) -> dict[bytes, Key]:
-        """New keys by name, for one call of so many that work at the same time.
+    def batch(self, width: int) -> dict[bytes, _Key]:
+        """New keys by name, for one of `width` simultaneous calls; empty at the end, or if too many wait.
 
         Batches grow, so that the first results come soon; the last ones shrink, so that all calls end at the
-        same time. None is left once there are no more keys, or too many wait to be taken. What is raised when
-        they are read comes in the place of the next one, as that of a name that fails.
+        same time. An error of the keys is that of the next name.
         """
-        size = min(LARGEST, max(FEW, self._sent // 2))
+        size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
         share = -(-len(self._new) // width)
-        size = min(size, max(share, FEW if self._sent >= LARGEST else 1))
+        size = min(size, max(share, MIN_BATCH_KEYS if self._sent >= MAX_BATCH_KEYS else 1))
         batch = dict(islice(self._new.items(), size))
         for named in batch:
             del self._new[named]
@@ -262,7 +262,7 @@ class DistinctKeys(Generic[Key]):
 
     def _read(self, most: int) -> None:
         try:
-            while len(self._new) < most and len(self.waiting) < MOST_AHEAD:
+            while len(self._new) < most and len(self.waiting) < MAX_KEYS_AHEAD:
                 key = next(self._keys)
                 name = self._name(key)
                 self.waiting.append(name)
@@ -271,17 +271,17 @@ class DistinctKeys(Generic[Key]):
                     self._new[name] = key
         except StopIteration:
             pass
-        except Exception as error:  # noqa: BLE001 - raised after the results of what was read before
+        except Exception as error:  # noqa: BLE001 - raised after earlier results
             self._keys = iter(())
-            self.waiting.append(UNREADABLE)
-            self.failed[UNREADABLE] = error
+            self.waiting.append(UNREADABLE_KEY)
+            self.failed[UNREADABLE_KEY] = error
 
 
 class ResultFile:
-    """Results by name, in a temporary file, so that a million of them need little memory."""
+    """Results by name, in a temporary file, since there may be a million of them."""
 
     def __init__(self) -> None:
-        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by __exit__
+        self._file = tempfile.SpooledTemporaryFile(RESULTS_IN_MEMORY)  # noqa: SIM115 - closed by __exit__
         self._places: dict[bytes, int] = {}
 
     def __enter__(self) -> Self:
@@ -299,7 +299,7 @@ class ResultFile:
         self._file.write(data)
         self._places[name] = place
 
-    def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - whatever was put there
+    def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - any stored value
         self._file.seek(self._places[name])
         return pickle.load(self._file)  # noqa: S301 - we wrote it
 
@@ -308,34 +308,34 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """The pool of this process, with one worker for each core, started on first use; a fork has its own."""
-    with SHARED.lock:
-        if SHARED.pool is None:
-            SHARED.pool = WorkerPool(cores()).__enter__()  # a pool that cannot start is not kept
-        return SHARED.pool
+    """The pool of this process with a worker for each core, started on first use; a fork has its own."""
+    with SHARED_POOL.lock:
+        if SHARED_POOL.pool is None:
+            SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # raises if it cannot start
+        return SHARED_POOL.pool
 
 
 class SharedPool:
-    """The pool of this process once it is started, and what forks do with it."""
+    """Holds the pool of this process once it is started; a fork starts anew."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()  # held during a fork, so that no pool is half started in the child
+        self.lock = threading.Lock()  # held during a fork, so that no child has half a pool
         self.pool: WorkerPool | None = None
-        self._inherited: list[WorkerPool] = []  # never taken apart: their threads are not here
+        self._inherited: list[WorkerPool] = []  # never freed, since their threads are missing here
         atexit.register(self.end)
         os.register_at_fork(
             before=self.lock.acquire, after_in_parent=self.lock.release, after_in_child=self.begin_anew
         )
 
     def end(self) -> None:
-        """End it."""
+        """End the pool."""
         with self.lock:
             if self.pool is not None:
                 self.pool.close()
                 self.pool = None
 
     def begin_anew(self) -> None:
-        """Let go of it, in the process that was forked."""
+        """Release the pool of the parent, in a forked process."""
         if self.pool is not None:
             self.pool.forget()
             self._inherited.append(self.pool)
@@ -344,8 +344,8 @@ class SharedPool:
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """The number of cores for this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-SHARED = SharedPool()
+SHARED_POOL = SharedPool()

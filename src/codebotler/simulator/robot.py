@@ -1,4 +1,4 @@
-"""The simulated robot: what each skill does to a world, and how it can fail."""
+"""The simulated robot: the effect of each skill on a world, and its errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from codebotler.core.trace import Event, Option, Trace, attempted, options_of
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.settings import (
-    PAPER,
+    PAPER_SETTINGS,
     Matching,
     SimulationSettings,
     choose,
@@ -34,7 +34,7 @@ Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # of a copy: `simulated` or `sam
 
 
 class SkillGuard(Protocol):
-    """Judges each skill before a robot executes it."""
+    """A judge of each skill before a robot executes it."""
 
     may_refuse: bool
 
@@ -42,10 +42,10 @@ class SkillGuard(Protocol):
         """Let a robot execute one skill, or raise RobotError."""
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """Judge what a skill of the user's own is about to do inside, or raise RobotError."""
+        """Judge an action inside a skill of the user's own, or raise RobotError."""
 
     def at_end(self) -> RobotError | None:
-        """Return what is wrong if the run ends now."""
+        """Return the error if the run ends now, if any."""
 
 
 @dataclass
@@ -53,17 +53,17 @@ class Thing:
     """An object in a room."""
 
     label: str
-    is_pattern: bool = True  # one that was put down keeps the name it was picked by, as literal text
+    is_pattern: bool = True  # else literal text, for a thing that was put down
 
     def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
         """Whether a request finds it."""
         if self.is_pattern:
             return finds(request, self.label, matching)
-        return self.label.lower() in request.lower()  # a regex would take minutes for names that are long
+        return self.label.lower() in request.lower()  # a regex may take minutes for long names
 
 
 class Somebody:
-    """A person in a room, what they have yet to answer, and when they come."""
+    """A person in a room, with their remaining answers."""
 
     def __init__(self, person: Person) -> None:
         self.person = person
@@ -76,15 +76,15 @@ class Somebody:
         """Whether they are in the room now."""
         return self.looks_before == 0 and not self.is_gone
 
-    def answer(self, question: str, rules: SimulationSettings) -> Answer | None:
-        """What they answer, if anything."""
+    def answer(self, question: str, settings: SimulationSettings) -> Answer | None:
+        """Their answer to a question, if any."""
         for topic, answer in self.person.topics:
-            if finds(question, topic, rules.matching):
+            if finds(question, topic, settings.matching):
                 return answer
         if not self.answers:
             return None
         answer = self.answers[0]
-        if len(self.answers) > 1:  # the last answer stays for ever
+        if len(self.answers) > 1:  # the last answer repeats
             del self.answers[0]
         else:
             self.is_gone = self.person.leaves
@@ -92,19 +92,21 @@ class Somebody:
 
 
 class SimulatedRobot:
-    """A robot in its own copy of a world, with the trace of what it has done."""
+    """A robot in its own copy of a world, with its trace."""
+
+    is_copied = True  # in the child of a batch; subclasses are not, unless they say so
 
     def __init__(
         self,
         world: World,
-        rules: SimulationSettings = PAPER,
+        settings: SimulationSettings = PAPER_SETTINGS,
         skills: SkillTable = SKILLS,
         *,
         guard: SkillGuard | None = None,
     ) -> None:
         self.guard = guard
-        self.world, self.rules, self.skills = world, rules, skills
-        self.setup: Setup = ("simulated", (world, rules))
+        self.world, self.settings, self.skills = world, settings, skills
+        self.setup: Setup = ("simulated", (world, settings))
         missing = () if skills is SKILLS else [name for name, row in skills.items() if row.does is None]
         if missing:
             raise UserError(f'the skill "{missing[0]}" cannot be simulated: nothing says what it does')
@@ -114,10 +116,8 @@ class SimulatedRobot:
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
         self.line: int | None = None
-        self._at_work: Skill | None = None  # one of a user's own
+        self._own_skill: Skill | None = None  # of the user, during its call
         self.events: list[Event] = []
-
-    # Made when they are first needed: whose run is remembered needs neither.
 
     @cached_property
     def things(self) -> dict[str, list[Thing]]:
@@ -126,7 +126,7 @@ class SimulatedRobot:
 
     @cached_property
     def people(self) -> dict[str, list[Somebody]]:
-        """The people in each room, also those who have yet to come."""
+        """The people in each room, including those who will come later."""
         return {room.name: [Somebody(person) for person in room.people] for room in self.world.rooms}
 
     @property
@@ -136,88 +136,87 @@ class SimulatedRobot:
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The skills that a copy made from `setup` would not have: they were declared elsewhere."""
-        return own_skills(self, SimulatedRobot)
+        """The skills declared elsewhere, which a copy made from `setup` would lack."""
+        if "is_copied" not in vars(type(self)):
+            return tuple(self.skills)
+        if self.skills is SKILLS:
+            return ()
+        return tuple(name for name, row in self.skills.items() if row.does is not _USUAL.get(name))
 
     @property
     def idle_skills(self) -> frozenset[str]:
-        """The skills that leave the robot and its world as they are, however often they are executed."""
+        """The skills that change neither the robot nor its world."""
         someone_may_come = any(one.looks_before for here in self.people.values() for one in here)
         return self.skills.idle - {"is_in_room"} if someone_may_come else self.skills.idle
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill; a question is answered by the position of the chosen option."""
+        """Execute one skill if the guard allows it; a question returns the position of an option."""
         if self.guard is not None:
             return self.guard.perform(self, skill, arguments)
         return self.execute(skill, arguments)
 
-    def meant_rooms(self, request: str) -> Sequence[str]:
-        """All rooms that a request may mean: only those where it leads, if it is the name of one."""
+    def possible_rooms(self, request: str) -> Sequence[str]:
+        """All rooms that a request may mean; for an exact name, only those where it leads."""
         wanted = request.strip().lower()
         named = [room for room in self.rooms if room.lower() == wanted]
         if named:
-            leads_to = resolve_room(self.rooms, request, self.rules.matching)
+            leads_to = resolve_room(self.rooms, request, self.settings.matching)
             return [*named, *([] if leads_to is None else [leads_to])]
-        return [room for room in self.rooms if finds(request, room, self.rules.matching)]
+        return [room for room in self.rooms if finds(request, room, self.settings.matching)]
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """The same, whatever rules say."""
+        """Execute one skill without asking the guard."""
         row = self.skills[skill]
         assert row.does is not None, "the robot was made with it"
         if row.adds_event or row.fails:
             return self._own(row, arguments)
         result: Result = row.does(self, *arguments)
         if isinstance(result, bool) and self.events and self.events[-1].found is None:
-            self._add_result(skill, found=result)
+            recording, last = row.recording, self.events[-1]
+            if recording is not None and last.kind == recording.kind:
+                self.events[-1] = replace(last, found=result)
         return result
 
-    def _add_result(self, skill: str, *, found: bool) -> None:
-        """Add to the event of a skill what it returned, where its behaviour has not done so."""
-        recording, last = self.skills[skill].recording, self.events[-1]
-        if recording is not None and last.kind == recording.kind:
-            self.events[-1] = replace(last, found=found)
-
-    # --- what skills do
+    # --- effects of skills
 
     def drive(self, location: str) -> None:
-        """Drive to the first room whose name is found in the request."""
+        """Drive to the first room whose name is in the request."""
         room = self.room_for(location)
-        if self.rules.events == "as-requested":
+        if self.settings.events == "as-requested":
             self.record(GOTO, location, destination=room)
         elif room is not None:
             self.record(GOTO, room, destination=room)
         if room is None:
-            raise no_room(location)
+            raise unknown_room(location)
         self.room = room
 
     def room_for(self, request: str) -> str | None:
-        """The first room whose name is found in a request; None if there is no such room."""
-        return resolve_room(self.rooms, request, self.rules.matching)
+        """The first room whose name is in a request; None if there is none."""
+        return resolve_room(self.rooms, request, self.settings.matching)
 
     def look(self, entity: str) -> bool:
-        """Look for an object, else for a person; who was not there may come after looks in vain."""
-        rules, here = self.rules, self.people[self.room]
-        seen = any(thing.is_meant_by(entity, rules.matching) for thing in self.things[self.room])
-        seen = seen or any(one.is_here and is_called(one.person, entity, rules) for one in here)
+        """Look for an object, else for a person; an absent person may come after some looks in vain."""
+        settings, people = self.settings, self.people[self.room]
+        seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things[self.room])
+        seen = seen or any(one.is_here and is_called(one.person, entity, settings) for one in people)
         self.record(CHECK, entity, found=seen)
-        if not any(one.is_here for one in here) and (
-            coming := next((o for o in here if not o.is_gone), None)
-        ):
+        coming = next((one for one in people if not one.is_gone), None)
+        if coming is not None and not any(one.is_here for one in people):
             coming.looks_before -= 1
         return seen
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask the first person here who is meant, and return the position of the option they choose."""
+        """Ask the first matching person here, and return the position of the option that they choose."""
         person, options = as_text(person), options_of(options)
         self.record(ASK, question, options, to=person)
         if not options:
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
         here = (one for one in self.people[self.room] if one.is_here)
-        asked = next((one for one in here if is_called(one.person, person, self.rules)), None)
+        asked = next((one for one in here if is_called(one.person, person, self.settings)), None)
         if asked is None:
             raise RobotError("AskNoPerson", f'nobody is in "{self.room}" to be asked "{question}"')
-        answer = asked.answer(question, self.rules)
-        chosen = None if answer is None else choose(answer, question, options, self.rules)
+        answer = asked.answer(question, self.settings)
+        chosen = None if answer is None else choose(answer, question, options, self.settings)
         if chosen is None:
             offered = ", ".join(option.text for option in options)
             raise RobotError(
@@ -227,26 +226,23 @@ class SimulatedRobot:
         return chosen
 
     def take(self, obj: str) -> None:
-        """Take the first object here that the request finds."""
+        """Take the first matching object here."""
         if self.held is not None:
             raise RobotError(
                 "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
             )
         here = self.things[self.room]
-        thing = next((thing for thing in here if thing.is_meant_by(obj, self.rules.matching)), None)
+        thing = next((thing for thing in here if thing.is_meant_by(obj, self.settings.matching)), None)
         if thing is None:
             raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
-        self.record(PICK, obj if self.rules.events == "as-requested" else thing.label)
+        self.record(PICK, obj if self.settings.events == "as-requested" else thing.label)
         here.remove(thing)
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down what the robot holds, which must be named as it was picked up.
-
-        Where events are recorded as they happened, any name that finds what it holds will do.
-        """
-        taken = self.taken if self.rules.events == "as-happened" else None
-        is_meant = taken is not None and taken.is_meant_by(obj, self.rules.matching)
+        """Put down the held object, named as in the pick; as-happened events allow any matching name."""
+        taken = self.taken if self.settings.events == "as-happened" else None
+        is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
             holds = "nothing" if self.held is None else f'"{self.held}"'
             raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
@@ -254,24 +250,24 @@ class SimulatedRobot:
         self.things[self.room].append(taken or Thing(obj, is_pattern=False))
         self.held = self.taken = None
 
-    # --- skills of a user's own
+    # --- skills of the user
 
     @cached_property
     def state(self) -> dict[str, Any]:
-        """What skills remember from one call to the next."""
+        """The memory of skills between their calls."""
         return {}
 
     def truth(self, statement: str) -> bool:
         """Whether a statement is true in this world."""
         known = dict(self.world.truths).get(statement)
         if known is None:
-            return self.lot(f'"{statement}"', ("is true", "is not true")) == 0
+            return self.draw_outcome(f'"{statement}"', ("is true", "is not true")) == 0
         if not isinstance(known, bool):
             raise UserError(f'the world says that "{statement}" is {known!r}; write true or false')
         return known
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of the skill's type
-        """What comes of a skill of which nobody says what it does: a result of its type, or its error."""
+        """The result of a skill without code for simulation: a random one of its type, or its error."""
         row, call = self.skills[skill], written_call(skill, plain(arguments))
         known, kinds = dict(self.world.truths).get(call), [kind for kind, _ in row.fails]
         if known in kinds:
@@ -287,14 +283,14 @@ class SimulatedRobot:
         if len(results) == 1 and not row.fails:
             return results[0]
         words = [f"gives {result!r}" if result is not None else "works" for result in results]
-        number = self.lot(call, words, [f"fails: {when}" for _, when in row.fails])
+        number = self.draw_outcome(call, words, [f"fails: {when}" for _, when in row.fails])
         if number >= len(results):
             self.fail(kinds[number - len(results)])
         return results[number]
 
     def fail(self, kind: str) -> NoReturn:
         """End a skill with an error that it declares."""
-        row = self._at_work
+        row = self._own_skill
         declared = {} if row is None else dict(row.fails)
         if row is not None and kind in declared:
             raise RobotError(kind, f"{row.name}: {declared[kind]}")
@@ -307,17 +303,17 @@ class SimulatedRobot:
             raise UserError(sentence)
         row.wrong(sentence)
 
-    def lot(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Draw which of some outcomes a statement has in this world: the same one each time."""
-        return self._lots.draw(len(outcomes), statement)
+    def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
+        """Draw one of the outcomes of a statement: in one world, the same one each time."""
+        return self._sampler.draw(len(outcomes), statement)
 
     @cached_property
-    def _lots(self) -> FactSampler:
+    def _sampler(self) -> FactSampler:
         world = json.dumps(self.world.to_data(), sort_keys=True)
         return FactSampler(int.from_bytes(blake2b(world.encode(), digest_size=8).digest(), "big"))
 
     def _own(self, row: Skill, arguments: Sequence[Argument]) -> Result:
-        """Execute a skill that adds no event by itself, and add it."""
+        """Execute a skill of the user, and add its event."""
         event, at = None, len(self.events)
         if row.adds_event:
             event = attempted(row, arguments, place=self.room, time=self.now, holding=self.held or "")
@@ -325,8 +321,8 @@ class SimulatedRobot:
         if event is not None and is_tried:
             self.events.append(event)
         if event is not None and row.is_drive and self.room_for(event.text) is None:
-            raise no_room(event.text)
-        self._at_work = row
+            raise unknown_room(event.text)
+        self._own_skill = row
         result: Result = called(row, self, arguments)
         if event is not None:
             if not is_tried:
@@ -358,7 +354,7 @@ class SimulatedRobot:
         to: str | None = None,
         destination: str | None = None,
     ) -> None:
-        """Add an event that happens here and now; the text loses the spaces at its ends."""
+        """Add an event here and now; its text is stripped."""
         given = text.strip(), options_of(options), None, found
         event = Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
         if self.guard is not None:
@@ -366,30 +362,17 @@ class SimulatedRobot:
         self.events.append(event)
 
     def repeat(self, events: Sequence[Event]) -> None:
-        """Add events that happened here before, and happen again now."""
-        for event in events:
-            seen = event.kind, event.text, event.options, event.answer, event.found
-            self.events.append(Event(*seen, self.room, self.now, event.holding, event.to))
+        """Add copies of earlier events in this room."""
+        self.events += [replace(event, time=self.now) for event in events]
 
     def amend(self, answer: str) -> None:
-        """Add to the last event what was answered."""
-        last = self.events[-1]
-        asked = last.kind, last.text, last.options, answer, last.found
-        self.events[-1] = Event(*asked, last.place, last.time, last.holding, last.to)
-
-
-def own_skills(robot: SimulatedRobot, kind: type[SimulatedRobot]) -> tuple[str, ...]:
-    """The skills of a robot that those of its kind do not have, or have in another way."""
-    if type(robot) is not kind:
-        return tuple(robot.skills)
-    if robot.skills is SKILLS:
-        return ()
-    return tuple(name for name, row in robot.skills.items() if row.does is not _USUAL.get(name))
+        """Add an answer to the last event."""
+        self.events[-1] = replace(self.events[-1], answer=answer)
 
 
 _USUAL = {name: row.does for name, row in SKILLS.items()}
 
 
-def no_room(location: str) -> RobotError:
-    """The error of a drive to what is no room."""
+def unknown_room(location: str) -> RobotError:
+    """The error of a drive to no known room."""
     return RobotError("GoToInvalidLocation", f'there is no room "{location}"')

@@ -13,10 +13,10 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, attempted
 from codebotler.core.world import Point, Room, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
-from codebotler.simulator.house_rule import NO_TEXT, Objection, Rule, RuleViolationError
+from codebotler.simulator.house_rule import NON_TEXT_OPTION, Objection, Rule, RuleViolationError
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot, Thing
 
-MOVES = {PICK, PLACE}  # kinds of events
+KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
@@ -27,20 +27,12 @@ def name_of(label: str, request: str) -> str:
 
 @dataclass
 class _History:
-    """What has happened, in the one way in which rules see it.
-
-    Args:
-        monitors: one for each rule.
-        names: by which rules compare rooms, once the robot has driven there.
-        unjudged: the names of rules that could not be judged.
-        inside: the rooms that hold the robot's pose.
-        holding: what the robot holds, by the name that rules compare.
-    """
+    """The events so far, by the names that rules compare."""
 
     monitors: Sequence[tuple[Rule, Monitor]]
-    names: dict[str, str] = field(default_factory=dict)
-    unjudged: set[str] = field(default_factory=set)
-    inside: Sequence[str] = ()
+    names: dict[str, str] = field(default_factory=dict)  # of rooms where the robot has been
+    unjudged: set[str] = field(default_factory=set)  # names of rules
+    inside: Sequence[str] = ()  # rooms that hold the robot's pose
     holding: str = ""
 
     def copy(self) -> _History:
@@ -48,179 +40,120 @@ class _History:
         monitors = [(rule, copy(monitor)) for rule, monitor in self.monitors]
         return replace(self, monitors=monitors, names=dict(self.names), unjudged=set(self.unjudged))
 
-    def named(self, event: Event, request: str, thing: Thing | None = None) -> Event:
-        """Return an event with the names that rules compare.
 
-        Args:
-            event: what the robot recorded.
-            request: the words for where it drove.
-            thing: what it picked up or put down, if known.
+class RuleGuard:
+    """Judges each action of one robot by house rules before it happens, by the history of earlier events.
+
+    Args:
+        rules: the rules in force.
+        rooms: the known rooms with their footprints.
+    """
+
+    def __init__(self, rules: Sequence[Rule], rooms: Sequence[Room] = ()) -> None:
+        self.rules, self._rooms = tuple(rules), rooms
+        self._stops = {room.name: room.stand_at for room in rooms}
+        self.may_refuse = any(rule.refuse and rule.when == "always" for rule in rules)
+        self.judges_poses = any(rule.inside for rule in rules)
+        self._history = _History([(rule, Monitor(rule.formula)) for rule in rules])
+
+        # The current call of a skill.
+        self._is_own = False  # a user's own skill, whose events count on trial until it ends
+        self._start = self._seen = 0  # number of events before the call, and of those already on trial
+        self._held: Thing | None = None  # before the call
+        self._prevented: RuleViolationError | None = None  # which the skill may have caught
+
+    def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
+        row, start = robot.skills[skill], len(robot.events)
+        holding = "" if robot.held is None else self._history.holding or robot.held
+        place = self._history.names.get(robot.room, robot.room)
+        attempt = attempted(row, arguments, place=place, time=robot.now, holding=holding)
+        if attempt is not None:
+            self.judge(*_attempts(robot, attempt, arguments, is_drive=row.is_drive))
+        self._is_own = SKILLS.get(skill) is not row
+        self._start, self._seen, self._held, self._prevented = start, start, robot.taken, None
+        request = None if self._is_own or attempt is None else attempt.text
+        try:
+            result = self._execute(robot, skill, arguments)
+        except RobotError:
+            is_tried = row.recording is not None and row.recording.when_tried
+            tried = [attempt] if attempt is not None and is_tried else []
+            self._take(robot, robot.events[start:] or tried, request)
+            if self._prevented is not None:
+                raise self._prevented from None
+            raise
+        self._take(robot, robot.events[start:], request)
+        if self._prevented is not None:
+            raise self._prevented
+        return result
+
+    def _execute(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+        history = self._history
+        if self._is_own:
+            self._history = history.copy()
+        try:
+            return robot.execute(skill, arguments)
+        finally:
+            self._history = history
+
+    def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
+        """RuleViolationError if a rule would be broken by what a user's own skill is about to do inside.
+
+        Events inside count on trial: the result of the skill itself, whose event may come first, is not
+        known before the call ends.
         """
-        text, place = event.text, self.names.get(event.place, event.place)
-        holding = (self.holding or event.holding) if event.holding else ""
-        if event.destination is not None:
-            text = name_of(event.destination, request)
-        elif thing is not None and event.kind in MOVES:
-            text = name_of(thing.label, text)
-        if (text, place, holding) == (event.text, event.place, event.holding):
-            return event
-        return replace(event, text=text, place=place, holding=holding)
+        if not self._is_own:
+            return
+        earlier, self._seen = robot.events[self._seen :], len(robot.events)
+        try:
+            self._take(robot, earlier)
+            named = self._named(event, event.text)
+            self.judge(*_attempts(robot, named, (), is_drive=named.kind == GOTO))
+        except RuleViolationError as broken:
+            self._prevented = self._prevented or broken
+            raise
 
-    def judge(self, attempts: Iterable[Event]) -> None:
+    def judge(self, *attempts: Event) -> None:
         """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
         caught: RuleViolationError | None = None
         attempts = tuple(map(_trimmed, attempts))
-        for rule, monitor in self.monitors:
+        for rule, monitor in self._history.monitors:
             for attempt in attempts if rule.when == "always" else ():
-                objection = _objection(rule, monitor, attempt)
-                if objection is not None:
-                    why = NO_TEXT if objection == "cannot judge" else ""
-                    broken = RuleViolationError(rule, attempt, objection, why)
-                    if broken.ends_run:
-                        raise broken
-                    caught = caught or broken  # another rule may end the run
+                broken = _violation(rule, monitor, attempt)
+                if broken is not None and broken.ends_run:
+                    raise broken
+                caught = caught or broken  # another rule may end the run
         if caught is not None:
             raise caught
 
-    def feed(self, event: Event) -> None:
-        """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
+    def happened(self, event: Event) -> None:
+        """Add an event to the history; RuleViolationError if its result, unknown before, broke a rule."""
         if event.destination is not None:
-            self.names[event.destination] = event.text
-        elif event.kind in MOVES:
-            self.holding = event.text if event.kind == PICK else ""
+            self._history.names[event.destination] = event.text
+        elif event.kind in KINDS_OF_MOVES:
+            self._history.holding = event.text if event.kind == PICK else ""
         late: RuleViolationError | None = None
         event = _trimmed(event)
-        for rule, monitor in self.monitors:
+        for rule, monitor in self._history.monitors:
             if event.kind == INSIDE and not rule.inside:  # other rules must not see it as the last event
                 continue
             try:
                 holds = monitor.feed(event)
             except Inconclusive:
-                self.unjudged.add(rule.name)
+                self._history.unjudged.add(rule.name)
                 holds = False
             if not holds and rule.when == "always" and late is None:
                 late = RuleViolationError(rule, event, "is broken by")
         if late is not None:
             raise late
 
-    def enter(self, way: Iterable[Sequence[str]], holding: str) -> None:
-        """Take each room that a way enters; RuleViolationError if that broke a rule."""
-        for here in way:
-            before, self.inside = self.inside, here
-            for room in here:
-                if room not in before:
-                    self.feed(Event(INSIDE, room, place=room, holding=holding))
-
-    def at_end(self) -> RuleViolationError | None:
-        """Return the first rule that is not kept if the mission ends now."""
-        for rule, monitor in self.monitors:
-            if rule.when == "finally" and (rule.name in self.unjudged or not monitor.holds):
-                return RuleViolationError(rule, None)
-        return None
-
-
-class RuleGuard:
-    """Judges by rules all that one robot is to do, before it does it.
-
-    Args:
-        rules: the rules in force.
-        rooms: the rooms with their footprints, as far as they are known.
-    """
-
-    def __init__(self, rules: Sequence[Rule], rooms: Sequence[Room] = ()) -> None:
-        self.rules, self._rooms = tuple(rules), rooms
-        self._stops = {room.name: room.stand_at for room in rooms}
-        self._history = _History([(rule, Monitor(rule.formula)) for rule in rules])
-        self._trial: _History | None = None  # during a call of a user's own skill
-        self._start = self._seen = 0  # events before the call, and before what the trial has not seen
-        self._held: Thing | None = None  # before the call
-        self._prevented: list[RuleViolationError] = []  # within the call
-        self.may_refuse = any(rule.refuse and rule.when == "always" for rule in rules)
-        self.judges_poses = any(rule.inside for rule in rules)
-
-    def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
-        row, start, history = robot.skills[skill], len(robot.events), self._history
-        holding = "" if robot.held is None else history.holding or robot.held
-        place = history.names.get(robot.room, robot.room)
-        attempt = attempted(row, arguments, place=place, time=robot.now, holding=holding)
-        if attempt is not None:
-            self.judge(*_attempts(robot, attempt, arguments, is_drive=row.is_drive))
-        is_own = SKILLS.get(skill) is not row
-        self._trial = history.copy() if is_own else None
-        self._start = self._seen = start
-        self._held = robot.taken
-        self._prevented.clear()
-        request = None if is_own or attempt is None else attempt.text
-        try:
-            result = robot.execute(skill, arguments)
-        except RobotError:
-            is_tried = row.recording is not None and row.recording.when_tried
-            tried = [attempt] if attempt is not None and is_tried else []
-            self._take(robot, robot.events[start:] or tried, history, request)
-            if self._prevented:
-                raise self._prevented[0] from None
-            raise
-        self._take(robot, robot.events[start:], history, request)
-        if self._prevented:  # the function of the skill has caught it
-            raise self._prevented[0]
-        return result
-
-    def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """RuleViolationError if a rule would be broken by what a user's own skill is about to do inside.
-
-        What happens inside counts on trial: the result of the skill itself, which may come first, is not
-        known before the call ends.
-        """
-        trial = self._trial
-        if trial is None:
-            return
-        earlier, self._seen = robot.events[self._seen :], len(robot.events)
-        try:
-            self._take(robot, earlier, trial)
-            named = trial.named(event, event.text)
-            trial.judge(_attempts(robot, named, (), is_drive=named.kind == GOTO))
-        except RuleViolationError as broken:
-            self._prevented.append(broken)
-            raise
-
-    def _take(
-        self,
-        robot: SimulatedRobot,
-        events: Sequence[Event],
-        history: _History,
-        request: str | None = None,
-    ) -> None:
-        """Add events of a call to a history; `request` is where it drives, if events may not tell."""
-        kinds = [event.kind for event in robot.events[self._start :]]
-        thing = self._held or robot.taken if sum(kind in MOVES for kind in kinds) == 1 else None
-        for event in events:
-            named = history.named(event, event.text if request is None else request, thing)
-            is_leg = event.kind == GOTO or GOTO not in kinds
-            if event.destination is not None and is_leg and self.judges_poses:
-                history.enter(self._way(event.place, event.destination), named.holding)
-            history.feed(named)
-
-    def _way(self, start: str, end: str) -> Iterable[Sequence[str]]:
-        """Return the rooms that hold each part of a simulated drive; only its ends without a map."""
-        one, other = self._stops.get(start), self._stops.get(end)
-        return [(start,), (end,)] if one is None or other is None else rooms_along(self._rooms, one, other)
-
     def moved(self, start: Point, end: Point, holding: str) -> None:
-        """Take a straight way that the robot's pose has gone; RuleViolationError if that broke a rule."""
+        """Add a straight drive between two poses to the history; RuleViolationError if it broke a rule."""
         if self.judges_poses:
-            self._history.enter(rooms_along(self._rooms, start, end), holding)
-
-    def judge(self, *attempts: Event) -> None:
-        """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
-        self._history.judge(attempts)
-
-    def happened(self, event: Event) -> None:
-        """Take what has happened; RuleViolationError if that broke a rule, which nobody could foresee."""
-        self._history.feed(event)
+            self._enter(rooms_along(self._rooms, start, end), holding)
 
     def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
-        """Take that some rules cannot be judged any more; RuleViolationError if one is not of the end."""
+        """Stop judging some rules; RuleViolationError if one of them must always hold."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":
@@ -228,7 +161,44 @@ class RuleGuard:
 
     def at_end(self) -> RuleViolationError | None:
         """Return the first rule that is not kept if the mission ends now."""
-        return self._history.at_end()
+        for rule, monitor in self._history.monitors:
+            if rule.when == "finally" and (rule.name in self._history.unjudged or not monitor.holds):
+                return RuleViolationError(rule, None)
+        return None
+
+    def _take(self, robot: SimulatedRobot, events: Sequence[Event], request: str | None = None) -> None:
+        """Add events of the current call to the history; `request` is where a drive of the package goes."""
+        kinds = [event.kind for event in robot.events[self._start :]]
+        is_one_move = sum(kind in KINDS_OF_MOVES for kind in kinds) == 1
+        thing = self._held or robot.taken if is_one_move else None
+        for event in events:
+            named = self._named(event, event.text if request is None else request, thing)
+            is_leg = event.kind == GOTO or GOTO not in kinds
+            if event.destination is not None and is_leg and self.judges_poses:
+                self._enter(self._way(event.place, event.destination), named.holding)
+            self.happened(named)
+
+    def _named(self, event: Event, request: str, thing: Thing | None = None) -> Event:
+        """Return an event of the robot with the names that rules compare."""
+        text, place = event.text, self._history.names.get(event.place, event.place)
+        holding = (self._history.holding or event.holding) if event.holding else ""
+        if event.destination is not None:
+            text = name_of(event.destination, request)
+        elif thing is not None and event.kind in KINDS_OF_MOVES:
+            text = name_of(thing.label, text)
+        return replace(event, text=text, place=place, holding=holding)
+
+    def _enter(self, way: Iterable[Sequence[str]], holding: str) -> None:
+        for here in way:
+            before, self._history.inside = self._history.inside, here
+            for room in here:
+                if room not in before:
+                    self.happened(Event(INSIDE, room, place=room, holding=holding))
+
+    def _way(self, start: str, end: str) -> Iterable[Sequence[str]]:
+        """Return the rooms that hold each part of a simulated drive; only its ends without a map."""
+        one, other = self._stops.get(start), self._stops.get(end)
+        return [(start,), (end,)] if one is None or other is None else rooms_along(self._rooms, one, other)
 
 
 def _trimmed(event: Event) -> Event:
@@ -240,8 +210,8 @@ def _trimmed(event: Event) -> Event:
     return replace(event, options=options, answer=answer, to=to)
 
 
-def _objection(rule: Rule, monitor: Monitor, attempt: Event) -> Objection | None:
-    """Return what a rule has against an event, whatever its result will be."""
+def _violation(rule: Rule, monitor: Monitor, attempt: Event) -> RuleViolationError | None:
+    """Return the error if a rule does not allow an event with any result."""
     is_unclear = False
     for event in rule.results(attempt):
         try:
@@ -249,7 +219,9 @@ def _objection(rule: Rule, monitor: Monitor, attempt: Event) -> Objection | None
                 return None
         except Inconclusive:
             is_unclear = True
-    return "cannot judge" if is_unclear else "forbids"
+    if is_unclear:
+        return RuleViolationError(rule, attempt, "cannot judge", NON_TEXT_OPTION)
+    return RuleViolationError(rule, attempt)
 
 
 def _attempts(
@@ -257,22 +229,22 @@ def _attempts(
 ) -> Iterator[Event]:
     """Yield an attempt, and the same with the names of the rooms or things that it may mean."""
     yield attempt
-    meant: list[str] = []
+    names: list[str] = []
     for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
         if is_drive:
-            meant += [name_of(room, request) for room in robot.meant_rooms(request)]
+            names += [name_of(room, request) for room in robot.possible_rooms(request)]
         else:
-            meant += _moved(robot, attempt.kind, request)
-    for name in dict.fromkeys(meant):
+            names += _names_of_thing(robot, attempt.kind, request)
+    for name in dict.fromkeys(names):
         if name != attempt.text:
             yield replace(attempt, text=name)
 
 
-def _moved(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
-    """Return by which name the thing is recorded that would be picked up or put down."""
+def _names_of_thing(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
+    """Return the name by which the thing is recorded that would be picked up or put down, if any."""
     things = [robot.taken] if kind == PLACE and robot.taken is not None else []
     if kind == PICK:
         here = robot.things[robot.room]
-        things = [thing for thing in here if thing.is_meant_by(request, robot.rules.matching)][:1]
-    as_happened = robot.rules.events == "as-happened"
+        things = [thing for thing in here if thing.is_meant_by(request, robot.settings.matching)][:1]
+    as_happened = robot.settings.events == "as-happened"
     return [thing.label if as_happened else name_of(thing.label, request) for thing in things]

@@ -1,4 +1,4 @@
-"""How programs are simulated, as a suite chooses it, and what requests mean by it."""
+"""How programs are simulated, which a suite chooses, and how requests are understood."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ Matching: TypeAlias = Literal["label-in-request", "whole-words"]
 
 @dataclass(frozen=True)
 class Limits:
-    """What one run may spend before it ends with status `timeout`."""
+    """The resources of one run; beyond them it ends with status `timeout`."""
 
     seconds: float = 3600.0  # simulated
-    calls: int = 1_000  # of skills; sleeping is none
+    calls: int = 1_000  # of skills; sleeping does not count
     ticks: int = 200_000  # fuel: turns of loops and entries of functions
     text: int = 10_000  # characters of one text that a skill is given
     trace: int = 1_000_000  # characters of all texts of a trace
@@ -43,25 +43,25 @@ class SimulationSettings:
     # Everybody answers to any name, or each to their own, to a word for people, and to no name at all.
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
     words_for_people: tuple[str, ...] = ()  # regexes
-    # Regexes of what else an option may say that means yes or no. An option in which a no is found is never a
-    # yes, and people who answer yes choose a single option that says neither.
+    # Regexes for further words for yes and no in options. An option with a word for no is never a yes. People
+    # who answer yes choose an option that says neither if there is just one.
     words_for_yes: tuple[str, ...] = ()
     words_for_no: tuple[str, ...] = ()
-    # Drives, picks and places are recorded in the words of the request, or by the room that was reached and
-    # the thing that was moved; a drive that reaches no room is then no event.
+    # Drives, picks and places are recorded in the words of the request, or by the names of the room and the
+    # thing; a drive to no room is then no event.
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)
-    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # what clocks show when the run starts
+    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # time on the clocks when the run starts
 
 
-PAPER = SimulationSettings()
+PAPER_SETTINGS = SimulationSettings()
 ENDLESS = Limits(calls=10**12, trace=10**12)  # on a robot, where each skill refuels the program
 
 
-# --- what requests mean by them
+# --- how requests are understood
 
 
-def found_in(label: str, request: str) -> bool:
+def is_in_request(label: str, request: str) -> bool:
     """Whether a label of the world, a regex, is found in a request of the program."""
     return _pattern(label).search(request) is not None
 
@@ -69,12 +69,12 @@ def found_in(label: str, request: str) -> bool:
 def finds(request: str, label: str, matching: Matching) -> bool:
     """Whether a request of the program finds a label of the world, a regex, or is that label."""
     pattern = label if matching == "label-in-request" else whole_words(label)
-    return found_in(pattern, request) or request.lower() == label.lower()
+    return is_in_request(pattern, request) or request.lower() == label.lower()
 
 
 @lru_cache(maxsize=4096)
 def whole_words(label: str) -> str:
-    """A regex that finds another one as whole words, in the singular or the plural."""
+    """A regex for the matches of another one as whole words, in the singular or the plural."""
     return rf"(?<!\w)(?:{_anchored(scope_flags(label))})(?:e?s)?(?!\w)"
 
 
@@ -87,60 +87,60 @@ _ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
 
 
 def _anchored(label: str) -> str:
-    """A label whose choices that begin with `.*` are tried at the start only, which takes linear time.
+    """A label that tries alternatives with a leading `.*` at the start only, which takes linear time.
 
-    The same is found: such a choice that is found anywhere is found from the start.
+    It matches the same requests, since such an alternative that matches anywhere matches from the start.
     """
     return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
 
 
-def is_called(person: Person, request: str, rules: SimulationSettings) -> bool:
+def is_called(person: Person, request: str, settings: SimulationSettings) -> bool:
     """Whether a request means a person: by no name, their own, or a word for people."""
-    if rules.people == "answer-to-any-name" or not request.strip():
+    if settings.people == "answer-to-any-name" or not request.strip():
         return True
-    return any(finds(request, name, rules.matching) for name in (person.name, *rules.words_for_people))
+    return any(finds(request, name, settings.matching) for name in (person.name, *settings.words_for_people))
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """The first room whose name is found in a request; by whole words, one of just that name before it."""
-    return _resolved(tuple(rooms), request, matching)
+    """The first room whose name is in a request; with whole words, preferably one of exactly that name."""
+    return _resolve_room(tuple(rooms), request, matching)
 
 
 @lru_cache(maxsize=65_536)
-def _resolved(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
+def _resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
     if matching == "whole-words" and request in rooms:
         return request
     return next((room for room in rooms if finds(request, room, matching)), None)
 
 
 def choose(
-    answer: Answer, question: str, options: tuple[Option, ...], rules: SimulationSettings = PAPER
+    answer: Answer, question: str, options: tuple[Option, ...], settings: SimulationSettings = PAPER_SETTINGS
 ) -> int | None:
     """The position of the option that an answer means.
 
-    The answer is looked for in the options. Failing that, a yes or a no is looked for in other words, if the
-    rules have any; and any other answer is a yes or a no to the question. An answer that is a number means
-    the nearest option that there is, counted from 1, or from the end if it is negative.
+    The answer is looked for in the options. Failing that, a yes or a no is looked for in the further words of
+    the settings; any other answer is a yes or a no to the question. A number means the nearest option,
+    counted from 1, or from the end if it is negative.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
-    direct = _first_saying((answer,), options, rules.matching)
+    direct = _first_saying((answer,), options, settings.matching)
     if direct is not None:
         return direct
-    if answer in {"yes", "no"} and rules.words_for_no:
-        return _in_other_words(answer, options, rules)
-    means = "yes" if finds(question, answer, rules.matching) else "no"
-    found = _first_saying((means,), options, rules.matching)
-    return _in_other_words(means, options, rules) if found is None and rules.words_for_no else found
+    if answer in {"yes", "no"} and settings.words_for_no:
+        return _in_other_words(answer, options, settings)
+    means = "yes" if finds(question, answer, settings.matching) else "no"
+    direct = _first_saying((means,), options, settings.matching)
+    return _in_other_words(means, options, settings) if direct is None and settings.words_for_no else direct
 
 
-def _in_other_words(answer: str, options: tuple[Option, ...], rules: SimulationSettings) -> int | None:
-    """Which option means yes or no; the only one that does not mean no means yes, whatever it says."""
+def _in_other_words(answer: str, options: tuple[Option, ...], settings: SimulationSettings) -> int | None:
+    """The option that means yes or no; a single option that does not mean no means yes."""
     if answer == "no":
-        return _first_saying(rules.words_for_no, options, rules.matching)
-    no = ("no", *rules.words_for_no)
-    may_be = [n for n, option in enumerate(options) if not _says(option.text, no, rules.matching)]
-    meant = [n for n in may_be if _says(options[n].text, rules.words_for_yes, rules.matching)]
+        return _first_saying(settings.words_for_no, options, settings.matching)
+    no = ("no", *settings.words_for_no)
+    may_be = [n for n, option in enumerate(options) if not _says(option.text, no, settings.matching)]
+    meant = [n for n in may_be if _says(options[n].text, settings.words_for_yes, settings.matching)]
     return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
 
 

@@ -1,4 +1,4 @@
-"""Serves the skill calls of one program's child, and finds out how the run ended."""
+"""Serves the skill calls of one program's child, and determines how the run ended."""
 
 from __future__ import annotations
 
@@ -10,30 +10,32 @@ from typing import TypeAlias
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.ledger import LAST_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
+from codebotler.simulator.ledger import MAX_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
-Taken: TypeAlias = tuple[str, str, tuple[Scalar, ...], str]  # name, kind, choices if any, and words
-Description: TypeAlias = tuple[tuple[str, tuple[Taken, ...]], ...]
-OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
+ParameterDescription: TypeAlias = tuple[
+    str, str, tuple[Scalar, ...], str
+]  # name, kind, choices if any, and words
+SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
+OVERRUN = 100  # requests beyond a limit, such as from `finally`, before the child is killed
 
 
 class SkillProtocol:
-    """One run: answers what a fresh child asks until it ends, and says how it ended."""
+    """One run: answers the requests of a fresh child until it ends."""
 
     def __init__(self, child: IsolatedProcess, code: bytes, robot: SkillPerformer) -> None:
-        self.child, self.robot, self.limits = child, robot, robot.rules.limits
+        self.child, self.robot, self.limits = child, robot, robot.settings.limits
         self.ledger = Ledger(robot)
         self._heard = False
         self._skills = {skill.name: skill for skill in robot.skills.rows}
-        child.send((code, described(robot), settings_of(robot)))
+        child.send((code, describe_skills(robot), run_parameters(robot)))
 
     def outcome(self) -> Outcome:
-        """Answer to the end, and say how the run ended."""
+        """Answer all requests, and return the outcome."""
         try:
             final = self.talk()
         except TimeoutError:
@@ -45,17 +47,17 @@ class SkillProtocol:
                 Status.KILLED, "Crash", f"the program wrote to the sandbox channel: {error}"
             )
         except BaseException:
-            with suppress(LostProcessError):  # which would hide what the robot says
+            with suppress(LostProcessError):  # which would hide the first error
                 self.child.end()
             raise
         if final is None and self.ledger.limit is None:
-            return self._died(self.child.ended())
+            return self._died(self.child.end_gently())
         self.child.kill()
         self.child.hang_up()
-        return self.ledger.ended(final or {})
+        return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer what the child asks until it says how it ended; None if it does not say so."""
+        """Answer requests, and return the child's last message, which says how it ended, if any."""
         overrun = 0
         while (message := self.child.receive()) is not None:
             self._heard = True
@@ -65,11 +67,11 @@ class SkillProtocol:
                 case [str() as name, list() as values, int() | float() as now]:
                     line = 0
                 case [str() as name, list() as values, int() | float() as now, int() as line]:
-                    pass  # a live program says where it is, and may lie: it is only shown
+                    pass  # from a live program; it may be a lie, and is only shown
                 case _:
                     raise ProtocolError("a request is malformed")
             if self.robot.is_live:
-                self.robot.line = line if type(line) is int and 0 < line <= LAST_LINE else None
+                self.robot.line = line if type(line) is int and 0 < line <= MAX_LINE else None
             self.child.send((*self._answer(name, values, now), self.robot.now))
             overrun += self.ledger.limit is not None
             if overrun > OVERRUN:
@@ -105,22 +107,22 @@ class SkillProtocol:
         return Outcome(cause, self.robot.trace, error)
 
 
-def described(robot: SkillPerformer) -> Description:
-    """The skills of a robot for a child: the name and the parameters of each."""
+def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
+    """The skills of a robot for a child: names and parameters."""
     return tuple(
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
         for skill in robot.skills.rows
     )
 
 
-def settings_of(robot: SkillPerformer) -> tuple[int, float, float, bool]:
-    """What else a child is told of a run: fuel, simulated seconds, start of its clocks, if it is live."""
-    rules = robot.rules
-    return rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), robot.is_live
+def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
+    """The parameters of a run: fuel, simulated seconds, start of the clocks, whether it is live."""
+    settings = robot.settings
+    return settings.limits.ticks, settings.limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
-    """What a program gives to a skill, as the robot takes it; a ProtocolError if it is anything else."""
+    """The arguments of a skill in the robot's form; ProtocolError if they do not fit its parameters."""
     if len(values) != len(skill.parameters):
         raise ProtocolError("a skill has other parameters")
     arguments: list[Argument] = []

@@ -12,7 +12,7 @@ from typing import TypeAlias
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.batches.replay import outcomes
-from codebotler.simulator.ledger import SkillPerformer, kept
+from codebotler.simulator.ledger import SkillPerformer, judge_end
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
@@ -22,32 +22,32 @@ from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import SkillProtocol
 
-EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
+run_log = logging.getLogger("codebotler.engine.events")  # start and end of each run, at DEBUG
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
-"""A program, and what makes the robots with which it runs, one after the other."""
+"""A program, and the factories of the robots of its runs."""
 Meanwhile: TypeAlias = Callable[[], object]
-"""What is done while a child runs programs; what it returns does not matter."""
-NOTHING: Meanwhile = bool
+"""Called while a child runs programs; its result is ignored."""
+DO_NOTHING: Meanwhile = bool
 
 
 class Worker:
     """The processes that run programs one at a time.
 
-    Nearly all programs are tame: some of them share a child, which has copies of their robots. Whatever is
-    not, and whatever a child could not decide, has a child of its own for each run, whose skills the engine
-    performs. The fork server of these has the standard library; it is started when the first of them comes.
+    Nearly all programs are tame: several of them share a child, which has copies of their robots. Each run of
+    another program, or one that the shared child could not decide, has a child of its own, and the engine
+    performs its skills. Their fork server has the standard library, and starts when it is first needed.
     """
 
     def __init__(self, *, one_process_per_run: bool = False) -> None:
         self._stopped = False
-        self._child: IsolatedProcess | None = None  # that runs batches
+        self._child: IsolatedProcess | None = None  # runs batches
         self._keeps_child = False
         self._one_process_per_run = one_process_per_run
         self._preparer = Preparer()
         self._fork_servers: dict[str, ForkServer] = {}
         try:
-            self._preparer.start()  # beside the fork server
+            self._preparer.start()  # in parallel with the fork server
             first = self._fork_server(FORK_SERVER if one_process_per_run else BATCH_SERVER)
             self.has_seccomp = first.has_seccomp
         except LostProcessError as error:
@@ -58,17 +58,17 @@ class Worker:
             raise
 
     def run(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program with a robot, and once more with a new one if need be."""
+        """Run a program with a robot, and again with a new one if a process was lost."""
         return self.run_all([(source, [new_robot])])[0][0]
 
     def run_all(self, jobs: Sequence[Job]) -> list[list[Outcome]]:
-        """Run programs, of which each outcome depends on nothing but the program and its robot.
+        """Run programs; each outcome depends on the program and its robot only.
 
         Args:
-            jobs: the programs; all robots have the same skills and the same way with literals.
+            jobs: the programs; all robots have equal skills and settings of literals.
 
         Returns:
-            for each program, the outcome with each of its robots; a run that is repeated has a new robot.
+            for each program, the outcome with each of its robots; a repeated run has a new robot.
         """
         known = self.run_tame(jobs)
         return [
@@ -80,9 +80,9 @@ class Worker:
         ]
 
     def run_live(self, source: str, robot: SkillPerformer) -> Outcome:
-        """Run a program on a robot, once and never again: what that has done cannot be undone.
+        """Run a program on a robot, once only, since actions cannot be undone.
 
-        What the robot raises besides `RobotError` ends the run and is raised here.
+        Errors of the robot other than `RobotError` end the run and are raised here.
         """
         try:
             prepared = self._prepare(source, robot)
@@ -93,21 +93,21 @@ class Worker:
             raise EngineError(stopped) from None
 
     def compiles(self, source: str, robot: SkillPerformer) -> bool:
-        """Whether a program compiles, so that it can be run with a robot."""
+        """Whether a program compiles."""
         try:
             return isinstance(self._prepare(source, robot), Prepared)
         except LostProcessError as error:
             raise EngineError(f"an isolated process was lost: {error}") from None
 
     def stop(self) -> None:
-        """End all processes, from any thread, and with them a run that is still going on."""
+        """End all processes and any current run, from any thread."""
         self._stopped = True
         self._preparer.kill()
         for fork_server in list(self._fork_servers.values()):
             fork_server.kill()
 
     def stay_on(self, core: int) -> None:
-        """Let the processes run on one core only."""
+        """Pin the processes to one core."""
         for fork_server in self._fork_servers.values():
             os.sched_setaffinity(fork_server.pid, {core})
 
@@ -119,7 +119,7 @@ class Worker:
             self._fork_servers.popitem()[1].close()
 
     def forget(self) -> None:
-        """Close the descriptors in a forked process, whose children these are not."""
+        """Close the descriptors in a forked process, which does not own these children."""
         self._preparer.forget()
         if self._child is not None:
             self._child.hang_up()
@@ -127,23 +127,22 @@ class Worker:
             self._fork_servers.popitem()[1].forget()
 
     def _prepare(self, source: str, robot: SkillPerformer) -> Prepared | Outcome:
-        lowercase = robot.rules.literals == "lowercase"
+        lowercase = robot.settings.literals == "lowercase"
         return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
 
-    def begin_to_prepare(self, source: str, skills: SkillTable, rules: SimulationSettings) -> None:
-        """Compile a program while the caller makes ready the robots with which it will run next."""
+    def begin_to_prepare(self, source: str, skills: SkillTable, settings: SimulationSettings) -> None:
+        """Begin to compile a program while the caller prepares its robots."""
         try:
-            self._preparer.ask_ahead(source, lowercase=rules.literals == "lowercase", skills=tuple(skills))
-        except (LostProcessError, OSError):  # whoever runs it tries again, with a new preparer
+            self._preparer.ask_ahead(source, lowercase=settings.literals == "lowercase", skills=tuple(skills))
+        except (LostProcessError, OSError):  # its run tries again, with a new preparer
             self._preparer.close()
 
     # --- several tame programs in a child
 
-    def run_tame(self, jobs: Sequence[Job], meanwhile: Meanwhile = NOTHING) -> dict[tuple[int, int], Outcome]:
-        """The outcomes of tame programs, as far as they are certain, by the numbers of job and robot.
-
-        While a child runs them, `meanwhile` is called, unless none is tame.
-        """
+    def run_tame(
+        self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
+    ) -> dict[tuple[int, int], Outcome]:
+        """The certain outcomes of tame programs by job and robot; `meanwhile` is called while they run."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -160,14 +159,11 @@ class Worker:
     def _tame(self, jobs: Sequence[Job]) -> Iterator[tuple[int, bytes, list[SimulatedRobot]]]:
         robot = jobs[0][1][0]()
         if robot.guard is not None and robot.guard.may_refuse:
-            return  # the child's copies refuse nothing
-        lowercase = robot.rules.literals == "lowercase"
+            return  # the child's copies cannot refuse actions
+        lowercase = robot.settings.literals == "lowercase"
         sources, skills = [source for source, _ in jobs], tuple(robot.skills)
-        if len(sources) == 1:
-            told = [self._preparer.prepare(*sources, lowercase=lowercase, skills=skills)]
-        else:
-            told = self._preparer.prepare_all(sources, lowercase=lowercase, skills=skills)
-        for number, prepared in enumerate(told):
+        answers = self._preparer.prepare_all(sources, lowercase=lowercase, skills=skills)
+        for number, prepared in enumerate(answers):
             if isinstance(prepared, Prepared) and prepared.is_tame:
                 yield number, prepared.code, [new_robot() for new_robot in jobs[number][1]]
 
@@ -178,19 +174,19 @@ class Worker:
         known: dict[tuple[int, int], Outcome],
         meanwhile: Meanwhile,
     ) -> list[tuple[int, bytes, list[SimulatedRobot]]]:
-        """Run programs in one child; return those that it had not begun when it broke off, if it did."""
+        """Run programs in one child; return those that it had not begun if it broke off."""
         child = self._child = self._child or self._fork_server(BATCH_SERVER).fork()
         for number, _, robots in batch:
             for _ in robots:
                 _log(jobs[number][0], "started")
-        told = outcomes(child, [(code, robots) for _, code, robots in batch], meanwhile)
+        ended = outcomes(child, [(code, robots) for _, code, robots in batch], meanwhile)
         waiting = list(batch)
         is_sound = False
         try:
             while waiting:
                 number, _, robots = waiting.pop(0)
                 for run in range(len(robots)):
-                    outcome = next(told)
+                    outcome = next(ended)
                     if outcome is not None:
                         known[number, run] = outcome
                         _log_end(jobs[number][0], outcome)
@@ -204,7 +200,7 @@ class Worker:
 
     @contextmanager
     def one_child(self) -> Iterator[None]:
-        """Let the same child run all batches meanwhile, which are of one program."""
+        """Let one child run all batches in this context, which are of one program."""
         self._keeps_child = True
         try:
             yield
@@ -213,15 +209,15 @@ class Worker:
             self._end_child()
 
     def _end_child(self) -> None:
-        """End the child that ran batches, and have the next one forked while nobody waits for it."""
+        """End the child of the last batch, and fork the next one ahead of need."""
         child, self._child = self._child, None
         if child is None:
             return
         server = self._fork_servers.get(BATCH_SERVER)
-        if not isinstance(server, BatchServer) or server.has_ended:  # and the child with it
+        if not isinstance(server, BatchServer) or server.has_ended:  # its child has ended, too
             child.hang_up()
             return
-        with suppress(LostProcessError):  # the same, a moment later
+        with suppress(LostProcessError):  # it may end at any moment
             child.kill()
         child.hang_up()
         server.fork_ahead()
@@ -229,7 +225,7 @@ class Worker:
     # --- a child for each run
 
     def run_alone(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program, once more with a new robot if a process was lost through no fault of the program."""
+        """Run a program, and again with a new robot if a process was lost through no fault of the program."""
         _log(source, "started")
         try:
             outcome = self._try(source, new_robot)
@@ -248,7 +244,7 @@ class Worker:
             prepared = self._prepare(source, robot)
             if isinstance(prepared, Outcome):
                 return prepared
-            return kept(self._fork(FORK_SERVER, prepared, robot), robot)
+            return judge_end(self._fork(FORK_SERVER, prepared, robot), robot)
         except (LostProcessError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
@@ -256,7 +252,6 @@ class Worker:
             raise LostProcessError(str(error)) from None
 
     def _fork(self, role: str, prepared: Prepared, robot: SkillPerformer) -> Outcome:
-        """Run a prepared program in a child of one of the fork servers."""
         return SkillProtocol(self._fork_server(role).fork(), prepared.code, robot).outcome()
 
     def _fork_server(self, role: str) -> ForkServer:
@@ -268,8 +263,8 @@ class Worker:
 
 
 def _log(source: str, what: str) -> None:
-    if EVENTS.isEnabledFor(logging.DEBUG):
-        EVENTS.debug("program %08x: %s", zlib.crc32(source.encode(errors="surrogatepass")), what)
+    if run_log.isEnabledFor(logging.DEBUG):
+        run_log.debug("program %08x: %s", zlib.crc32(source.encode(errors="surrogatepass")), what)
 
 
 def _log_end(source: str, outcome: Outcome) -> None:
@@ -278,4 +273,4 @@ def _log_end(source: str, outcome: Outcome) -> None:
 
 
 class EngineError(RuntimeError):
-    """The engine itself failed; no verdict on a program can be drawn from it."""
+    """The engine itself failed, which says nothing about a program."""

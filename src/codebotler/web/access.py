@@ -1,4 +1,4 @@
-"""Who may open the page, and at which address: tokens, roles, cookies, hosts."""
+"""Access to the page: tokens, roles, cookies, hosts and addresses."""
 
 from __future__ import annotations
 
@@ -10,88 +10,87 @@ import secrets
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
 from codebotler.core.errors import UserError
-from codebotler.web.proxy import OuterAddress, by_host
+from codebotler.web.proxy import OuterAddress, addresses_by_host
 
-TRIES, WINDOW = 10, 60.0
-"""How many wrong tokens may come from an address in so many seconds."""
+MAX_WRONG_TOKENS, WRONG_TOKEN_SECONDS = 10, 60.0
+"""The limit for wrong tokens from one address, per period."""
 
-MOST_ADDRESSES = 10_000
-SHORTEST_TOKEN = 16
-LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
-PORTS = range(8080, 8100)
-QUEUE = 128  # connections that wait to be accepted
+MAX_ADDRESSES = 10_000
+MIN_TOKEN_LENGTH = 16
+LOCAL_HOST_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
+PAGE_PORTS = range(8080, 8100)
+_LISTEN_BACKLOG = 128  # connections
 
 
 class Role(StrEnum):
-    """What a visitor may do: an operator everything, the robot's face only speak and ask."""
+    """The role of a visitor: operators may do everything, the robot's face may only talk and stop."""
 
     OPERATOR = "operator"
     FACE = "face"
 
 
 class TooManyTriesError(Exception):
-    """Too many wrong tokens came from an address; for a while the right one is refused as well."""
+    """Too many wrong tokens came from an address; for a while, even the right one is refused."""
 
 
 def new_token() -> str:
-    """A random token."""
+    """Return a random token."""
     return secrets.token_urlsafe(24)
 
 
 @dataclass(frozen=True)
 class Access:
-    """The tokens, and which role each gives."""
+    """The tokens and their roles."""
 
-    operator: str | None = field(default_factory=new_token)  # None where operators need none
+    operator: str | None = field(default_factory=new_token)  # None if operators need none
     face: str = field(default_factory=new_token)
-    unguessable: frozenset[Role] = frozenset()  # whose tokens were made here; these open at any time
+    unguessable: frozenset[Role] = frozenset()  # roles with random tokens, which no limit applies to
     now: Callable[[], float] = time.monotonic
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
 
     @classmethod
-    def asked_for(
+    def from_options(
         cls, operator: str | None, face: str | None, *, open_to_all: bool, is_private: bool
     ) -> Access:
-        """The tokens that a user chose, and new ones for None; UserError if they let in too many people."""
+        """Take a user's tokens, and create those that are None; raises UserError if they are unsafe."""
         if open_to_all and (operator or face or not is_private):
-            others = "--host, --behind-proxy and all tokens"
-            raise UserError(f"--no-token works on this machine only; leave out {others}")
-        if any(token is not None and len(token) < SHORTEST_TOKEN for token in (operator, face)):
-            raise UserError(f"this token is too short; use {SHORTEST_TOKEN} characters or more, or none")
+            raise UserError("--no-token works only without --host, --behind-proxy and tokens of your own")
+        if any(token is not None and len(token) < MIN_TOKEN_LENGTH for token in (operator, face)):
+            raise UserError(f"this token is too short; use at least {MIN_TOKEN_LENGTH} characters")
         if operator is not None and operator == face:
-            raise UserError("the face's token would open the operator's page; choose another one")
+            raise UserError("the face's token must differ from the operator's; choose another one")
         made = {Role.OPERATOR: operator is None, Role.FACE: face is None}
         unguessable = frozenset(role for role, is_new in made.items() if is_new)
         return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """The role that a token gives; None for a wrong one, which counts against the address."""
+        """Return a token's role, or None for a wrong one, which counts towards the address's limit."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
-        wrong = self._wrong.get(address, deque(maxlen=TRIES))
-        while wrong and wrong[0] <= self.now() - WINDOW:
+        wrong = self._wrong.get(address, deque(maxlen=MAX_WRONG_TOKENS))
+        while wrong and wrong[0] <= self.now() - WRONG_TOKEN_SECONDS:
             wrong.popleft()
-        if len(wrong) >= TRIES:
+        if len(wrong) >= MAX_WRONG_TOKENS:
             raise TooManyTriesError
         if role is None:
-            if address not in self._wrong and len(self._wrong) >= MOST_ADDRESSES:
+            if address not in self._wrong and len(self._wrong) >= MAX_ADDRESSES:
                 self._wrong.pop(next(iter(self._wrong)))
             self._wrong.setdefault(address, wrong).append(self.now())
         return role
 
     def of_cookie(self, value: str) -> Role | None:
-        """The role that a cookie gives; None for a wrong one."""
-        return self._of(value, _in_cookie)
+        """Return a cookie's role, or None for a wrong one."""
+        return self._of(value, _cookie_value)
 
     def cookie(self, role: Role) -> str:
-        """The value of a role's cookie: not the token itself, which opens other browsers."""
-        return _in_cookie(self.face if role is Role.FACE else self.operator or "")
+        """Return a role's cookie, from which nobody can derive the token."""
+        return _cookie_value(self.face if role is Role.FACE else self.operator or "")
 
     def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:
         for role, token in ((Role.OPERATOR, self.operator), (Role.FACE, self.face)):
@@ -100,60 +99,60 @@ class Access:
         return None
 
 
-def _in_cookie(token: str) -> str:
+def _cookie_value(token: str) -> str:
     return hmac.new(token.encode(), b"codebotler cookie", hashlib.sha256).hexdigest()
 
 
 @dataclass(frozen=True)
 class GuardRules:
-    """Which requests the guard lets through."""
+    """The guard's settings."""
 
     access: Access
-    hosts: frozenset[str] = LOOPBACK  # names of the page, without ports
-    any_address: bool = False  # whether numeric addresses are accepted besides, as from other machines
-    cookie: str = "codebotler"  # its name, another one for each port
-    proxies: Mapping[str, OuterAddress] = field(default_factory=dict)  # in front, by what `Host` says
+    hosts: frozenset[str] = LOCAL_HOST_NAMES  # accepted host names, without ports
+    any_address: bool = False  # whether to accept all numeric addresses, too
+    cookie: str = "codebotler"  # the cookie's name, different for each port
+    proxies: Mapping[str, OuterAddress] = field(default_factory=dict)  # by Host header
 
 
 @dataclass(frozen=True)
 class PageAddress:
-    """The address of the page."""
+    """The address at which to serve the page."""
 
     host: str = "127.0.0.1"
-    port: int | None = None  # 0 takes any free one, None the first of `PORTS` that is free
-    names: tuple[str, ...] = ()  # further names of the page
-    proxies: tuple[OuterAddress, ...] = ()  # where a reverse proxy offers it
+    port: int | None = None  # 0 for any free port, None for the first free one of `PAGE_PORTS`
+    names: tuple[str, ...] = ()  # additional host names
+    proxies: tuple[OuterAddress, ...] = ()  # its addresses at reverse proxies
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only this machine can reach it."""
+        """Whether it listens on a loopback interface."""
         try:
             return ipaddress.ip_address(self.host).is_loopback
         except ValueError:
-            return self.host in LOOPBACK
+            return self.host in LOCAL_HOST_NAMES
 
     @property
     def is_private(self) -> bool:
-        """Whether no other machine can reach it, not even through a proxy."""
+        """Whether no other machine can reach it, even through a proxy."""
         return self.is_loopback and not self.proxies
 
-    def listening(self) -> socket.socket:
-        """An open socket there."""
-        ports = PORTS if self.port is None else (self.port,)
+    def listen(self) -> socket.socket:
+        """Open a socket; raises UserError if no port is free."""
+        ports = PAGE_PORTS if self.port is None else (self.port,)
         for port in ports:
             try:
-                return self._bound(port)
+                return self._bind(port)
             except OSError as error:
                 if error.errno == errno.EADDRINUSE and port != ports[-1]:
                     continue
                 raise UserError(
-                    f"{_taken(ports)} already in use; choose another --port"
+                    f"port {port} is already in use; choose another --port"
                     if error.errno == errno.EADDRINUSE
                     else f"cannot listen on {self.host}, port {port}: {error.strerror}"
                 ) from None
         raise AssertionError("there are ports")
 
-    def _bound(self, port: int) -> socket.socket:
+    def _bind(self, port: int) -> socket.socket:
         family, kind, protocol, _, address = socket.getaddrinfo(
             self.host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
@@ -161,19 +160,15 @@ class PageAddress:
         try:
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             bound.bind(address)
-            bound.listen(QUEUE)
+            bound.listen(_LISTEN_BACKLOG)
         except OSError:
             bound.close()
             raise
         return bound
 
     def rules(self, access: Access, port: int) -> GuardRules:
-        """The guard's rules for this address."""
+        """Return the guard's settings for this address."""
         named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
-        hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
-        cookie, proxies = f"codebotler-{port}", by_host(self.proxies)
+        hosts = LOCAL_HOST_NAMES | named | (set() if self.is_loopback else {socket.gethostname().lower()})
+        cookie, proxies = f"codebotler-{port}", addresses_by_host(self.proxies)
         return GuardRules(access, frozenset(hosts), not self.is_loopback, cookie, proxies)
-
-
-def _taken(ports: Sequence[int]) -> str:
-    return f"port {ports[0]} is" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]} are"

@@ -1,4 +1,4 @@
-"""The HTTP API: everything the page does with missions, checks and the robot."""
+"""The HTTP API for missions, checks and the robot."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import shortened
-from codebotler.missions.log import EVENTS, Line, Summary, events_of
+from codebotler.missions.log import EVENTS_FILE, LogLine, MissionSummary, read_events
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find, missions
-from codebotler.missions.view import Order, SessionView
-from codebotler.missions.wording import PAGE
-from codebotler.web.console import MOST_PROGRAM, QUIET, Console
+from codebotler.missions.store import find_mission, read_missions
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.wording import BY_PAGE
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS, MAX_WAIT_SECONDS, Console
 
-HERE = "current"
-"""The current mission, in an address."""
+_CURRENT = "current"
+"""Names the current mission in a path."""
 
-Text = Annotated[str, Field(max_length=MOST_PROGRAM)]
+_LimitedText = Annotated[str, Field(max_length=MAX_PROGRAM_CHARACTERS)]
 
 
 class _Form(BaseModel):
@@ -38,23 +38,21 @@ class _Form(BaseModel):
 class NewMission(_Form):
     """A new mission: an instruction, a program, or both; without a program, the model writes one."""
 
-    instruction: Text = ""
+    instruction: _LimitedText = ""
     model: Annotated[str, Field(max_length=200)] = Field("", description="By default, the first one.")
-    program: Text = ""
+    program: _LimitedText = ""
 
 
 class NewProgram(_Form):
-    """A program to check, alone or in the place of the current one."""
+    """A program to check, or to replace the current one."""
 
-    program: Text
+    program: _LimitedText
 
 
 class Approval(_Form):
     """A person's approval of a program."""
 
-    program: str = Field(
-        description="The digest of the program that the person saw.", examples=["3f5a8b0c9d21e467"]
-    )
+    program: str = Field(description="The digest of the reviewed program.", examples=["3f5a8b0c9d21e467"])
     despite_problems: bool = False
 
 
@@ -72,26 +70,25 @@ class AskAgainForm(_Form):
 
 
 class AsciiJSONResponse(JSONResponse):
-    """JSON in ASCII, which can hold the lone surrogates of a program."""
+    """ASCII-only JSON, because programs may contain lone surrogates."""
 
     def render(self, content: object) -> bytes:
         """The response's body."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
-def refused(_request: Request, error: Exception) -> AsciiJSONResponse:
-    """Say what is wrong with a request, without sending it back."""
-    assert isinstance(error, RequestValidationError), "registered for this error alone"
-    told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
-    return AsciiJSONResponse({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
+def invalid_request(_request: Request, error: Exception) -> AsciiJSONResponse:
+    """Explain what is wrong with a request, without echoing it."""
+    assert isinstance(error, RequestValidationError), "registered only for this error"
+    detail = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
+    return AsciiJSONResponse({"detail": detail}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(console: Console) -> APIRouter:
-    """The addresses of the API."""
+    """Create the routes of the API."""
     api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AsciiJSONResponse)
     _add_missions(api, console)
     _add_changes(api, console)
-    _add_events(api, console)
     _add_rest(api, console)
     return api
 
@@ -101,13 +98,13 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     def list_missions() -> list[dict[str, Any]]:
         """All missions, oldest first."""
         with as_http_errors():
-            return [asdict(summary) for summary in missions(console.home)]
+            return [asdict(summary) for summary in read_missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission; writing and checking go on in the background. Refused while a mission runs."""
+        """Begin a mission, which is written and checked in the background. Refused while a mission runs."""
         with as_http_errors():
-            session = console.begin(Order(new.instruction, new.model, new.program))
+            session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
         if not session.view.id:
             raise HTTPException(409, session.view.error or "the mission was stopped before it started")
@@ -115,17 +112,17 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """A mission: the current one with its check, or the summary of a past one."""
+        """The current mission with its check, or the summary of a past one."""
         view = console.view
-        if mission in {HERE, view.id}:
+        if mission in {_CURRENT, view.id}:
             return view_data(view)
-        return asdict(_past(console, mission)[0])
+        return asdict(_read_mission(console, mission)[0])
 
     @api.get("/missions/{mission}/events.jsonl")
     def jsonl(mission: str) -> Response:
-        """The events as JSON lines."""
-        summary, _ = _past(console, mission)
-        data = (console.home / "missions" / summary.id / EVENTS).read_bytes()
+        """Download the events as JSON lines."""
+        summary, _ = _read_mission(console, mission)
+        data = (console.home / "missions" / summary.id / EVENTS_FILE).read_bytes()
         return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
 
     @api.get("/missions/{mission}/events.mcap")
@@ -136,11 +133,11 @@ def _add_missions(api: APIRouter, console: Console) -> None:
             Query(description="`robot` for simulated time, else `wall`."),
         ] = "wall",
     ) -> Response:
-        """The events as MCAP, which Foxglove opens."""
+        """Download the events as MCAP, for Foxglove."""
         with as_http_errors(), installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
 
-        summary, events = _past(console, mission)
+        summary, events = _read_mission(console, mission)
         file = io.BytesIO()
         folder = console.home / "missions" / summary.id
         write_mcap(file, summary, events, folder=folder, clock=clock)
@@ -151,47 +148,45 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Replace the program; it is checked in the background."""
-        _at_hand(console, mission)
+        _current_session(console, mission)
         with as_http_errors():
             return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
-        """Have the model write another program, which is then checked."""
-        session = _at_hand(console, mission)
+        """Have the model write and check another program."""
+        session = _current_session(console, mission)
         with as_http_errors():
             session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
-        """Run the program that the person saw, and no other."""
-        session = _at_hand(console, mission)
+        """Run exactly the program that the person reviewed."""
+        session = _current_session(console, mission)
         with as_http_errors():
             session.approve(approval.program, despite_problems=approval.despite_problems)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
-        """Stop the current mission; `state` says when it has stopped."""
-        _at_hand(console, mission)
-        console.stop(PAGE)
+        """Stop the current mission; `state` tells when it has stopped."""
+        _current_session(console, mission)
+        console.stop(BY_PAGE)
         return view_data(console.view)
 
     @api.post("/stop", status_code=202)
     async def stop(
         *, only_moving: Annotated[bool, Query(description="Stop only a robot that runs a program.")] = False
     ) -> dict[str, Any]:
-        """Stop the current mission, or only one whose robot moves; says whether there is any."""
-        return {"stopping": console.stop(PAGE, only_moving=only_moving)}
+        """Stop the current mission, or only a running one; return whether there is one."""
+        return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}
 
-
-def _add_events(api: APIRouter, console: Console) -> None:
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
-        """The events as they happen (server-sent), from the first one on or after `Last-Event-ID`."""
+        """Stream the events (server-sent), from the beginning or after `Last-Event-ID`."""
         return StreamingResponse(
-            _stream(console, _at_hand(console, mission), last_event_id),
+            _stream(console, _current_session(console, mission), last_event_id),
             media_type="text/event-stream",
             headers={"cache-control": "no-store"},
         )
@@ -200,7 +195,7 @@ def _add_events(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program by the house rules, in the rooms of the current mission if there is one."""
+        """Check a program against the house rules, in the rooms of the current mission, if any."""
         with as_http_errors():
             return console.check(new.program, console.view.room_map, console.rules).data()
 
@@ -214,7 +209,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
             bool, Query(description="Wait for the beginning of a mission, at most 15 s.")
         ] = False,
     ) -> dict[str, Any]:
-        """The robot, its skills and its mission."""
+        """The robot, its skills and the current mission."""
         if once_begun:
             await console.view_once(over=False)
         view = await console.view_once(over=True) if once_over else console.view
@@ -234,7 +229,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
 
 
 async def _stream(console: Console, session: MissionSession, known: int) -> AsyncIterator[str]:
-    """Server-sent events; a slow reader skips nothing and delays nobody."""
+    """Yield server-sent events; a slow reader misses nothing and delays nobody."""
 
     def has_more() -> bool:
         return bool(session.events(known)) or session.view.is_over
@@ -245,12 +240,12 @@ async def _stream(console: Console, session: MissionSession, known: int) -> Asyn
             yield f"id: {known}\nevent: {line['event']}\ndata: {json.dumps(line)}\n\n"
         if session.view.is_over and not session.events(known):
             return
-        if not await console.notifier.until(has_more, QUIET):
+        if not await console.notifier.until(has_more, MAX_WAIT_SECONDS):
             yield ": still there\n\n"
 
 
 def view_data(view: SessionView) -> dict[str, Any]:
-    """A view as plain data."""
+    """Return a view as plain data."""
     return {
         "id": view.id,
         "state": view.state,
@@ -280,34 +275,32 @@ def view_data(view: SessionView) -> dict[str, Any]:
     }
 
 
-def _at_hand(console: Console, mission: str) -> MissionSession:
+def _current_session(console: Console, mission: str) -> MissionSession:
     session = console.session
-    if session is not None and mission in {HERE, session.view.id}:
+    if session is not None and mission in {_CURRENT, session.view.id}:
         return session
-    summary, _ = _past(console, mission)
+    summary, _ = _read_mission(console, mission)
     raise HTTPException(409, f"mission {summary.id} is over; it can only be read")
 
 
-def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
-    name = console.view.id if mission == HERE else mission
+def _read_mission(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine]]:
+    name = console.view.id if mission == _CURRENT else mission
     if not name:
-        none = "there is no mission yet; POST /api/missions starts one"
-        raise HTTPException(404, none if console.session is None else "the current mission has not started")
+        raise HTTPException(404, "there is no current mission; POST /api/missions starts one")
     try:
-        folder = find(console.home, name)
+        folder = find_mission(console.home, name)
     except UserError:
-        raise HTTPException(
-            404, f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
-        ) from None
+        sentence = f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
+        raise HTTPException(404, sentence) from None
     try:
-        return Summary.read(folder), events_of(folder)
+        return MissionSummary.read(folder), read_events(folder)
     except UserError as error:
         raise HTTPException(404, error.sentence) from None
 
 
 @contextmanager
 def as_http_errors() -> Iterator[None]:
-    """Answer what a mission refuses with 409, and what is wrong with 422."""
+    """Convert MissionError to status 409 and UserError to 422."""
     try:
         yield
     except MissionError as error:
@@ -317,5 +310,5 @@ def as_http_errors() -> Iterator[None]:
 
 
 def _file(data: bytes, name: str, kind: str) -> Response:
-    shown = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
-    return Response(data, media_type=kind, headers=shown)
+    headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+    return Response(data, media_type=kind, headers=headers)

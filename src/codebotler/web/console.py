@@ -1,4 +1,4 @@
-"""The operator's console: the robot and the mission at hand, the same for every viewer."""
+"""The operator's console: the robot and the current mission, shared by all viewers."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from codebotler.checking.problems import Check
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
-from codebotler.missions.log import Summary
-from codebotler.missions.mission import GRACE, SHUTTING_DOWN, MissionError
+from codebotler.missions.log import MissionSummary
+from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import recover
-from codebotler.missions.view import Order, SessionView
+from codebotler.missions.store import recover_missions
+from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
@@ -27,17 +27,17 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
-MOST_PROGRAM = 200_000
-"""The longest program or instruction, in characters."""
+MAX_PROGRAM_CHARACTERS = 200_000
+"""The limit for programs and instructions."""
 
-QUIET = 15.0
-"""Seconds after which somebody who waits for something gets an answer in any case."""
+MAX_WAIT_SECONDS = 15.0
+"""The longest time for which a request waits for a change."""
 
 
 class Console:
-    """Holds a robot, connected by missions only, and the mission at hand, for viewers on any threads.
+    """Holds a robot, which only missions connect, and the current mission, for viewers on any thread.
 
-    `models` are the names on offer, the default first.
+    `models` are the names of available models, the default first.
     """
 
     def __init__(
@@ -55,57 +55,49 @@ class Console:
         self.notifier, self.face, self.rules = Notifier(), face, rules
         if face is not None:
             face.changed = self.notifier.change
-        self.interrupted: tuple[Summary, ...] = ()
+        self.interrupted: tuple[MissionSummary, ...] = ()
         self._open_model = open_model
-        self._lock = threading.Lock()  # held for moments
-        self._session: MissionSession | None = None
+        self._lock = threading.Lock()  # held briefly
+        self.session: MissionSession | None = None  # the current one, or the last one
         self._checking = threading.Lock()
         self._held = ExitStack()
         self._pool: WorkerPool | None = None
 
     def __enter__(self) -> Self:
-        self.interrupted = tuple(recover(self.home))
+        self.interrupted = tuple(recover_missions(self.home))
         make_folder(self.home / "missions")
         return self
 
     def __exit__(self, *_: object) -> None:
-        session = self._session
+        session = self.session
         if session is not None:
-            session.stop(SHUTTING_DOWN)
-            session.join(GRACE + 1)
+            session.stop(BY_SHUTDOWN)
+            session.join(STOP_GRACE_SECONDS + 1)
         with self._checking:
             self._held.close()
 
     @property
-    def session(self) -> MissionSession | None:
-        """The mission at hand, or the last one."""
-        return self._session
-
-    @property
     def view(self) -> SessionView:
-        """What all viewers see."""
-        session = self._session
+        """The current view."""
+        session = self.session
         return SessionView() if session is None else session.view
 
     async def view_once(self, *, over: bool) -> SessionView:
-        """What all viewers see once a mission is over, or goes on; at the latest after some seconds."""
-        await self.notifier.until(lambda: self.view.is_over == over, QUIET)
+        """Return the view once the mission is over, or has begun, or after `MAX_WAIT_SECONDS`."""
+        await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
-    def begin(self, order: Order) -> MissionSession:
-        """Begin a mission, by default with the first model.
-
-        One at hand that is not running makes room for it; another one raises MissionError.
-        """
+    def begin(self, order: MissionOrder) -> MissionSession:
+        """Begin a mission, by default with the first model; raises MissionError while another one runs."""
         model = order.model.strip() or ("" if order.has_program else self.models[0])
         order = replace(order, instruction=order.instruction.strip(), model=model)
         for text in (order.instruction, order.program):
             _check_length(text)
         with self._lock:
-            before = self._session
+            before = self.session
             if before is not None and before.view.is_running:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
-            self._session = session = MissionSession(
+            self.session = session = MissionSession(
                 self.robot,
                 self.home,
                 order,
@@ -124,15 +116,15 @@ class Console:
         return session
 
     def edit(self, program: str) -> MissionSession:
-        """Replace the program at hand; after the end of a mission this begins another one."""
+        """Replace the current program; after the end of a mission, begin another one."""
         _check_length(program)
-        session = self._session
+        session = self.session
         if session is None or session.view.is_over:
             before = self.view
             if program == before.program:
-                return self.begin(Order(before.instruction, before.model, program, before.author))
+                return self.begin(MissionOrder(before.instruction, before.model, program, before.author))
             kept = before.instruction if is_version_of(before.program, program) else ""
-            return self.begin(Order(kept, before.model if kept else "", program))
+            return self.begin(MissionOrder(kept, before.model if kept else "", program))
         session.edit(program)
         return session
 
@@ -142,15 +134,15 @@ class Console:
         self.notifier.change()
 
     def stop(self, by: str, *, only_moving: bool = False) -> bool:
-        """Stop the mission, or only a robot that runs, without waiting; whether there is anything to stop."""
-        session, view = self._session, self.view
+        """Stop the mission, or only a running one, without waiting; return whether there is one."""
+        session, view = self.session, self.view
         if session is None or view.is_over or (only_moving and not view.is_running):
             return False
         session.stop_soon(by)
         return True
 
     def check(self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()) -> Check:
-        """Check a program, one at a time; without a map of the robot's rooms they are taken from it."""
+        """Check one program at a time; without a map, in the rooms that it names."""
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
@@ -159,25 +151,25 @@ class Console:
 
 
 class Notifier:
-    """Wakes viewers at each change; they then read what there is, so no queue can grow."""
+    """Wakes viewers at each change; they read the latest view, so no queue can grow."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._wakes: list[Callable[[], None]] = []
 
     def change(self) -> None:
-        """Wake all viewers; from any thread."""
+        """Wake all viewers, from any thread."""
         with self._lock:
             wakes = tuple(self._wakes)
         for wake in wakes:
             wake()
 
     async def changes(self) -> AsyncGenerator[None]:
-        """Yield now, and again after changes; those during one round of the loop count as one."""
+        """Yield now and after changes; several during one iteration of the event loop count as one."""
         loop, changed = asyncio.get_running_loop(), asyncio.Event()
 
         def wake() -> None:
-            with suppress(RuntimeError):  # the loop has ended, and with it all who waited
+            with suppress(RuntimeError):  # the event loop has ended
                 loop.call_soon_threadsafe(changed.set)
 
         with self._lock:
@@ -191,23 +183,23 @@ class Notifier:
             with self._lock:
                 self._wakes.remove(wake)
 
-    async def until(self, holds: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Wait until something holds, at most so many seconds; whether it does."""
+    async def until(self, is_met: Callable[[], bool], seconds: float | None = None) -> bool:
+        """Wait for a condition, at most some seconds; return whether it is met."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
                 async for _ in changes:
-                    if holds():
+                    if is_met():
                         return True
-        return holds()
+        return is_met()
 
 
 def is_version_of(program: str, changed: str) -> bool:
-    """Whether a program, changed by hand, is still for the same instruction: it keeps half of the lines."""
+    """Whether an edited program keeps half of its lines, so that its instruction still applies."""
     lines = [line for line in map(str.strip, program.splitlines()) if line]
     kept = set(map(str.strip, changed.splitlines()))
     return bool(lines) and 2 * sum(line in kept for line in lines) >= len(lines)
 
 
 def _check_length(text: str) -> None:
-    if len(text) > MOST_PROGRAM:
-        raise UserError(f"it is too long: {len(text):,} characters, and {MOST_PROGRAM:,} is the limit")
+    if len(text) > MAX_PROGRAM_CHARACTERS:
+        raise UserError(f"this text has {len(text):,} characters; the limit is {MAX_PROGRAM_CHARACTERS:,}")

@@ -1,4 +1,4 @@
-"""The robot's face: its page and its part of the API. It cannot run or read programs."""
+"""The page and the API of the robot's face, which can neither run nor read programs."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from fastapi.responses import HTMLResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.terminal import shortened, visible_lines
-from codebotler.missions.mission import UNCONFIRMED
+from codebotler.missions.mission import UNCONFIRMED_STOP
 from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.access import Role
 from codebotler.web.console import Console
 
-PAGE = Path(__file__).with_name("static") / "face.html"
-POLICY = (
+_FACE_PAGE = Path(__file__).with_name("static") / "face.html"
+_FACE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
-"""Stricter than that of other pages, since there is no NiceGUI: no script can turn a text into markup."""
+"""Stricter than for NiceGUI's pages: no script can turn text into markup."""
 
-STOPS = "a person at the face"
-BACK = '<a id="back" href="./">Operate the robot</a>'
-PLACE_OF_BACK = "<!-- back -->"  # for those who may operate
-MOST_TEXT, MOST_OPTION, MOST_OPTIONS = 2_000, 300, 50
-"""Characters and options that people can read on a screen."""
+BY_FACE = "a person at the face"
+_BACK_LINK = '<a id="back" href="./">Operate the robot</a>'
+_BACK_PLACEHOLDER = "<!-- back -->"  # replaced for operators
+MAX_FACE_TEXT, MAX_FACE_OPTION, MAX_FACE_OPTIONS = 2_000, 300, 50
+"""Limits for texts and options, in characters and number."""
 
 
 class FaceAnswer(BaseModel):
@@ -43,61 +43,60 @@ class FaceAnswer(BaseModel):
 
 
 def router(console: Console, face: Face) -> APIRouter:
-    """The addresses of the face."""
-    here = APIRouter(tags=["face"])
+    """Create the routes of the face."""
+    routes = APIRouter(tags=["face"])
 
-    @here.get("/face", include_in_schema=False)
+    @routes.get("/face", include_in_schema=False)
     def page(request: Request) -> HTMLResponse:
-        headers = {"content-security-policy": POLICY, "cache-control": "no-store"}
+        headers = {"content-security-policy": _FACE_POLICY, "cache-control": "no-store"}
         may_operate = getattr(request.state, "role", None) is Role.OPERATOR
-        shown = PAGE.read_text(encoding="utf-8").replace(PLACE_OF_BACK, BACK if may_operate else "")
+        shown = _FACE_PAGE.read_text(encoding="utf-8").replace(
+            _BACK_PLACEHOLDER, _BACK_LINK if may_operate else ""
+        )
         return HTMLResponse(shown, headers=headers)
 
-    @here.get("/api/face")
+    @routes.get("/api/face")
     async def show(*, once_over: bool = False, once_begun: bool = False) -> dict[str, Any]:
-        """What the face shows: what the robot does, says and asks; with `once_over` after the mission.
-
-        `question` has the number to answer.
-        """
+        """What the robot does, says and asks; with `once_over`, after the end of the mission."""
         if once_begun:
             await console.view_once(over=False)
         if once_over:
             await console.view_once(over=True)
         return face_data(console, face)
 
-    @here.post("/api/face/answer")
+    @routes.post("/api/face/answer")
     def answer(given: FaceAnswer) -> dict[str, Any]:
-        """Answer the question; the first answer counts, and one that comes too late is refused."""
+        """Answer the question; the first answer counts, and late ones are refused."""
         try:
             face.answer(given.question, given.option)
         except AnswerError as error:
             raise HTTPException(409, error.sentence) from None
         return face_data(console, face)
 
-    @here.post("/api/face/stop", status_code=202)
+    @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
-        """Stop a robot that runs, and nothing else; says whether there is one."""
-        return {"stopping": console.stop(STOPS, only_moving=True)}
+        """Stop a running mission; return whether there is one."""
+        return {"stopping": console.stop(BY_FACE, only_moving=True)}
 
-    @here.websocket("/api/face/live")
+    @routes.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
-        """Send what the face shows, again at each change; messages from there are ignored."""
+        """Send the face's data now and at each change; incoming messages are ignored."""
         await socket.accept()
         with face.count_screen():
             sending = asyncio.create_task(_send_changes(socket, console, face))
             try:
-                with suppress(WebSocketDisconnect, KeyError):  # a message that is no text
+                with suppress(WebSocketDisconnect, KeyError):  # not a text message
                     while True:
                         await socket.receive_text()
             finally:
                 sending.cancel()
 
-    return here
+    return routes
 
 
 async def _send_changes(socket: WebSocket, console: Console, face: Face) -> None:
     sent: object = None
-    with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
+    with suppress(WebSocketDisconnect, RuntimeError):  # the face was closed
         async for _ in console.notifier.changes():
             data = face_data(console, face)
             shown = {**data, "seconds_left": None}
@@ -107,22 +106,22 @@ async def _send_changes(socket: WebSocket, console: Console, face: Face) -> None
 
 
 def face_data(console: Console, face: Face) -> dict[str, Any]:
-    """What a face shows, as plain data."""
+    """Return what a face shows, as plain data."""
     view, shown = console.view, face.shown
     question = shown.question
     is_moving = view.is_running and view.progress.is_driving
     doing = "asking" if question else "moving" if is_moving else "working" if view.is_running else "idle"
     return {
         "doing": doing,
-        "to": words(view.progress.room, MOST_OPTION) if is_moving else "",
-        "said": [{"number": said.number, "text": words(said.text)} for said in shown.said],
+        "to": screen_text(view.progress.room, MAX_FACE_OPTION) if is_moving else "",
+        "said": [{"number": said.number, "text": screen_text(said.text)} for said in shown.said],
         "question": None if question is None else question_data(question),
         "seconds_left": None if question is None else _seconds_left(question),
         "ended": None if shown.ended is None else _ended_data(shown.ended),
         "screens": face.screens,
         "state": view.state,
         "is_over": view.is_over,
-        "reason": UNCONFIRMED if view.reason == UNCONFIRMED else "",
+        "reason": UNCONFIRMED_STOP if view.reason == UNCONFIRMED_STOP else "",
     }
 
 
@@ -132,21 +131,21 @@ def _seconds_left(question: FaceQuestion) -> float | None:
 
 
 def question_data(question: FaceQuestion) -> dict[str, Any]:
-    """A question as plain data."""
+    """Return a question as plain data."""
     return {
         "number": question.number,
-        "person": words(question.person, MOST_OPTION),
-        "text": words(question.text),
-        "options": [words(option, MOST_OPTION) for option in question.options[:MOST_OPTIONS]],
-        "more_options": max(0, len(question.options) - MOST_OPTIONS),
+        "person": screen_text(question.person, MAX_FACE_OPTION),
+        "text": screen_text(question.text),
+        "options": [screen_text(option, MAX_FACE_OPTION) for option in question.options[:MAX_FACE_OPTIONS]],
+        "more_options": max(0, len(question.options) - MAX_FACE_OPTIONS),
     }
 
 
-def words(text: str, most: int = MOST_TEXT) -> str:
-    """A text with its lines, cut after so many characters, and with hidden characters written out."""
+def screen_text(text: str, most: int = MAX_FACE_TEXT) -> str:
+    """Shorten a text, keep its line breaks, and escape hidden characters."""
     return shortened(text, most, visible_lines)
 
 
 def _ended_data(ended: FaceQuestion) -> dict[str, Any]:
-    answer = None if ended.answer is None else words(ended.options[ended.answer], MOST_OPTION)
+    answer = None if ended.answer is None else screen_text(ended.options[ended.answer], MAX_FACE_OPTION)
     return {"number": ended.number, "how": ended.how, "answer": answer}

@@ -1,4 +1,4 @@
-"""A map of the rooms, with the robot, its way so far, and what it has met (SVG)."""
+"""The map of the rooms as SVG, with the robot, its trail and its finds."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from html import escape
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point, Room, World, is_within, laid_out
 
-MARGIN = 0.6
-MOST_ROOMS = 100
-WIDE = 0.62
-"""The width of a letter, in heights of a letter."""
+_MARGIN = 0.6
+MAX_DRAWN_ROOMS = 100
+_LETTER_WIDTH = 0.62
+"""The width of a letter, relative to its height."""
 
-SMALLEST, LARGEST, SMALL = 0.2, 0.62, 0.44
-HALO = 0.62  # the radius around the robot, in metres
-MOST_LETTERS, MOST_FINDS = 60, 3
+_MIN_LETTER, _MAX_LETTER, _FIND_LETTER = 0.2, 0.62, 0.44
+_HALO_RADIUS = 0.62  # metres
+_MAX_LABEL_CHARACTERS, _MAX_FINDS = 60, 3
 
 
 @dataclass(frozen=True)
 class MapState:
-    """What a map shows besides the rooms.
+    """The contents of a map.
 
     Args:
         at: the robot's position in metres, if known.
-        room: where it is, or where it drives to; empty if that is not known, or it is in none.
-        is_driving: whether it drives there.
-        trail: the positions on its way so far.
-        finds: by room, what was seen and who was asked there.
-        held: what it holds.
+        room: its room or destination; empty if unknown or between rooms.
+        is_driving: whether `room` is its destination.
+        trail: its previous positions.
+        finds: things and people that it found, by room.
+        held: the object that it holds.
     """
 
     at: Point | None = None
@@ -41,7 +41,7 @@ class MapState:
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """The contents in words."""
         where = "is between rooms" if self.at else ""
         if self.room:
             where = f"{'is driving to' if self.is_driving else 'is in'} {self.room}"
@@ -52,12 +52,12 @@ class MapState:
 
 
 def floorplan(world: World, state: MapState) -> str:
-    """Draw a world as seen from above; nothing covers the name of a room."""
-    rooms = laid_out(world).rooms[:MOST_ROOMS]
+    """Draw a world from above, with room names on top."""
+    rooms = laid_out(world).rooms[:MAX_DRAWN_ROOMS]
     points = [corner for one in rooms for corner in one.footprint or ()]
     points += [*state.trail, *([state.at] if state.at else [])]
-    left, right = min(x for x, _ in points) - MARGIN, max(x for x, _ in points) + MARGIN
-    low, high = min(y for _, y in points) - MARGIN, max(y for _, y in points) + MARGIN
+    left, right = min(x for x, _ in points) - _MARGIN, max(x for x, _ in points) + _MARGIN
+    low, high = min(y for _, y in points) - _MARGIN, max(y for _, y in points) + _MARGIN
 
     def on_map(point: Point) -> Point:
         return point[0] - left, high - point[1]
@@ -68,16 +68,16 @@ def floorplan(world: World, state: MapState) -> str:
         assert one.footprint is not None, "rooms are laid out"
         look = ("goal" if state.is_driving else "here") if one.name == state.room else ""
         corners = [on_map(corner) for corner in one.footprint]
-        parts.append(f'<polygon class="room {look}" points="{_joined(corners)}"/>')
+        parts.append(f'<polygon class="room {look}" points="{_svg_points(corners)}"/>')
         names += _labels(one, corners, on_map, state.finds.get(one.name, ()))
     if len(state.trail) > 1:
-        parts.append(f'<polyline class="trail" points="{_joined(map(on_map, state.trail))}"/>')
+        parts.append(f'<polyline class="trail" points="{_svg_points(map(on_map, state.trail))}"/>')
     if state.at is not None:
         x, y = on_map(state.at)
         parts.append(_robot(x, y))
         if state.held:
-            held = f"holding {shortened(state.held, MOST_LETTERS)}"
-            parts.append(_text(x, y + HALO + 0.12, SMALL, held, "held"))
+            held = f"holding {shortened(state.held, _MAX_LABEL_CHARACTERS)}"
+            parts.append(_text(x, y + _HALO_RADIUS + 0.12, _FIND_LETTER, held, "held"))
     about = escape(shortened(f"Map of {len(rooms)} rooms. {state.sentence}", 400))
     return (
         f'<svg class="floorplan" viewBox="0 0 {right - left:.2f} {high - low:.2f}" role="img" '
@@ -86,58 +86,56 @@ def floorplan(world: World, state: MapState) -> str:
 
 
 def room_at(rooms: Iterable[Room], at: Point) -> str:
-    """The name of the room whose footprint a point is in; empty if there is none."""
+    """Return the name of the room that contains a point; empty if there is none."""
     return next((one.name for one in rooms if one.footprint and is_within(at, one.footprint)), "")
 
 
-def _joined(points: Iterable[Point]) -> str:
+def _svg_points(points: Iterable[Point]) -> str:
     return " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
 
 
 def _robot(x: float, y: float) -> str:
     at = f'cx="{x:.2f}" cy="{y:.2f}"'
-    return f'<g class="robot"><circle class="halo" {at} r="{HALO}"/><circle class="body" {at} r=".34"/></g>'
+    halo = f'<circle class="halo" {at} r="{_HALO_RADIUS}"/>'
+    return f'<g class="robot">{halo}<circle class="body" {at} r=".34"/></g>'
 
 
 def _labels(
     room: Room, corners: Sequence[Point], on_map: Callable[[Point], Point], finds: Sequence[str]
 ) -> Iterator[str]:
-    """The name of a room at the side that is farther from where the robot stands.
-
-    Finds are beside the name if there is space before the robot, or else at the other side.
-    """
+    """Yield a room's name at the wall farther from the robot, and its finds near it if there is space."""
     top, bottom = min(y for _, y in corners), max(y for _, y in corners)
     left, right = min(x for x, _ in corners), max(x for x, _ in corners)
-    middle, stands = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
-    lines = _broken(shortened(room.name, MOST_LETTERS))
-    size = _size(lines, right - left, LARGEST)
-    is_above = stands >= (top + bottom) / 2
+    middle, stop = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
+    lines = _wrap(shortened(room.name, _MAX_LABEL_CHARACTERS))
+    size = _size(lines, right - left, _MAX_LETTER)
+    is_above = stop >= (top + bottom) / 2
     start = top + 1.2 * size if is_above else bottom - size * (1.15 * (len(lines) - 1) + 0.5)
     for number, line in enumerate(lines):
         yield _text(middle, start + 1.15 * size * number, size, line, "name")
-    met = [shortened(one, MOST_LETTERS) for one in finds[-MOST_FINDS:]]
-    small = _size(met or [""], right - left, SMALL)
-    named, found = size * (1.15 * len(lines) + 0.35), small * 1.15 * len(met)
-    is_beside = max(stands - top, bottom - stands) - HALO >= named + found
+    labels = [shortened(one, _MAX_LABEL_CHARACTERS) for one in finds[-_MAX_FINDS:]]
+    small = _size(labels or [""], right - left, _FIND_LETTER)
+    named, found = size * (1.15 * len(lines) + 0.35), small * 1.15 * len(labels)
+    fits = max(stop - top, bottom - stop) - _HALO_RADIUS >= named + found
     if is_above:
-        first = top + named + 0.85 * small if is_beside else bottom - found + 0.65 * small
+        first = top + named + 0.85 * small if fits else bottom - found + 0.65 * small
     else:
-        first = bottom - named - found + 0.85 * small if is_beside else top + 1.2 * small
-    for number, one in enumerate(met):
+        first = bottom - named - found + 0.85 * small if fits else top + 1.2 * small
+    for number, one in enumerate(labels):
         yield _text(middle, first + 1.15 * small * number, small, one, "find")
 
 
 def _size(lines: Sequence[str], width: float, largest: float) -> float:
-    fits = width * 0.92 / (WIDE * max(1, *map(len, lines)))
-    return max(SMALLEST, min(largest, fits))
+    size = width * 0.92 / (_LETTER_WIDTH * max(1, *map(len, lines)))
+    return max(_MIN_LETTER, min(largest, size))
 
 
 def _text(x: float, y: float, size: float, text: str, kind: str) -> str:
     return f'<text class="{kind}" x="{x:.2f}" y="{y:.2f}" font-size="{size:.2f}">{escape(text)}</text>'
 
 
-def _broken(name: str) -> list[str]:
-    """A name in one line, or in two of about the same length."""
+def _wrap(name: str) -> list[str]:
+    """Split a long name into two lines of similar length."""
     words = name.split()
     if len(words) < 2 or len(name) < 9:  # noqa: PLR2004 - two words, and longer than fits
         return [name]

@@ -1,8 +1,8 @@
-"""What all pages share: the bar with STOP, texts that stay texts, and how further pages are added."""
+"""The frame of all pages: the bar with STOP, plain texts and buttons, and the entry point for more pages."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -15,47 +15,39 @@ from nicegui.elements.mixins.text_element import TextElement
 from codebotler.core.terminal import note, visible_lines
 from codebotler.web.proxy import prefix_of
 
-HEAD = '<link rel="stylesheet" href="{prefix}/static/page.css">'
-BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
+_STYLESHEET_HTML = '<link rel="stylesheet" href="{prefix}/static/page.css">'
+_STOP_BAR_HTML = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
 <button id="stop" type="button" aria-keyshortcuts="Escape"><b>STOP</b><small>Esc</small></button></div>
 <script src="{prefix}/static/stop.js"></script>"""
-"""Both name files below the prefix of a proxy, which is empty without one."""
+ROBOT_LINKS = (("Robot", "/"), ("Missions", "/missions"))
+FACE_LINK = ("Face", "/face")
+_ENTRY_POINTS = "codebotler.pages"
+"""The entry point group for pages of other packages."""
 
-ROBOT = (("Robot", "/"), ("Missions", "/missions"))
-FACE = ("Face", "/face")
-GROUP = "codebotler.pages"
-"""The entry points of pages."""
-
-PATIENCE = 60.0
-"""Seconds that a page may take to build: a run is read when it is first opened."""
+PAGE_BUILD_SECONDS = 60.0
+"""The time limit for building a page, which may have to read a run first."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Puts the bar on a page; STOP works without the rest of the page.
+    """Adds the bar to a page; STOP works without the rest of the page.
 
     Args:
-        links: names and addresses of pages, in order.
+        links: the names and addresses of pages, in order.
         brand: the name in the bar.
-        has_robot: whether there is a robot to stop.
+        has_robot: whether to show STOP.
     """
 
-    links: tuple[tuple[str, str], ...] = ROBOT
+    links: tuple[tuple[str, str], ...] = ROBOT_LINKS
     brand: str = "CodeBotler"
     has_robot: bool = True
 
     def __call__(self, title: str, here: str, parts: Sequence[tuple[str, str]] = ()) -> None:
-        """Begin a page.
-
-        Args:
-            title: of the page.
-            here: the address that is marked in the bar.
-            parts: names and addresses within the page, for screens that show its panes one below another.
-        """
+        """Begin a page; the bar marks the address `here`, and on small screens links to `parts`."""
         ui.page_title(f"{title} · {self.brand}")
-        ui.add_head_html(HEAD.format(prefix=outside("")))
+        ui.add_head_html(_STYLESHEET_HTML.format(prefix=outside("")))
         if self.has_robot:
-            ui.add_body_html(BAR.format(prefix=outside("")))
+            ui.add_body_html(_STOP_BAR_HTML.format(prefix=outside("")))
         with ui.element("header").classes("bar" if self.has_robot else "bar no-stop"):
             html.a(self.brand, href=outside("/")).classes("brand")
             if parts:
@@ -70,25 +62,17 @@ class Frame:
 
 
 def outside(address: str) -> str:
-    """An address of ours as the browser of this page knows it: behind a proxy, it may have a prefix.
-
-    Args:
-        address: a path from the root.
-    """
+    """Return the address that the browser must use for a path: behind a proxy, it may have a prefix."""
     request = ui.context.client.request
     return prefix_of(request.scope) + address
 
 
 def script(name: str) -> None:
-    """Add a script from our files to the page.
-
-    Args:
-        name: of the file.
-    """
+    """Add one of our scripts to the page, given its file name."""
     ui.add_head_html(f'<script src="{outside("/static")}/{name}"></script>')
 
 
-# --- texts and buttons, shown as text and never as markup, with hidden characters written out
+# --- texts are never interpreted as markup, and hidden characters are escaped
 
 
 class PlainText(TextElement):
@@ -108,12 +92,12 @@ class PlainText(TextElement):
 
 
 def scroll_up() -> None:
-    """Show the first pane, where panes stand one below another."""
+    """Scroll to the first pane, if the panes form one column."""
     ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
 
 
 def scroll_to(element: str) -> None:
-    """Show the element with an ID from its beginning."""
+    """Scroll to the element with an ID."""
     ui.run_javascript(f"document.getElementById({element!r}).scrollIntoView()")
 
 
@@ -123,22 +107,19 @@ def warn(sentence: str, seconds: float = 5.0) -> None:
 
 
 class Button(PlainText):
-    """A button that calls a function when it is pressed."""
+    """A button that calls a function."""
 
     def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "") -> None:
         super().__init__("button", text, kind)
         self.props("type=button")
         self.on("click", pressed)
-        self._may = True
 
     def allow(self, may: bool) -> None:  # noqa: FBT001 - one word after the verb
         """Enable or disable it."""
-        if may != self._may:
-            self._may = may
-            if may:
-                self.props(remove="disabled")
-            else:
-                self.props("disabled")
+        if may:
+            self.props(remove="disabled")
+        else:
+            self.props("disabled")
 
 
 # --- pages of other packages
@@ -146,11 +127,11 @@ class Button(PlainText):
 
 @dataclass(frozen=True)
 class Site:
-    """What further pages are added to; the guard protects them too, and keeps faces out.
+    """The site to which other packages add pages; the guard protects these, too, and excludes faces.
 
     Args:
-        app: takes further addresses: of the API below `/api/`, of files below `/static/`.
-        frame: to be called first on each page.
+        app: the application: API paths belong below `/api/`, files below `/static/`.
+        frame: call it first on each page.
         runs: the folder of runs.
     """
 
@@ -164,10 +145,10 @@ class Pages:
     """Pages that another package adds.
 
     Args:
-        name: in the bar.
-        brand: the name of the site where there are no other pages.
-        address: of the first page.
-        add: adds the pages.
+        name: the name in the bar.
+        brand: the name of the site if it has no other pages.
+        address: the address of the first page.
+        add: adds the pages to a site.
     """
 
     name: str
@@ -177,17 +158,15 @@ class Pages:
 
 
 def installed_pages() -> tuple[Pages, ...]:
-    """The pages that installed packages add; those that cannot be loaded are noted and left out."""
-    return tuple(_loaded())
-
-
-def _loaded() -> Iterator[Pages]:
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+    """Load the pages of installed packages; those that fail are reported and left out."""
+    found: list[Pages] = []
+    for point in sorted(entry_points(group=_ENTRY_POINTS), key=lambda point: point.name):
         try:
             pages = point.load()
             if not isinstance(pages, Pages):
-                raise TypeError(f"{point.value} is not an instance of Pages")  # noqa: TRY301 - noted like all else
-        except Exception as error:  # noqa: BLE001 - no package keeps an operator from the robot
+                raise TypeError(f"{point.value} is not an instance of Pages")  # noqa: TRY301 - reported below
+        except Exception as error:  # noqa: BLE001 - no package may keep operators from the robot
             note(f'the pages "{point.name}" cannot be added: {error}')
         else:
-            yield pages
+            found.append(pages)
+    return tuple(found)

@@ -1,4 +1,4 @@
-"""Middleware: accepts or refuses each request by host, origin, token and size; sets security headers."""
+"""Middleware that checks the host, origin, token and size of each request, and sets security headers."""
 
 from __future__ import annotations
 
@@ -20,24 +20,23 @@ from codebotler.core.terminal import note
 from codebotler.web.access import GuardRules, Role, TooManyTriesError
 from codebotler.web.proxy import OuterAddress, path_of, prefix_of
 
-MOST_BYTES = 2_000_000
-"""The largest body of a request."""
+MAX_BODY_BYTES = 2_000_000
+"""The limit for the body of a request."""
 
-CHANGES_NOTHING = frozenset({"GET", "HEAD", "OPTIONS"})
-FOR_FACES = ("/face", "/api/face", "/static", "/favicon.ico")
-"""What a face may open: not NiceGUI's websocket, which takes messages for any page by its number."""
+_SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+_FACE_PATHS = ("/face", "/api/face", "/static", "/favicon.ico")
+"""The paths for faces; NiceGUI's websocket would accept messages for any page by its number."""
 
-POLICY = (
+_PAGE_POLICY = (
     "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data:; font-src 'self'; connect-src 'self'; manifest-src 'self'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
 )
-"""`unsafe-eval` and inline styles are what NiceGUI needs: Vue builds its templates and handlers in the
-browser, Quasar and CodeMirror write styles. The guard writes a nonce into each page because NiceGUI puts the
-page's own content into inline scripts, so no hash is known beforehand, and it has no option for nonces."""
+"""NiceGUI needs `unsafe-eval`, because Vue compiles templates in the browser, and inline styles for Quasar
+and CodeMirror. Inline scripts get a nonce, because their content, and so their hash, varies."""
 
-PLAIN_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
-HEADERS = {
+_REFUSAL_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
+_SECURITY_HEADERS = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "x-frame-options": "DENY",
@@ -45,29 +44,29 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), geolocation=(), payment=(), usb=(), microphone=(self)",
 }
-HOST = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
-"""A name or an address and any port, since a tunnel or a proxy in front has a port of its own."""
+_HOST_HEADER = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
+"""Any port, because a tunnel or a proxy has its own."""
 
-MOST_PORT = 65_535
-CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
-SCRIPT = re.compile(rb"<script(?=[\s>])")
-NO_SCRIPT = "script-src 'none'"  # in a page's own policy: no script in it is marked as ours
+_MAX_PORT = 65_535
+_CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+_SCRIPT_TAG = re.compile(rb"<script(?=[\s>])")
+_NO_SCRIPT = "script-src 'none'"  # pages with this policy get no nonce
 
-NO_CONTROL = "there is no such page: addresses here have no control characters"
+_NO_CONTROL_CHARACTERS = "there is no such page; addresses cannot contain control characters"
 NO_PAGE = "there is no such page"
-WRONG = "this token is wrong"
-OTHER_SITE = "this request came from another site, which is not allowed"
-HOST_LOST = "the proxy in front must pass on the header Host as the browser sent it"
-TOO_LARGE = f"at most {MOST_BYTES:,} bytes are accepted"
+_WRONG = "this token is wrong"
+_OTHER_SITE = "this request came from another site, which is not allowed"
+_HOST_CHANGED = "the proxy must pass on the browser's Host header unchanged"
+_BODY_TOO_LARGE = f"this request is too large; the limit is {MAX_BODY_BYTES:,} bytes"
 
-REFUSAL = """<!doctype html><html lang="en"><meta charset="utf-8">
+_REFUSAL_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{brand}</title>
 <style>body{{font:18px/1.5 system-ui,sans-serif;color-scheme:light dark;max-width:34rem;margin:20vh auto;
 padding:0 1.5rem}}h1{{font-size:1.4rem}}</style><h1>{brand}</h1><p>{sentence}</p></html>"""
 
 
 class RefusedError(Exception):
-    """A request that is refused, with the status and a sentence that says why."""
+    """A request is refused, with a status and a reason."""
 
     def __init__(self, status: HTTPStatus, sentence: str) -> None:
         super().__init__(status, sentence)
@@ -75,14 +74,14 @@ class RefusedError(Exception):
 
 
 class Guard:
-    """ASGI middleware that lets a request through or refuses it."""
+    """ASGI middleware that accepts or refuses requests."""
 
     def __init__(self, app: ASGIApp, rules: GuardRules, has_page: Callable[[str], bool]) -> None:
         self._app, self._rules, self._has_page = app, rules, has_page
         self._has_noted = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request through, or refuse it."""
+        """Accept or refuse a request."""
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
@@ -107,53 +106,51 @@ class Guard:
             return
         scope.setdefault("state", {})["role"] = role
         if is_http:
-            await _LimitedBody(receive, send).run(self._app, scope)
+            limited = _LimitedBody(scope, receive, send)
+            await self._app(scope, limited.receive, limited.send)
         else:
             await self._app(scope, receive, send)
 
     def _check_path(self, path: str) -> None:
-        if CONTROL.search(path) and not self._has_page(path):  # names that people gave may have them
-            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
+        if _CONTROL_CHARACTERS.search(path) and not self._has_page(path):  # names of runs may have them
+            raise RefusedError(HTTPStatus.BAD_REQUEST, _NO_CONTROL_CHARACTERS)
 
     def _check_host(self, request: HTTPConnection) -> None:
-        """Refuse other names: a foreign page whose name leads here (DNS rebinding) calls us by that name."""
+        """Refuse unknown host names, which a foreign page could use to reach us (DNS rebinding)."""
         name = _host(request)
         if name not in self._rules.hosts and not (self._rules.any_address and _is_address(name)):
             raise RefusedError(
                 HTTPStatus.MISDIRECTED_REQUEST,
-                "this server does not use that host name; open the printed link, or add the name with --name "
-                "or --behind-proxy",
+                "unknown host name; open the printed link, or add the name with --name or --behind-proxy",
             )
 
     def _check_origin(self, request: HTTPConnection, proxy: OuterAddress | None) -> None:
-        """Refuse foreign pages, which may neither change anything nor listen."""
+        """Refuse requests from foreign pages."""
         headers, is_socket = request.headers, request.scope["type"] == "websocket"
         origin = headers.get("origin")
         host = headers.get("host", "") if proxy is None else proxy.host
         if origin is not None and not _is_same(origin, host, request.scope):
             raise RefusedError(HTTPStatus.FORBIDDEN, self._why_not(origin.lower(), request, proxy))
-        changes = is_socket or request.scope["method"] not in CHANGES_NOTHING
+        changes = is_socket or request.scope["method"] not in _SAFE_METHODS
         from_browser = "cookie" in headers or is_socket
         if changes and origin is None and from_browser and "authorization" not in headers:
-            raise RefusedError(HTTPStatus.FORBIDDEN, "a browser must send the header Origin")
+            raise RefusedError(HTTPStatus.FORBIDDEN, "browsers must send the Origin header")
         navigates = headers.get("sec-fetch-mode") == "navigate"
         if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
-            raise RefusedError(HTTPStatus.FORBIDDEN, OTHER_SITE)
+            raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)
 
     def _why_not(self, origin: str, request: HTTPConnection, proxy: OuterAddress | None) -> str:
-        """Say what to do about an origin that is not ours, if it is that of a proxy in front."""
+        """Explain a foreign origin, which may be that of a proxy."""
         outer = OuterAddress.found_in(origin)
         is_our_page = request.headers.get("sec-fetch-site") == "same-origin"
         if outer is None or not (is_our_page or outer.name == _host(request)):
-            return OTHER_SITE
+            return _OTHER_SITE
         if proxy is not None:
             return f"open this page at {proxy.page}"
         if outer.host in self._rules.proxies:
-            return HOST_LOST
-        sentence = (
-            f"if a proxy is in front, start with --behind-proxy {outer.origin}, followed by its path if any"
-        )
-        if not self._has_noted:  # once, since the browser shows a page that has lost its connection
+            return _HOST_CHANGED
+        sentence = f"behind a proxy, start with --behind-proxy {outer.origin}, plus its path, if any"
+        if not self._has_noted:  # in the terminal, because the browser only shows a lost connection
             self._has_noted = True
             note(f"a request was refused: {sentence}")
         return sentence
@@ -164,7 +161,7 @@ class Guard:
         if kind.lower() == "bearer" and given:
             role = self._of_token(given.strip(), request)
             if role is None:
-                raise RefusedError(HTTPStatus.UNAUTHORIZED, WRONG)
+                raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
             return role
         role = access.of_cookie(request.cookies.get(self._rules.cookie, ""))
         return Role.OPERATOR if role is None and access.operator is None else role
@@ -178,19 +175,21 @@ class Guard:
             ) from None
 
     def _let_in(self, token: str, request: HTTPConnection) -> Response:
-        """Exchange a token in the link for a cookie, so that no history keeps it."""
+        """Exchange the token of a link for a cookie, to keep it out of the history."""
         role = self._of_token(token, request)
         if role is None and self._rules.access.operator is not None:
-            raise RefusedError(HTTPStatus.UNAUTHORIZED, WRONG)
-        path = "/" + path_of(request.scope).strip("/")  # two slashes would begin the name of another host
-        if CONTROL.search(path):
-            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
-        if normpath(path) != path or not self._has_page(path):  # browsers follow ".."
+            raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
+        path = "/" + path_of(request.scope).strip("/")  # a double slash would start a host name
+        if _CONTROL_CHARACTERS.search(path):
+            raise RefusedError(HTTPStatus.BAD_REQUEST, _NO_CONTROL_CHARACTERS)
+        if normpath(path) != path or not self._has_page(path):  # browsers resolve ".."
             raise RefusedError(HTTPStatus.NOT_FOUND, NO_PAGE)
         rest = [(name, value) for name, value in request.query_params.multi_items() if name != "token"]
         prefix = prefix_of(request.scope)
         where = prefix + quote(path) + (f"?{urlencode(rest)}" if rest else "")
-        answer = RedirectResponse(where, HTTPStatus.SEE_OTHER, {**HEADERS, "cache-control": "no-store"})
+        answer = RedirectResponse(
+            where, HTTPStatus.SEE_OTHER, {**_SECURITY_HEADERS, "cache-control": "no-store"}
+        )
         answer.headers["location"] = where
         if role is not None:
             value = self._rules.access.cookie(role)
@@ -207,17 +206,16 @@ class Guard:
 
 
 def _named_host(scope: Scope) -> str:
-    """What the only `Host` says; empty where there are none or more."""
+    """The value of the only Host header; empty if there are none or several."""
     named = [value for name, value in scope["headers"] if name == b"host"]
     return named[0].decode("latin-1").lower() if len(named) == 1 else ""
 
 
 def _host(request: HTTPConnection) -> str:
-    """The name by which the page was called."""
-    named = [host.lower() for host in request.headers.getlist("host")]
-    found = HOST.fullmatch(named[0]) if len(named) == 1 else None
-    if found is None or not 0 < int(found[3] or 80) <= MOST_PORT:
-        raise RefusedError(HTTPStatus.BAD_REQUEST, "send the header Host once, with a name and a port")
+    """The requested host name."""
+    found = _HOST_HEADER.fullmatch(_named_host(request.scope))
+    if found is None or not 0 < int(found[3] or 80) <= _MAX_PORT:
+        raise RefusedError(HTTPStatus.BAD_REQUEST, "send exactly one Host header, with a name and a port")
     return found[1] or found[2]
 
 
@@ -230,12 +228,11 @@ def _is_address(name: str) -> bool:
 
 
 def _is_same(origin: str, host: str, scope: Scope) -> bool:
-    secure = scope["scheme"] in {"https", "wss"}
-    return origin.lower() == f"http{'s' if secure else ''}://{host.lower()}"
+    secure = "s" if scope["scheme"] in {"https", "wss"} else ""
+    return origin.lower() == f"http{secure}://{host.lower()}"
 
 
 def _token_in_link(request: HTTPConnection) -> str | None:
-    """The token in the link of a page."""
     if path_of(request.scope).startswith(("/api/", "/_nicegui")):
         return None
     return request.query_params.get("token")
@@ -243,65 +240,59 @@ def _token_in_link(request: HTTPConnection) -> str | None:
 
 def _check_role(role: Role | None, path: str) -> None:
     if role is None:
-        raise RefusedError(
-            HTTPStatus.UNAUTHORIZED, "open the link that was printed at the start; it contains the token"
-        )
-    if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in FOR_FACES):
-        raise RefusedError(HTTPStatus.FORBIDDEN, "this link opens only the robot's face")
+        raise RefusedError(HTTPStatus.UNAUTHORIZED, "open the printed link, which contains the token")
+    if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in _FACE_PATHS):
+        raise RefusedError(HTTPStatus.FORBIDDEN, "your link opens only the robot's face")
 
 
 def _check_length(request: HTTPConnection) -> None:
     length = request.headers.get("content-length", "0")
-    if not length.isascii() or not length.isdigit() or int(length) > MOST_BYTES:
-        raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, TOO_LARGE)
+    if not length.isascii() or not length.isdigit() or int(length) > MAX_BODY_BYTES:
+        raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _BODY_TOO_LARGE)
 
 
 class _LimitedBody:
-    """Cuts off a request whose body is too large, and adds the headers that browsers obey to the answer."""
+    """Cuts off a request body that is too large, and adds security headers to the response."""
 
-    def __init__(self, receive: Receive, send: Send) -> None:
-        self._receive, self._send = receive, send
+    def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._scope, self._receive, self._send = scope, receive, send
         self._length = 0
         self._nonce = secrets.token_urlsafe(16)
         self._is_page = self._is_refused = False
 
-    async def run(self, app: ASGIApp, scope: Scope) -> None:
-        self._scope = scope
-        await app(scope, self.receive, self.send)
-
     async def receive(self) -> Message:
         message = await self._receive()
         self._length += len(message.get("body", b""))
-        return {"type": "http.disconnect"} if self._length > MOST_BYTES else message
+        return {"type": "http.disconnect"} if self._length > MAX_BODY_BYTES else message
 
     async def send(self, message: Message) -> None:
         if self._is_refused:
             return
         if message["type"] == "http.response.start":
-            if self._length > MOST_BYTES:
+            if self._length > MAX_BODY_BYTES:
                 self._is_refused = True
-                error = RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, TOO_LARGE)
+                error = RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _BODY_TOO_LARGE)
                 answer = _refusal(HTTPConnection(self._scope), error)
-                answer.headers["connection"] = "close"  # the rest of the body is not read
+                answer.headers["connection"] = "close"  # the rest of the body is unread
                 await answer(self._scope, self._receive, self._send)
                 return
             headers = MutableHeaders(raw=list(message["headers"]))
             own = headers.get("content-security-policy", "")
-            self._is_page = headers.get("content-type", "").startswith("text/html") and NO_SCRIPT not in own
+            self._is_page = headers.get("content-type", "").startswith("text/html") and _NO_SCRIPT not in own
             if self._is_page:
                 del headers["content-length"]
-            for name, value in HEADERS.items():
+            for name, value in _SECURITY_HEADERS.items():
                 headers[name] = value
-            headers.append("content-security-policy", POLICY.format(nonce=self._nonce))
+            headers.append("content-security-policy", _PAGE_POLICY.format(nonce=self._nonce))
             message = {**message, "headers": headers.raw}
         elif self._is_page and message["type"] == "http.response.body":
-            marked = SCRIPT.sub(f'<script nonce="{self._nonce}"'.encode(), message.get("body", b""))
+            marked = _SCRIPT_TAG.sub(f'<script nonce="{self._nonce}"'.encode(), message.get("body", b""))
             message = {**message, "body": marked}
         await self._send(message)
 
 
 def _refusal(request: HTTPConnection, error: RefusedError) -> Response:
-    headers = {**HEADERS, "content-security-policy": PLAIN_POLICY, "cache-control": "no-store"}
+    headers = {**_SECURITY_HEADERS, "content-security-policy": _REFUSAL_POLICY, "cache-control": "no-store"}
     if error.status is HTTPStatus.UNAUTHORIZED:
         headers["www-authenticate"] = "Bearer"
     if error.status is HTTPStatus.TOO_MANY_REQUESTS:
@@ -316,7 +307,7 @@ def refusal(
     headers: Mapping[str, str],
     brand: str = "CodeBotler",
 ) -> Response:
-    """An answer with one sentence: a page for browsers, else JSON."""
+    """Return one sentence, as a page for browsers, else as JSON."""
     if "text/html" in request.headers.get("accept", ""):
-        return HTMLResponse(REFUSAL.format(sentence=sentence, brand=brand), status, headers)
+        return HTMLResponse(_REFUSAL_PAGE.format(sentence=sentence, brand=brand), status, headers)
     return JSONResponse({"detail": sentence}, status, headers)

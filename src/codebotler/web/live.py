@@ -1,4 +1,4 @@
-"""Pages that follow what changes."""
+"""Live updates of pages."""
 
 from __future__ import annotations
 
@@ -9,24 +9,19 @@ from nicegui import background_tasks, ui
 
 from codebotler.web.console import Notifier
 
-PAUSE = 0.1
-"""Seconds between two updates of a page, however often something changes."""
+_UPDATE_PAUSE = 0.1
+"""The shortest time between two updates of a page, in seconds."""
 
 
 async def follow(notifier: Notifier, update: Callable[[], Awaitable[None]]) -> None:
-    """Wait for the browser, and from then on update the page that is being built, for as long as it is open.
-
-    Args:
-        notifier: says when something has changed.
-        update: brings the page up to date; it is called once at the beginning.
-    """
+    """Wait for the browser, then call `update` now and at each change while the page is open."""
     client, here = ui.context.client, ui.context.slot.parent
     await client.connected()
 
-    async def following() -> None:
+    async def update_at_changes() -> None:
         async for _ in notifier.changes():
             with here:
                 await update()
-            await asyncio.sleep(PAUSE)
+            await asyncio.sleep(_UPDATE_PAUSE)
 
-    client.on_delete(background_tasks.create(following()).cancel)
+    client.on_delete(background_tasks.create(update_at_changes()).cancel)

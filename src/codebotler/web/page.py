@@ -1,4 +1,4 @@
-"""The operator's page: its three panes, updated at each change."""
+"""The operator's page with its three panes."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from nicegui import ui
 
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
-from codebotler.web.frame import PATIENCE, Frame, PlainText
+from codebotler.web.frame import PAGE_BUILD_SECONDS, Frame, PlainText
 from codebotler.web.live import follow
 from codebotler.web.panes import mission_list, past_mission
 from codebotler.web.panes.instruction import InstructionPane
 from codebotler.web.panes.program import ProgramPane
 from codebotler.web.panes.robot import RobotPane
 
-PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h-status"))
+_PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h-status"))
 
 
 def add(console: Console, frame: Frame) -> None:
     """Add the operator's pages."""
 
-    @ui.page("/", response_timeout=PATIENCE)
+    @ui.page("/", response_timeout=PAGE_BUILD_SECONDS)
     async def operate() -> None:
-        frame("Robot", "/", PARTS)
+        frame("Robot", "/", _PARTS)
         PlainText("h1", "Operate the robot", "unseen")
         with ui.element("div") as box:
             instruction = InstructionPane(console)
@@ -29,7 +29,7 @@ def add(console: Console, frame: Frame) -> None:
 
         def show() -> None:
             view = console.view
-            box.classes(replace=f"operate to-{_next(view)}")
+            box.classes(replace=f"operate to-{_next_step(view)}")
             for pane in panes:
                 pane.show(view)
 
@@ -46,8 +46,8 @@ def add(console: Console, frame: Frame) -> None:
     past_mission.add(console, frame)
 
 
-def _next(view: SessionView) -> str:
-    """What an operator does next, by which a small screen orders its panes."""
+def _next_step(view: SessionView) -> str:
+    """The operator's next step, which determines the order of panes on small screens."""
     if view.is_running:
         return "watch"
     if not view.is_over:

@@ -1,4 +1,4 @@
-"""Addresses of the page behind a reverse proxy, and requests as the browser sent them to it."""
+"""Addresses of the page at reverse proxies, and the requests that these pass on."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.chosen import ConfigFile
 
-ORIGIN = re.compile(
+_ADDRESS = re.compile(
     r"(?P<scheme>https?)://(?P<host>[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::0*(?P<port>[1-9]\d{0,4}))?"
     r"(?P<prefix>(?:/(?!\.{1,2}(?:/|$))[\w.~-]+)*)/?",
     re.IGNORECASE | re.ASCII,
 )
-PORTS: Mapping[str, str] = {"https": "443", "http": "80"}
-SECURE: Mapping[str, str] = {"http": "https", "ws": "wss"}
-FORWARDED_PREFIX = b"x-forwarded-prefix"  # NiceGUI would add it to the prefix, which the option names
-LONGEST = 80  # characters of a wrong address that a message quotes
+_SCHEME_PORTS: Mapping[str, str] = {"https": "443", "http": "80"}
+_SECURE_SCHEMES: Mapping[str, str] = {"http": "https", "ws": "wss"}
+_FORWARDED_PREFIX = b"x-forwarded-prefix"  # NiceGUI would add it to the prefix from --behind-proxy
+_MAX_QUOTED = 80  # characters
 
 
 @dataclass(frozen=True)
 class OuterAddress:
-    """The address of the page in front of a reverse proxy.
+    """The address of the page at a reverse proxy.
 
     Args:
         scheme: https or http.
-        host: name and port, as browsers write it in `Host`; without the scheme's own port.
-        prefix: the path at which the proxy offers the page, such as /robot, or empty.
+        host: the name and port, as in the Host header, without the scheme's default port.
+        prefix: the path of the page, such as /robot, or empty.
     """
 
     scheme: str
@@ -42,35 +42,31 @@ class OuterAddress:
 
     @classmethod
     def parse(cls, text: str) -> OuterAddress:
-        """The address that a text names, such as https://host:8443/robot.
-
-        Raises:
-            UserError: it is none.
-        """
+        """Parse an address such as https://host:8443/robot; raises UserError if it is invalid."""
         address = cls.found_in(text)
         if address is None:
-            quoted = f'"{both_ends(text, LONGEST)}" is no address of a proxy'
-            raise UserError(f"{quoted}; write https://HOST, with :PORT and /PATH if it has them")
+            quoted = f'"{both_ends(text, _MAX_QUOTED)}" is not the address of a proxy'
+            raise UserError(f"{quoted}; write https://HOST, plus :PORT and /PATH, if any")
         return address
 
     @classmethod
     def found_in(cls, text: str) -> OuterAddress | None:
-        """The address that a text names; None if it names none."""
-        found = ORIGIN.fullmatch(text)
+        """Parse an address; return None if it is invalid."""
+        found = _ADDRESS.fullmatch(text)
         if found is None:
             return None
         scheme, port = found["scheme"].lower(), found["port"]
-        suffix = "" if port in {None, PORTS[scheme]} else f":{port}"
+        suffix = "" if port in {None, _SCHEME_PORTS[scheme]} else f":{port}"
         return cls(scheme, found["host"].lower() + suffix, found["prefix"])
 
     @property
     def name(self) -> str:
-        """The name of the host, or its address, without a port."""
-        return name_of(self.host)
+        """The name or numeric address of the host."""
+        return host_name(self.host)
 
     @property
     def origin(self) -> str:
-        """What browsers send as `Origin`."""
+        """The Origin header that browsers send."""
         return f"{self.scheme}://{self.host}"
 
     @property
@@ -79,17 +75,18 @@ class OuterAddress:
         return f"{self.origin}{self.prefix}/"
 
     def seen_from_outside(self, scope: Scope) -> dict[str, Any]:
-        """A request that the proxy passed on, with the scheme and the path that the browser sent.
-
-        It does not matter whether the proxy removed the prefix from the path.
-        """
+        """Return a request with the browser's scheme and path, even if the proxy removed the prefix."""
         path, raw = scope["path"], scope.get("raw_path") or b""
         if self.prefix and path != self.prefix and not path.startswith(f"{self.prefix}/"):
             path, raw = self.prefix + path, self.prefix.encode() + raw
         if path == self.prefix:
             path, raw = f"{path}/", raw + b"/"
-        headers = [(name, value) for name, value in scope["headers"] if name != FORWARDED_PREFIX]
-        secure = SECURE.get(scope["scheme"], scope["scheme"]) if self.scheme == "https" else scope["scheme"]
+        headers = [(name, value) for name, value in scope["headers"] if name != _FORWARDED_PREFIX]
+        secure = (
+            _SECURE_SCHEMES.get(scope["scheme"], scope["scheme"])
+            if self.scheme == "https"
+            else scope["scheme"]
+        )
         return {
             **scope,
             "path": path,
@@ -101,28 +98,17 @@ class OuterAddress:
 
 
 def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
-    """The addresses that texts name, each once.
-
-    Raises:
-        UserError: one is no address, or two have the same host.
-    """
+    """Parse addresses; raises UserError if one is invalid, or two have the same host."""
     found = tuple(dict.fromkeys(map(OuterAddress.parse, texts)))
     hosts = [address.host for address in found]
     for address in found:
         if hosts.count(address.host) > 1:
-            raise UserError(f"--behind-proxy names {address.host} twice; one address for each host and port")
+            raise UserError(f"--behind-proxy names {address.host} twice; use one address per host and port")
     return found
 
 
 def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
-    """The addresses that the command line names, or else those of config.yaml.
-
-    Args:
-        given: what the command line names.
-
-    Raises:
-        UserError: one is no address, two have the same host, or config.yaml is wrong.
-    """
+    """Return the addresses from the command line, or else from config.yaml; raises UserError if invalid."""
     file = config_file()
     if given or file is None or not file.is_file():
         return outer_addresses(given or ())
@@ -133,29 +119,29 @@ def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
         raise error if error.file else config.wrong(error.sentence, "behind_proxy") from None
 
 
-def by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
-    """Addresses by what `Host` may say: some clients write the scheme's own port, too."""
+def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
+    """Index addresses by Host header; some clients add the scheme's default port."""
     found: dict[str, OuterAddress] = {}
     for address in addresses:
         found[address.host] = address
         if ":" not in address.host.rpartition("]")[2]:
-            found[f"{address.host}:{PORTS[address.scheme]}"] = address
+            found[f"{address.host}:{_SCHEME_PORTS[address.scheme]}"] = address
     return MappingProxyType(found)
 
 
-def name_of(host: str) -> str:
-    """A host without its port, and without the brackets of a numeric address."""
+def host_name(host: str) -> str:
+    """Return a host without its port and brackets."""
     bare = host[: host.rindex("]") + 1] if "]" in host else host.partition(":")[0]
     return bare.strip("[]")
 
 
 def prefix_of(scope: Mapping[str, Any]) -> str:
-    """The path at which the proxy offers the page; empty without one."""
-    prefix: str = scope.get("app_root_path", scope.get("root_path", ""))  # a mounted app has its own root
+    """Return the path of the page at the proxy; empty without one."""
+    prefix: str = scope.get("app_root_path", scope.get("root_path", ""))  # a mounted app changes root_path
     return prefix
 
 
 def path_of(scope: Mapping[str, Any]) -> str:
-    """The path of a request, without the prefix of a proxy."""
+    """Return the path of a request, without the prefix of a proxy."""
     path: str = scope["path"]
     return path.removeprefix(prefix_of(scope))

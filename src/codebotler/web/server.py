@@ -1,4 +1,4 @@
-"""Serves the page and its API on a port, behind the guard, and prints the link that opens it."""
+"""Serves the page and its API behind the guard, and prints the link that opens it."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
 from codebotler.core.words import listed
-from codebotler.missions.mission import SHUTTING_DOWN
+from codebotler.missions.mission import BY_SHUTDOWN
 from codebotler.web import api, face, page
 from codebotler.web.access import Access, PageAddress, Role
 from codebotler.web.console import Console
-from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
-from codebotler.web.guard import MOST_BYTES, NO_PAGE, Guard, refusal
+from codebotler.web.frame import FACE_LINK, ROBOT_LINKS, Frame, Pages, Site
+from codebotler.web.guard import MAX_BODY_BYTES, NO_PAGE, Guard, refusal
 from codebotler.web.proxy import path_of
 
-STATIC = Path(__file__).with_name("static")
-LEAVING = "CodeBotler, since the last operator closed the page"
-RUNS = Path("runs")
-METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
-SOCKETS = "/_nicegui_ws/"
-"""Where the page of an operator holds a websocket open for as long as it is shown."""
+STATIC_FOLDER = Path(__file__).with_name("static")
+BY_LEAVING = "CodeBotler, because the last operator closed the page"
+RUNS_FOLDER = Path("runs")
+_HTTP_METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
+_PAGE_SOCKETS = "/_nicegui_ws/"
+"""An operator's page keeps a websocket open below this path."""
 
-LINGER = 3
-"""Seconds that streams have to end when the server stops."""
+_STREAM_END_SECONDS = 3
+"""The time for streams to end when the server stops."""
 
 
 def serve(
@@ -51,31 +51,31 @@ def serve(
     place: PageAddress,
     access: Access,
     further: Sequence[Pages] = (),
-    runs: Path = RUNS,
+    runs: Path = RUNS_FOLDER,
     *,
     alone_for: float | None = None,
 ) -> None:
-    """Serve the page, or without a console only further pages, until Ctrl-C, which stops a running robot.
+    """Serve the page, or without a console only other pages, until Ctrl-C, which also stops a running robot.
 
-    `alone_for` seconds after the last operator left, a running robot is stopped, too; None means never.
+    A running robot is also stopped `alone_for` seconds after the last operator left; None means never.
     """
-    with place.listening() as bound, console or nullcontext():
+    with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]
         pages = application(console, further, runs)
         _check_prefixes(pages, place)
         app: ASGIApp = pages
         if console and alone_for is not None:
-            app = Presence(app, alone_for, partial(console.stop, LEAVING, only_moving=True))
+            app = Presence(app, alone_for, partial(console.stop, BY_LEAVING, only_moving=True))
         guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
-            log_config=None,  # its log is noted like all else
+            log_config=None,  # its log goes to our own
             log_level=logging.WARNING,
             access_log=False,
             proxy_headers=False,
             server_header=False,
-            ws_max_size=MOST_BYTES,
-            timeout_graceful_shutdown=LINGER,
+            ws_max_size=MAX_BODY_BYTES,
+            timeout_graceful_shutdown=_STREAM_END_SECONDS,
         )
         note(_links(place, port, access, console))
         _Server(settings, console).run([bound])
@@ -96,32 +96,36 @@ def _links(place: PageAddress, port: int, access: Access, console: Console | Non
         lines.append("Other machines can open this link, too. The connection is not encrypted.\n")
     if console and console.face is not None:
         where = "here (--host lets other machines in)" if place.is_private else "on the robot's tablet"
-        lines.append(f"The robot's face cannot run anything. Open it {where}:\n")
+        lines.append(f"Open the robot's face, which cannot run programs, {where}:\n")
         lines += links("face", access.face)
     return "\n".join(lines)
 
 
 def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
-    """Refuse prefixes that begin like an address of ours, since proxies may or may not remove them."""
+    """Refuse prefixes that look like our own paths, because proxies may or may not remove them."""
     routes = (*app.routes, *nicegui.app.routes)
     own = {path.split("/")[1] for route in routes if (path := getattr(route, "path", ""))}
     for proxy in place.proxies:
         first = proxy.prefix.split("/")[1] if proxy.prefix else ""
         if first and first in own:
             raise UserError(
-                f"--behind-proxy {proxy.page}: the page itself uses /{first}; choose another path"
+                f"--behind-proxy {proxy.page}: /{first} is a path of the page; choose another one"
             )
 
 
-def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS) -> FastAPI:
-    """The page and its API, without the guard."""
+def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS_FOLDER) -> FastAPI:
+    """Create the application, without the guard."""
     links = tuple((pages.name, pages.address) for pages in further)
-    to_face = (FACE,) if console and console.face else ()
-    frame = Frame((*ROBOT, *to_face, *links)) if console else Frame(links, further[0].brand, has_robot=False)
+    to_face = (FACE_LINK,) if console and console.face else ()
+    frame = (
+        Frame((*ROBOT_LINKS, *to_face, *links))
+        if console
+        else Frame(links, further[0].brand, has_robot=False)
+    )
     app = FastAPI(
         title="CodeBotler",
         version=__version__,
-        description="What the page does, for programs.",
+        description="Controls missions, checks programs and describes the robot.",
         docs_url=None,
         redoc_url=None,
         openapi_url="/api/openapi.json",
@@ -133,29 +137,29 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
         page.add(console, frame)
     for pages in further:
         pages.add(Site(app, frame, runs))
-    app.add_exception_handler(RequestValidationError, api.refused)
-    app.mount("/static", StaticFiles(directory=STATIC))
-    core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard allows ours alone
+    app.add_exception_handler(RequestValidationError, api.invalid_request)
+    app.mount("/static", StaticFiles(directory=STATIC_FOLDER))
+    core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard only ours
     nicegui.app.config.socket_io_js_transports = ["websocket"]
     nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app, frame.brand))
     ui.run_with(
         app,
         title="CodeBotler",
-        favicon=STATIC / "icon.svg",
+        favicon=STATIC_FOLDER / "icon.svg",
         dark=None,
         language="en-US",
         tailwind=False,
         reconnect_timeout=20.0,
-        gzip_middleware_factory=None,  # the guard reads pages to mark their scripts
+        gzip_middleware_factory=None,  # the guard adds nonces to uncompressed pages
         show_welcome_message=False,
     )
     return app
 
 
 def _not_found(app: FastAPI, brand: str, request: Request, _error: Exception) -> Response:
-    """404, or 405 where NiceGUI took an address that the API has for another method."""
+    """Return 404, or 405 if the API has this path for another method."""
     status, sentence, headers = HTTPStatus.NOT_FOUND, NO_PAGE, {}
-    allowed = [method for method in METHODS if _is_taken(app.routes, method, path_of(request.scope))]
+    allowed = [method for method in _HTTP_METHODS if _is_taken(app.routes, method, path_of(request.scope))]
     if allowed:
         status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address accepts only {listed(allowed)}"
         headers = {"allow": ", ".join(allowed)}
@@ -172,9 +176,9 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
 
 
 class Presence:
-    """ASGI middleware behind the guard that calls `alone` when no operator's page was open for some seconds.
+    """ASGI middleware that calls `alone` after some seconds without an open operator's page.
 
-    It must return at once. A page that is reloaded is away for a moment.
+    The call must return at once. The delay covers reloads.
     """
 
     def __init__(self, app: ASGIApp, seconds: float, alone: Callable[[], object]) -> None:
@@ -183,9 +187,9 @@ class Presence:
         self._leaving: asyncio.TimerHandle | None = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, and count the pages that are open."""
+        """Pass a request on, and count open pages."""
         is_operator = scope.get("state", {}).get("role") is Role.OPERATOR
-        if not is_operator or scope["type"] != "websocket" or not path_of(scope).startswith(SOCKETS):
+        if not is_operator or scope["type"] != "websocket" or not path_of(scope).startswith(_PAGE_SOCKETS):
             await self._app(scope, receive, send)
             return
         self._pages += 1
@@ -200,7 +204,7 @@ class Presence:
 
 
 class _Server(uvicorn.Server):
-    """Stops the robot at a signal, before anything else ends."""
+    """Stops the robot first at a signal."""
 
     def __init__(self, config: uvicorn.Config, console: Console | None) -> None:
         super().__init__(config)
@@ -208,5 +212,5 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:
-            self._console.stop(SHUTTING_DOWN)
+            self._console.stop(BY_SHUTDOWN)
         super().handle_exit(sig, frame)

@@ -1,4 +1,4 @@
-"""Storyboards on the page: a strip for each kind of sampled world."""
+"""Storyboards on the page: one strip for each kind of sampled world."""
 
 from __future__ import annotations
 
@@ -16,62 +16,59 @@ from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event
 from codebotler.web.frame import PlainText
 
-MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
-LEFT_OUT = "…"  # instead of a room, where steps are left out
+_MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
+_LEFT_OUT = "…"  # replaces rooms in a shortened strip
 
 
 @dataclass(frozen=True)
-class Deed:
-    """Something that the robot does in a room."""
+class Action:
+    """An action of the robot in a room."""
 
-    kind: str  # `say`, `ask` and `answer` for what is spoken; else the event's
+    kind: str  # the event's, or `answer`
     text: str
-    step: int = field(default=0, compare=False)  # in the trace, from 1; 0 for an answer
+    step: int = field(default=0, compare=False)  # position in the trace, from 1; 0 for an answer
 
 
 @dataclass(frozen=True)
 class Scene:
     """A stay in a room."""
 
-    room: str  # for a drive that fails, the room that was asked for
-    deeds: tuple[Deed, ...] = ()
-    is_found: bool = True  # whether there is such a room
-    step: int = field(default=0, compare=False)  # of the drive there, from 1; 0 where the robot started
+    room: str  # the requested one if the drive fails
+    deeds: tuple[Action, ...] = ()
+    is_found: bool = True  # whether the room exists
+    step: int = field(default=0, compare=False)  # of the drive, in the trace, from 1; 0 at the start
 
 
 @dataclass(frozen=True)
 class Strip:
     """The scenes of one sampled world."""
 
-    world: str  # what it is like, as the first half of a sentence
+    world: str  # its description, as the first half of a sentence
     scenes: tuple[Scene, ...]
     ending: str
     ends_well: bool
 
 
 @dataclass(frozen=True)
-class Reached:
-    """How far a robot has come."""
+class RouteProgress:
+    """The progress of a robot along a strip."""
 
     visited: tuple[str, ...] = ()  # rooms
-    looks: tuple[tuple[str, bool], ...] = ()  # what it looked for, and whether it was found
-    answers: tuple[str | None, ...] = ()  # to its questions; None where one failed
+    looks: tuple[tuple[str, bool], ...] = ()  # objects, and whether they were found
+    answers: tuple[str | None, ...] = ()  # None for a question that failed
 
 
-NOWHERE = Reached()
-NONE_FITS = "What happened fits none of the imagined worlds; they are only examples."
+NO_PROGRESS = RouteProgress()
+_NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
 
 
-def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
-    """Draw what a robot would do, as far as a check found, and tick off the rooms that it has visited.
-
-    A strip that is no longer possible is folded.
-    """
+def draw_strips(check: Check, reached: RouteProgress = NO_PROGRESS) -> None:
+    """Draw what a robot would do according to a check; tick off visited rooms, and fold refuted strips."""
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
     if shown and all(number is None for number in numbers):
-        PlainText("p", NONE_FITS, "quiet unsure")
+        PlainText("p", _NO_STRIP_FITS, "quiet unsure")
     for strip, number_reached, is_folded in zip(shown, numbers, folded(numbers), strict=True):
         with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:
@@ -84,34 +81,32 @@ def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
 
 
 def folded(numbers: Sequence[int | None]) -> list[bool]:
-    """Whether each strip is folded: none is where none fits, since they are but some worlds."""
+    """Whether to fold each strip; if none matches, all are shown."""
     is_among_them = any(number is not None for number in numbers)
     return [is_among_them and number is None for number in numbers]
 
 
-def scenes_reached(strip: Strip, reached: Reached) -> int | None:
-    """How many drives of a strip the robot has made; None if it went, found or heard something else."""
-    is_whole = all(scene.room != LEFT_OUT for scene in strip.scenes)
-    if is_whole and not (_has_seen(strip, reached.looks) and _has_heard(strip, reached.answers)):
+def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
+    """The number of a strip's drives that the robot has made; None if its run differs from the strip."""
+    is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
+    seen = [look_text(*look) for look in reached.looks]
+    has_seen = _texts(strip, CHECK)[: len(seen)] == seen
+    if is_whole and not (has_seen and _has_heard(strip, reached.answers)):
         return None
     for number, room in enumerate(reached.visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
-        if scene is not None and scene.room == LEFT_OUT:
+        if scene is not None and scene.room == _LEFT_OUT:
             return number
-        if scene is None or scene.room != shortened(room, MOST_TEXT):
+        if scene is None or scene.room != shortened(room, _MAX_STEP_TEXT):
             return None
     return len(reached.visited)
 
 
-def _has_seen(strip: Strip, looks: Sequence[tuple[str, bool]]) -> bool:
-    return _texts(strip, CHECK)[: len(looks)] == [look_text(*look) for look in looks]
-
-
 def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
-    """Robots that hear people may return an option in another case and with blanks around it."""
-    heard = [NO_ANSWER if answer is None else shortened(answer, MOST_TEXT) for answer in answers]
-    told = _texts(strip, "answer")[: len(answers)]
-    return [text.strip().casefold() for text in told] == [text.strip().casefold() for text in heard]
+    # Speech recognition may change an option's case and add blanks.
+    heard = [NO_ANSWER if answer is None else shortened(answer, _MAX_STEP_TEXT) for answer in answers]
+    expected = _texts(strip, "answer")[: len(answers)]
+    return [text.strip().casefold() for text in expected] == [text.strip().casefold() for text in heard]
 
 
 def _texts(strip: Strip, kind: str) -> list[str]:
@@ -121,10 +116,7 @@ def _texts(strip: Strip, kind: str) -> list[str]:
 def draw_scene(
     scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False, anchor: str = ""
 ) -> None:
-    """Draw a stay in a room, and mark the steps whose numbers are wrong.
-
-    With an `anchor`, each step has it and its number as an id, to which links lead.
-    """
+    """Draw a stay in a room, and mark wrong steps; the id of a step is `anchor` and its number."""
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
     with ui.element("li").classes(" ".join(kinds)):
@@ -148,24 +140,24 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: Check) -> list[Strip]:
-    """One strip for each kind of world that makes a difference: those that show a problem first."""
+    """Return one strip for each outcome, those with problems first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
         different.setdefault((strip.scenes, strip.ending), (sample.number in check.showing, strip))
     ranked = sorted(different.values(), key=lambda each: (not each[0], not each[1].ends_well))
-    return [strip for _, strip in ranked[:MOST_STRIPS]]
+    return [strip for _, strip in ranked[:MAX_STRIPS]]
 
 
 def _strip(sample: Sample, check: Check) -> Strip:
     error = sample.outcome.error
     if sample.in_vain:
-        ending = "The robot waits or searches without success, which is not counted as a problem."
+        ending = "The robot waits or searches in vain; this does not count as a problem."
     elif error is not None:
-        ending = f"Fails: {shortened(error.message, MOST_TEXT)} ({shortened(error.kind)})"
+        ending = f"Fails: {shortened(error.message, _MAX_STEP_TEXT)} ({shortened(error.kind)})"
     else:
         ending = "Done."
-    world = shortened(f"If {sample.world}", MOST_WORLD) if sample.facts else ""
+    world = shortened(f"If {sample.world}", _MAX_WORLD_TEXT) if sample.facts else ""
     shown = scenes(steps_of(sample.outcome.trace, has_places=True), check.room_map.start)
     return Strip(world, shown, ending, error is None or sample.in_vain)
 
@@ -173,36 +165,36 @@ def _strip(sample: Sample, check: Check) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """The scenes of a trace from its start on; of a long one its ends, and the steps that are needed."""
-    found: list[Scene] = [Scene(shortened(start, MOST_TEXT))]
+    """Return the scenes of a trace; a long one is shortened in the middle, except for needed steps."""
+    found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in cut(steps, needed):
         if not is_shown:
-            found.append(Scene(LEFT_OUT, (Deed("more", f"{len(some):,} more steps"),)))
+            found.append(Scene(_LEFT_OUT, (Action("more", f"{len(some):,} more steps"),)))
             continue
         for step in some:
             if step["kind"] == GOTO:
                 to = step["to"]
-                room = shortened(to or step["text"], MOST_TEXT)
+                room = shortened(to or step["text"], _MAX_STEP_TEXT)
                 found.append(Scene(room, is_found=to is not None, step=step["step"]))
             else:
-                found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_deeds(step)))
+                found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_actions(step)))
     return tuple(found)
 
 
-def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
-    kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
+def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
+    kind, text, number = step["kind"], shortened(step["text"], _MAX_STEP_TEXT), step["step"]
     if not is_question(kind) and not is_spoken(kind):
-        return (Deed(kind, _phrase(event_from_step(step)), number),)
+        return (Action(kind, _phrase(event_from_step(step)), number),)
     if "answer" not in step:
-        return (Deed(kind, text, number),)
-    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
-    return (Deed(kind, text, number), Deed("answer", heard))
+        return (Action(kind, text, number),)
+    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), _MAX_STEP_TEXT)
+    return (Action(kind, text, number), Action("answer", heard))
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
-    """A look and its result in words."""
+    """Return a look and its result in words."""
     return _phrase(Event(CHECK, what, found=is_found))
 
 
 def _phrase(event: Event) -> str:
-    return phrase(event, "third", show=lambda text: shortened(text, MOST_TEXT), quote="")
+    return phrase(event, "third", show=lambda text: shortened(text, _MAX_STEP_TEXT), quote="")

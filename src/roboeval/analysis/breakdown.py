@@ -8,15 +8,15 @@ import polars as pl
 
 from roboeval.analysis.counts import completions_of, prompt_scores, task_scores
 from roboeval.analysis.metrics import Estimate, by_formula, mean_of
-from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.failures import FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of
-from roboeval.evaluation.runs.traces import has_circumstances, trace_of
+from roboeval.evaluation.runs.traces import trace_of
 from roboeval.suites.load import Suite
 
-REPORTS = "report-back"
-LOST = "GoToInvalidLocation"
+REPORT_ABILITY = "report-back"
+NO_SUCH_ROOM_ERROR = "GoToInvalidLocation"
 
 
 def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Estimate, Mapping[str, float]]]:
@@ -31,7 +31,10 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
     for ability in dict.fromkeys(ability for task in suite.tasks.values() for ability in task.abilities):
         tasks = [name for name in scores if name in suite.tasks and ability in suite.tasks[name].abilities]
         total = sum(count for (task, _), count in failed.items() if task in tasks)
-        shares = {name: sum(failed.get((task, name), 0) for task in tasks) / (total or 1) for name in CLASSES}
+        shares = {
+            name: sum(failed.get((task, name), 0) for task in tasks) / (total or 1)
+            for name in FAILURE_CLASSES
+        }
         if tasks:
             yield ability, len(tasks), by_formula([scores[name] for name in tasks], over="tasks"), shares
 
@@ -41,22 +44,26 @@ def compare_report_back(results: Results) -> pl.DataFrame:
 
     Has a row for tasks whether or not they end with `reports`, and no row if none does: the number of
     `completions`, their `pass@1`, how many `failed`, how many of these left their first room and
-    `never_returned` (null if an earlier version, which stored no places, judged some of them), and how many
-    went to a room that does not exist (`lost`).
+    `never_returned`, and how many went to a room that does not exist (`lost`).
     """
     suite = results.known_suite
-    reports = pl.col("task").is_in([name for name, task in suite.tasks.items() if REPORTS in task.abilities])
+    reports = pl.col("task").is_in(
+        [name for name, task in suite.tasks.items() if REPORT_ABILITY in task.abilities]
+    )
     table = results.table.with_columns(reports=reports)
     scores = prompt_scores(table).group_by(reports=reports)
     counts = scores.agg("pass@1", completions=pl.col("n").sum(), failed=(pl.col("n") - pl.col("c")).sum())
     away = [(*key, never_returned(results.failed_row(key))) for key in results.failed]
     keys = {name: table.schema[name] for name in KEY}
-    gone = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
+    returns = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
     found = (
         completions_of(table)
-        .join(gone, on=KEY, how="left")
+        .join(returns, on=KEY, how="left")
         .group_by("reports")
-        .agg(never_returned=_count_failed(pl.col("away")), lost=(pl.col("failure_kind") == LOST).sum())
+        .agg(
+            never_returned=pl.col("away").sum(),
+            lost=(pl.col("failure_kind") == NO_SUCH_ROOM_ERROR).sum(),
+        )
         .join(counts.with_columns(_mean("pass@1")), on="reports")
         .select("reports", "completions", "failed", "never_returned", "lost", "pass@1")
         .sort("reports", descending=True)
@@ -68,22 +75,14 @@ def _mean(lists: str) -> pl.Expr:
     return pl.col(lists).map_elements(lambda values: mean_of([values]), return_dtype=pl.Float64)
 
 
-def _count_failed(condition: pl.Expr) -> pl.Expr:
-    """Count failed completions that meet a condition; null if it is null for one of them."""
-    of_failed = condition.filter(pl.col("failure_class").is_not_null())
-    return pl.when(~of_failed.is_null().any()).then(of_failed.sum())
-
-
-def never_returned(row: Row) -> bool | None:
+def never_returned(row: Row) -> bool:
     """Whether the robot left its first room for good, in the world in which the completion failed.
 
-    False if the trace was too long to be stored; None if an earlier version judged it without places.
+    False if the trace was too long to be stored.
     """
     verdict = row["verdicts"][failure_of(row)["world"]]
     if "cut" in verdict:
         return False
-    if not has_circumstances(verdict):
-        return None
     trace = trace_of(verdict)
     start = trace[0].place if trace else ""
     visited = [event.destination for event in trace if event.destination is not None]

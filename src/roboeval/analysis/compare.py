@@ -12,16 +12,16 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.counts import tally_of
-from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, mean_of
-from roboeval.analysis.statistics import ROUNDING, SampleSizes, by_bootstrap, p_by_signs, sample_sizes
+from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of
+from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
 from roboeval.analysis.summary import cut_off_replies, failures
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import Coverage, CutOff
 
 SIGNIFICANCE = 0.05
-SMALLEST_P = 0.001  # smaller values are shown as "p < 0.001"
-MOST_PAIRS = 10  # with more pairs, each run is compared with the best only
+MIN_SHOWN_P = 0.001  # smaller values are shown as "p < 0.001"
+MAX_PAIRS = 10  # with more pairs, each run is compared with the best only
 PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
 RunLike = TypeVar("RunLike")
 
@@ -98,7 +98,7 @@ def pairs_to_compare(
 ) -> list[tuple[RunLike, RunLike]]:
     """All pairs of runs; with many runs, each paired with the best."""
     pairs = list(combinations(runs, 2))
-    if len(pairs) <= MOST_PAIRS:
+    if len(pairs) <= MAX_PAIRS:
         return pairs
     best = max(runs, key=pass_at_1)
     return [(run, best) for run in runs if run is not best]
@@ -106,10 +106,10 @@ def pairs_to_compare(
 
 def p_text(p: float) -> str:
     """Format a p-value."""
-    return f"p = {p:.3f}" if p >= SMALLEST_P else f"p < {SMALLEST_P}"
+    return f"p = {p:.3f}" if p >= MIN_SHOWN_P else f"p < {MIN_SHOWN_P}"
 
 
-def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
+def comparison_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
     """Say which run is better, with its significance, and how many prompts were left out."""
     sentence = _better_sentence(comparison, names)
     if not comparison.left_out:
@@ -121,7 +121,7 @@ def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
 
 def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
     difference = comparison.over_tasks.mean
-    if abs(difference) < ROUNDING:
+    if abs(difference) < ROUNDING_ERROR:
         return f"{names[0]} and {names[1]} pass equally often."
     better, other = (names[1], names[0]) if difference > 0 else names
     by = f"{100 * abs(difference):.1f} points"
@@ -141,9 +141,11 @@ def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
 def other_differences(first: Results, second: Results) -> list[str]:
     """Differences between two runs, other than the model, that may explain their results."""
     judged_with = ("python", "codebotler")  # run.json has the versions used for generation
-    runs = [{**one.about, **{name: one.head.get(name) for name in judged_with}} for one in (first, second)]
+    runs = [
+        {**one.about, **{name: one.manifest.get(name) for name in judged_with}} for one in (first, second)
+    ]
     found = []
-    for name, words in SETTINGS.items():
+    for name, words in COMPARED_SETTINGS.items():
         a, b = (run.get(name) for run in runs)
         if a is not None and b is not None and a != b:
             found.append(f"{words} differ: {_short(a)} and {_short(b)}")
@@ -157,7 +159,7 @@ def other_differences(first: Results, second: Results) -> list[str]:
     return found
 
 
-SETTINGS = {
+COMPARED_SETTINGS = {
     "python": "the Python versions used for judging",
     "codebotler": "the versions of codebotler used for judging",
     "template": "the prompt templates",

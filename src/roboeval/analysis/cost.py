@@ -10,7 +10,7 @@ import polars as pl
 
 from roboeval.analysis.counts import completions_of, task_scores
 from roboeval.analysis.metrics import passed_count, prompts_of
-from roboeval.analysis.resample import LIMITS, chances, rejected_share, requests, trials_by_prompt
+from roboeval.analysis.resample import LIMITS, final_chances, mean_requests, rejected_share, trials_by_prompt
 from roboeval.evaluation.runs.table import MILLION, Price
 
 
@@ -43,7 +43,6 @@ def cost_of(table: pl.DataFrame, price: Price | None = None) -> RunCost:
 
 
 def _counted(completions: pl.DataFrame) -> pl.DataFrame:
-    """The token counts of completions that have them."""
     return completions.select("input_tokens", "output_tokens").drop_nulls()
 
 
@@ -71,8 +70,8 @@ def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LI
     each = [tokens.get((prompt.task, prompt.prompt), (0.0, 0.0)) for prompt in prompts]
     rejected = [rejected_share(prompt.trials) for prompt in prompts]
     for retries in limits:
-        asked = [requests(share, retries) for share in rejected]
-        passed = sum(chances(prompt.trials, retries).passed for prompt in prompts)
+        asked = [mean_requests(share, retries) for share in rejected]
+        passed = sum(final_chances(prompt.trials, retries).passed for prompt in prompts)
         sent, received = (math.fsum(n * t[at] for n, t in zip(asked, each, strict=True)) for at in (0, 1))
         yield Budget(
             retries,

@@ -17,8 +17,8 @@ SamplingUnit: TypeAlias = Literal["prompts", "tasks"]
 """The unit that an interval treats as sampled at random."""
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)  # ranges of values
-LEVEL = 0.95  # confidence level
-ROUNDING = 1e-9
+CONFIDENCE = 0.95  # confidence level
+ROUNDING_ERROR = 1e-9
 
 
 def pass_at_k(n: int, c: int, k: int) -> float:
@@ -60,11 +60,11 @@ class Estimate:
     @property
     def is_known(self) -> bool:
         """Whether the interval is informative: not of equal values, nor of a single one."""
-        return self.high - self.low > ROUNDING and (self.low, self.high) not in (SHARE, DIFFERENCE)
+        return self.high - self.low > ROUNDING_ERROR and (self.low, self.high) not in (SHARE, DIFFERENCE)
 
     def ends(self, form: str = ".3f") -> str:
         """Format the interval."""
-        if self.high - self.low <= ROUNDING:
+        if self.high - self.low <= ROUNDING_ERROR:
             return f"unknown: no variation between {self.over}"
         if not self.is_known:
             return f"unknown: too few {self.over}"
@@ -153,12 +153,19 @@ def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, floa
 
 def share_at_least(values: Sequence[float], threshold: float) -> float:
     """The share of values that reach a threshold above 0; at least one value is needed."""
-    return sum(value >= threshold - ROUNDING for value in values) / len(values)
+    return sum(value >= threshold - ROUNDING_ERROR for value in values) / len(values)
+
+
+def percent(share: float) -> str:
+    """Format a share in whole percent; "<1" and ">99" avoid rounding to 0 and 100."""
+    if 0 < share < 0.01:  # noqa: PLR2004 - one percent
+        return "<1"
+    return ">99" if 0.99 < share < 1 else f"{100 * share:.0f}"  # noqa: PLR2004 - 99 percent
 
 
 def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
     """The share of prompts by threshold of pass@1, where it changes, from 1 down (paper, section V.A)."""
-    thresholds = sorted({1.0, *(value for value in values if value > ROUNDING)}, reverse=True)
+    thresholds = sorted({1.0, *(value for value in values if value > ROUNDING_ERROR)}, reverse=True)
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
 
@@ -177,7 +184,7 @@ def by_formula(
     residuals = [math.fsum(value - mean for value in values) for values in clusters]
     size = sum(map(len, clusters))
     variance = count / (count - 1) * math.fsum(r * r for r in residuals) / size**2
-    margin = t_quantile((1 + LEVEL) / 2, count - 1) * math.sqrt(variance)
+    margin = t_quantile((1 + CONFIDENCE) / 2, count - 1) * math.sqrt(variance)
     return Estimate(mean, max(within[0], mean - margin), min(within[1], mean + margin), over)
 
 

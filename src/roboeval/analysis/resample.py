@@ -38,14 +38,14 @@ class Chances:
     passed: float
 
 
-def chances(trials: Sequence[CheckedCompletion], retries: int) -> Chances:
+def final_chances(trials: Sequence[CheckedCompletion], retries: int) -> Chances:
     """Compute the exact probabilities for a prompt, if each request returns any completion equally likely.
 
     A completion is final if it is accepted or if no retry is left. Without retries, the probability to pass
     is exactly the prompt's pass@1.
     """
     rejected = rejected_share(trials)
-    asked, is_last = requests(rejected, retries), rejected**retries
+    asked, is_last = mean_requests(rejected, retries), rejected**retries
 
     def chance(end: Callable[[CheckedCompletion], bool]) -> float:
         accepted = sum(trial.accepted and end(trial) for trial in trials)
@@ -64,7 +64,7 @@ def rejected_share(trials: Sequence[CheckedCompletion]) -> float:
     return sum(not trial.accepted for trial in trials) / len(trials)
 
 
-def requests(rejected: float, retries: int) -> float:
+def mean_requests(rejected: float, retries: int) -> float:
     """The mean number of requests per program, given the share of rejected ones and the limit of retries."""
     return sum(rejected**number for number in range(retries + 1))
 
@@ -107,7 +107,7 @@ class RetryResult:
 
 def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
     """Compute the result of one limit of retries."""
-    each = tuple(chances(prompt.trials, retries) for prompt in prompts)
+    each = tuple(final_chances(prompt.trials, retries) for prompt in prompts)
     return RetryResult(
         retries=retries,
         passed=over_tasks((prompt.task, one.passed) for prompt, one in zip(prompts, each, strict=True)),

@@ -14,9 +14,9 @@ import polars as pl
 from codebotler.rtl import Formula, Inconclusive, holds, parse
 from roboeval.analysis.counts import completions_of
 from roboeval.evaluation.processes import map_in_processes
-from roboeval.evaluation.runs.completions import KEY, Key
+from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.rows import key_of
-from roboeval.evaluation.runs.traces import can_judge, trace_of
+from roboeval.evaluation.runs.traces import trace_of
 
 ROWS_FOR_PROCESSES = 2_000  # fewer do not justify starting processes
 
@@ -35,15 +35,9 @@ class TraceQuery:
 class TraceMatch:
     """The worlds in which a completion matches a query, by number from 1 and name."""
 
-    key: Key
+    key: CompletionKey
     worlds: tuple[tuple[int, str], ...]
     cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be stored
-    earlier: tuple[tuple[int, str], ...] = ()  # undecided: an earlier version stored no places
-
-    @property
-    def undecided(self) -> tuple[tuple[int, str], ...]:
-        """The worlds in which the query cannot be decided."""
-        return tuple(sorted((*self.cut, *self.earlier)))
 
 
 def search(lines: Sequence[bytes], query: TraceQuery, *, workers: int = 1) -> Iterator[TraceMatch]:
@@ -79,19 +73,16 @@ def match_rows(lines: Sequence[bytes], query: TraceQuery) -> list[TraceMatch]:
 
 def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:
     """Match one row."""
-    worlds, cut, earlier = [], [], []
+    worlds, cut = [], []
     for number, verdict in _verdicts_in_scope(row, query):
         if formula is not None and "cut" in verdict:
             cut.append((number, verdict["world"]))
-        elif formula is not None and not can_judge(formula, verdict):
-            earlier.append((number, verdict["world"]))
         elif formula is None or _holds(formula, verdict) != query.negated:
             worlds.append((number, verdict["world"]))
-    return TraceMatch(key_of(row), tuple(worlds), tuple(cut), tuple(earlier))
+    return TraceMatch(key_of(row), tuple(worlds), tuple(cut))
 
 
 def _verdicts_in_scope(row: Mapping[str, Any], query: TraceQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    """The verdicts in the worlds of a query, numbered from 1."""
     if query.task not in {None, row["task"]}:
         return
     for number, verdict in enumerate(row["verdicts"], 1):

@@ -9,14 +9,22 @@ from statistics import NormalDist
 
 import numpy as np
 
-from roboeval.analysis.metrics import LEVEL, SHARE, Clusters, Estimate, SamplingUnit, mean_of, t_quantile
+from roboeval.analysis.metrics import (
+    CONFIDENCE,
+    ROUNDING_ERROR,
+    SHARE,
+    Clusters,
+    Estimate,
+    SamplingUnit,
+    mean_of,
+    t_quantile,
+)
 
-SEED = 0
-POWER = 0.8
-FEW = 8  # with fewer clusters, the bootstrap interval is too narrow
-EXACT = 20  # up to this many clusters, all 2**20 sign flips are enumerated
-ROUNDING = 1e-12
-CHUNK = 1_000  # resamples held in memory at a time
+BOOTSTRAP_SEED = 0
+TEST_POWER = 0.8
+MIN_CLUSTERS = 8  # with fewer clusters, the bootstrap interval is too narrow
+MAX_EXACT_CLUSTERS = 20  # up to this many clusters, all 2**20 sign flips are enumerated
+RESAMPLES_AT_ONCE = 1_000  # resamples held in memory at a time
 
 
 def by_bootstrap(
@@ -24,7 +32,7 @@ def by_bootstrap(
     *,
     within: tuple[float, float] = SHARE,
     over: SamplingUnit = "prompts",
-    seed: int = SEED,
+    seed: int = BOOTSTRAP_SEED,
     draws: int = 10_000,
 ) -> Estimate:
     """The mean of all values with a percentile interval from a cluster bootstrap.
@@ -39,32 +47,32 @@ def by_bootstrap(
     sums = np.array([math.fsum(values) for values in clusters])
     sizes = np.array([len(values) for values in clusters])
     means = []
-    for start in range(0, draws, CHUNK):
-        drawn = generator.integers(count, size=(min(CHUNK, draws - start), count))
-        means.append(sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1))
-    wider = math.sqrt(count / (count - 1)) * t_quantile((1 + LEVEL) / 2, count - 1)
+    for start in range(0, draws, RESAMPLES_AT_ONCE):
+        sample = generator.integers(count, size=(min(RESAMPLES_AT_ONCE, draws - start), count))
+        means.append(sums[sample].sum(axis=1) / sizes[sample].sum(axis=1))
+    wider = math.sqrt(count / (count - 1)) * t_quantile((1 + CONFIDENCE) / 2, count - 1)
     tail = NormalDist().cdf(-wider)
     low, high = np.quantile(np.concatenate(means), [tail, 1 - tail])
     return Estimate(mean, max(within[0], float(low)), min(within[1], float(high)), over)
 
 
-def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) -> float:
+def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 100_000) -> float:
     """The p-value of a two-sided permutation test that flips the signs of whole clusters of differences.
 
     It is exact for up to 20 clusters; for more, signs are sampled. With G clusters it is at least 2 / 2**G,
     so a few clusters cannot reach significance.
     """
     sums = np.array([math.fsum(values) for values in clusters])
-    observed = abs(float(sums.sum())) - ROUNDING
-    if len(sums) <= EXACT:
+    observed = abs(float(sums.sum())) - ROUNDING_ERROR
+    if len(sums) <= MAX_EXACT_CLUSTERS:
         totals = np.zeros(1)
         for one in sums:
             totals = np.concatenate([totals + one, totals - one])
         return float((np.abs(totals) >= observed).mean())
     generator = np.random.default_rng(seed)
     extreme = 0
-    for start in range(0, draws, CHUNK):
-        signs = generator.integers(2, size=(min(CHUNK, draws - start), len(sums))) * 2 - 1
+    for start in range(0, draws, RESAMPLES_AT_ONCE):
+        signs = generator.integers(2, size=(min(RESAMPLES_AT_ONCE, draws - start), len(sums))) * 2 - 1
         extreme += int((np.abs(signs @ sums) >= observed).sum())
     return (extreme + 1) / (draws + 1)
 
@@ -87,11 +95,11 @@ def sample_sizes(pairs: Sequence[tuple[float, float]]) -> SampleSizes:
     m = len(pairs)
     differences = [b - a for a, b in pairs]
     mean = math.fsum(differences) / m
-    if abs(mean) < ROUNDING:
+    if abs(mean) < ROUNDING_ERROR:
         return SampleSizes(None, None)
     normal = NormalDist()
-    factor = ((normal.inv_cdf((1 + LEVEL) / 2) + normal.inv_cdf(POWER)) / mean) ** 2
+    factor = ((normal.inv_cdf((1 + CONFIDENCE) / 2) + normal.inv_cdf(TEST_POWER)) / mean) ** 2
     within = math.fsum(a * (1 - a) + b * (1 - b) for a, b in pairs) / m
     spread = math.fsum((d - mean) ** 2 for d in differences) / (m - 1) if m > 1 else None
-    prompts = None if spread is None else max(2, math.ceil(factor * spread - ROUNDING))
-    return SampleSizes(max(1, math.ceil(factor * within / m - ROUNDING)), prompts)
+    prompts = None if spread is None else max(2, math.ceil(factor * spread - ROUNDING_ERROR))
+    return SampleSizes(max(1, math.ceil(factor * within / m - ROUNDING_ERROR)), prompts)

@@ -19,7 +19,7 @@ from roboeval.analysis.metrics import (
     prompts_of,
 )
 from roboeval.analysis.tally import Tally
-from roboeval.evaluation.failures import CLASSES, NO_PROGRAM
+from roboeval.evaluation.failures import FAILURE_CLASSES, NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
 from roboeval.suites.load import Suite
@@ -65,7 +65,7 @@ class EvaluationSummary:
 
 def cut_off_replies(failures: Iterable[Failures], scope: JudgingScope) -> CutOff:
     """The replies of a run that were cut off, given its failures."""
-    kinds = (kind for one in failures if one.name == NO_PROGRAM for kind in one.kinds)
+    kinds = (kind for one in failures if one.name == NO_PROGRAM_CLASS for kind in one.kinds)
     without = sum(kind.count for kind in kinds if kind.name == "cut-off")
     return CutOff(max(scope.cut_off, without), without, scope.total, scope.limit)
 
@@ -115,12 +115,12 @@ def failures(tally: Tally) -> tuple[Failures, ...]:
 
     def of_class(name: str) -> Failures:
         counts = failed.get(name, Counter())
-        known = CLASSES[name].kinds if name in CLASSES else ()
+        known = FAILURE_CLASSES[name].kinds if name in FAILURE_CLASSES else ()
         others = sorted(counts.keys() - set(known), key=lambda kind: (-counts[kind], kind))
         kinds = tuple(Failures(kind, counts[kind], counts[kind] / n) for kind in [*known, *others])
         return Failures(name, counts.total(), counts.total() / n, kinds)
 
-    return tuple(of_class(name) for name in [*CLASSES, *sorted(failed.keys() - set(CLASSES))])
+    return tuple(of_class(name) for name in [*FAILURE_CLASSES, *sorted(failed.keys() - set(FAILURE_CLASSES))])
 
 
 PASSED, ALL = "passed", "all"
@@ -149,9 +149,9 @@ def causes(tally: Tally) -> Causes:
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
     """The kinds of a class that occur, known kinds first."""
-    there = {kind for one in found for kind in one.kinds.get(name, {})}
-    known = [kind for kind in CLASSES[name].kinds if kind in there]
-    return [*known, *sorted(there - {*known})]
+    occurring = {kind for one in found for kind in one.kinds.get(name, {})}
+    known = [kind for kind in FAILURE_CLASSES[name].kinds if kind in occurring]
+    return [*known, *sorted(occurring - {*known})]
 
 
 def summary_data(summary: EvaluationSummary) -> dict[str, Any]:

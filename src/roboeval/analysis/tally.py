@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from roboeval.analysis.metrics import PromptScore, TaskScore
-from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import Row, key_of
 
 
@@ -17,7 +17,7 @@ class Tally:
         self.judged: Counter[tuple[str, int]] = Counter()  # by task and prompt
         self.passed: Counter[tuple[str, int]] = Counter()  # by task and prompt
         self.failed: Counter[tuple[str, str]] = Counter()  # by class and kind of the failure
-        self.first_failed: Key | None = None
+        self.first_failed: CompletionKey | None = None
 
     def add(self, row: Row) -> None:
         """Count a completion."""

@@ -10,7 +10,7 @@ import polars as pl
 
 from roboeval.analysis.counts import completions_of, prompt_scores
 from roboeval.evaluation.explanation import reason, suite_instruction
-from roboeval.evaluation.runs.completions import KEY, Completion, Key
+from roboeval.evaluation.runs.completions import KEY, Completion, CompletionKey
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import requested_of_prompts
 
@@ -33,7 +33,7 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
     """The distinct programs of a judged prompt as plain data, with the reason why each fails."""
     of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
     programs = results.programs
-    groups: dict[object, list[Key]] = defaultdict(list)
+    groups: dict[object, list[CompletionKey]] = defaultdict(list)
     for index in of_prompt["index"]:
         key = task, prompt, index
         groups[programs.get(key, index)].append(key)
@@ -64,7 +64,7 @@ def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame
     return counts.with_columns(share=pl.col("counted") / pl.when(judged > 0).then(judged))
 
 
-def _reason(results: Results, key: Key) -> dict[str, Any]:
+def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
     if key not in results.failed:
         return {"passed": True, "failure": None}
     return reason(results.failed_row(key), results.suite, ablated=results.is_ablated)

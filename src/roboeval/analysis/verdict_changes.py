@@ -10,11 +10,10 @@ from typing import Any
 import polars as pl
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.cluster import Cluster, cluster_data, describe_groups, group_failures
 from roboeval.analysis.compare import Comparison, PromptScores, compare_scores, comparison_data
 from roboeval.analysis.counts import completions_of, task_scores
-from roboeval.analysis.metrics import pass_at_1
-from roboeval.analysis.statistics import ROUNDING
+from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_data, group_failures
+from roboeval.analysis.metrics import ROUNDING_ERROR, pass_at_1
 from roboeval.evaluation.runs.completions import KEY, how_many
 from roboeval.evaluation.runs.results import Results
 
@@ -38,8 +37,8 @@ class VerdictChanges:
     suites: tuple[str, str]
     comparison: Comparison  # second suite minus first
     tasks: tuple[TaskChanges, ...]
-    first_only: tuple[Cluster, ...]  # with the reasons why the second suite fails them
-    second_only: tuple[Cluster, ...]  # with the reasons why the first suite fails them
+    first_only: tuple[FailureGroup, ...]  # with the reasons why the second suite fails them
+    second_only: tuple[FailureGroup, ...]  # with the reasons why the first suite fails them
     programs: int  # distinct ones whose verdict changes
     left_out: int  # completions judged by one suite only
 
@@ -97,7 +96,7 @@ def _by_task(both: pl.DataFrame, order: Iterable[str]) -> Iterator[TaskChanges]:
 
 def rank(name: str, scores: Mapping[str, float]) -> int:
     """The rank of a run, from 1; equal scores share a rank."""
-    return 1 + sum(score > scores[name] + ROUNDING for score in scores.values())
+    return 1 + sum(score > scores[name] + ROUNDING_ERROR for score in scores.values())
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ def _compare_ranks(one: VerdictChanges, other: VerdictChanges) -> RankChange:
 
 
 def _sign(difference: float) -> int:
-    return (difference > ROUNDING) - (difference < -ROUNDING)
+    return (difference > ROUNDING_ERROR) - (difference < -ROUNDING_ERROR)
 
 
 # --- sentences
@@ -160,13 +159,13 @@ def describe_ranking(found: Sequence[VerdictChanges]) -> list[str]:
     if not changes:
         return [f"The ranking of the {len(found)} runs is the same under {second} as under {first}."]
     return [
-        f"{pair.one} passes {HOW_OFTEN[_sign(pair.second)]} {pair.other} under {second}, "
-        f"and {HOW_OFTEN[_sign(pair.first)]} it under {first}."
+        f"{pair.one} passes {FREQUENCY_WORDS[_sign(pair.second)]} {pair.other} under {second}, "
+        f"and {FREQUENCY_WORDS[_sign(pair.first)]} it under {first}."
         for pair in changes
     ]
 
 
-HOW_OFTEN = {1: "more often than", 0: "as often as", -1: "less often than"}
+FREQUENCY_WORDS = {1: "more often than", 0: "as often as", -1: "less often than"}
 
 
 def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
@@ -197,9 +196,9 @@ def _run_data(one: VerdictChanges, all_of_them: Sequence[VerdictChanges]) -> dic
         "completions": one.completions,
         "left_out": one.left_out,
         "programs": one.programs,
-        "places": [rank(one.name, of) for of in scores],
+        "places": [rank(one.name, side) for side in scores],
         **{name: comparison[name] for name in ("first", "second", "difference", "interval", "p")},
         "tasks": [asdict(task) for task in one.tasks],
-        "first_only": list(map(cluster_data, one.first_only)),
-        "second_only": list(map(cluster_data, one.second_only)),
+        "first_only": list(map(group_data, one.first_only)),
+        "second_only": list(map(group_data, one.second_only)),
     }

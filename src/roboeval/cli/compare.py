@@ -1,4 +1,4 @@
-"""The commands compare and resample: two runs or suites, and the effect of checking programs before a run."""
+"""The commands compare, for two runs or suites, and resample, for the effect of rejection sampling."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from roboeval.cli.options import (
     RunArgument,
     SuiteOption,
     WorkersOption,
-    named,
+    path_to,
 )
-from roboeval.cli.output import fail, note, print_json, print_rich, watched
+from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
 if TYPE_CHECKING:
     import polars as pl
@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 def compare(
     runs: Annotated[
         list[Path],
-        typer.Argument(help="Two runs that were judged; with --suites, one or more.", parser=named("a run")),
+        typer.Argument(
+            help="Two runs that were judged; with --suites, one or more.", parser=path_to("a run")
+        ),
     ],
     suite: SuiteOption = "paper",
     suites: Annotated[
@@ -53,16 +55,13 @@ def compare(
     """
     if suites is not None:
         compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
-    elif len(runs) == PAIR:
+    elif len(runs) == _PAIR:
         compare_runs(runs, suite, ablated=ablation, as_json=json)
     else:
-        fail(
-            f"a comparison takes two runs, and {len(runs)} {'is' if len(runs) == 1 else 'are'} named; "
-            "with --suites it takes any number"
-        )
+        fail(f"name two runs rather than {len(runs)}; with --suites, any number")
 
 
-PAIR = 2
+_PAIR = 2
 
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
@@ -96,7 +95,7 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
     if len({path.resolve() for path in paths}) < len(paths):
         fail("a run is named twice; name each run once")
     names = [name.strip() for name in suites.split(",")]
-    if len(names) != PAIR or len({*names}) != PAIR or not all(names):
+    if len(names) != _PAIR or len({*names}) != _PAIR or not all(names):
         fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
     found = []
     for path in paths:
@@ -139,22 +138,22 @@ def resample(
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
         results = open_current(run, suite, ablated=False, rules=rules).results
         checker = engine_for(len(results.places))
-        prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
+        prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
     coverage = results.scope.coverage(len(results.places))
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
-        of = {"suite": results.head["suite"], "samples": samples, "seed": seed, **asdict(coverage)}
+        of = {"suite": results.manifest["suite"], "samples": samples, "seed": seed, **asdict(coverage)}
         print_json({**of, **curve_data(prompts, limits)})
     else:
         print_rich(resample_view(prompts, limits, title=str(run), coverage=coverage))
 
 
-def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
-    """The table of a run with the answers of the check to each program; the run keeps the answers."""
+def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
+    """Check the programs of a run, save the results in the run, and return its table with them."""
     from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 
     judged = [results.completions[key] for key in results.places]
     different = {(completion.task, completion.program) for completion in judged}
     checking = check_programs(results.run, results.known_suite, judged, engine, samples=samples, seed=seed)
-    return with_answers(results.table, dict(watched(checking, "checking", len(different))))
+    return with_answers(results.table, dict(show_progress(checking, "checking", len(different))))

@@ -1,4 +1,4 @@
-"""Names that a shell completes in command lines."""
+"""Completion of names by the shell."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import typer
 
 
 def suite_names(incomplete: str) -> list[str]:
-    """The suites that ship with RoboEval or are installed; the shell itself completes folders."""
+    """Return built-in and installed suites; the shell itself completes folders."""
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import shipped_suites
 
@@ -15,7 +15,7 @@ def suite_names(incomplete: str) -> list[str]:
 
 
 def task_names(context: typer.Context, incomplete: str) -> list[str]:
-    """The tasks of the suite that the line names, or of the paper's."""
+    """Return the tasks of the suite in the command line, by default of `paper`."""
     from codebotler.core.errors import UserError
     from roboeval.suites.load import suite_folder, task_files
 
@@ -27,18 +27,18 @@ def task_names(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
-    """The tasks for the last of several names, which commas separate."""
+    """Return the tasks for the last of several comma-separated names."""
     *whole, last = incomplete.split(",")
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
 
 
 def split_names(incomplete: str) -> list[str]:
     """The splits of families."""
-    from roboeval.suites.families.suite import SPLITS
+    from roboeval.suites.families.suite import FIRST_SEEDS
 
-    return [name for name in SPLITS if name.startswith(incomplete)]
+    return [name for name in FIRST_SEEDS if name.startswith(incomplete)]
 
 
 def engine_names(incomplete: str) -> list[str]:
-    """The engines."""
+    """Return the engines."""
     return [name for name in ("local", "ray") if name.startswith(incomplete)]

@@ -1,4 +1,4 @@
-"""The engine that a command runs programs with."""
+"""The choice of the engine that runs programs."""
 
 from __future__ import annotations
 
@@ -11,17 +11,15 @@ from roboeval.cli.output import fail
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
 
-WORKERS_OF_A_PROCESS = 2  # workers that one process keeps busy
-
-
-PROGRAMS_FOR_PROCESSES = 5_000  # programs for which it is worth while to start processes
+MAX_WORKERS_OF_PROCESS = 2  # workers that one process can keep busy
+MIN_PROGRAMS_FOR_PROCESSES = 5_000  # starting processes is too slow for fewer
 
 
 @contextmanager
 def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[Callable[[int], OpenEngine]]:
-    """The engine with this name for so many programs, isolated as `WorkerPool` says.
+    """Yield a function that returns the engine of a name for a number of programs.
 
-    A worker starts beside what follows.
+    A worker starts in parallel to the block; `WorkerPool` explains the arguments of isolation.
     """
     if name == "local":
         from codebotler.simulator.pool import WorkerPool, cores
@@ -31,11 +29,11 @@ def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[
         with closing(WorkerPool(workers, **isolation)) as pool:
 
             def local(programs: int) -> OpenEngine:
-                if programs < PROGRAMS_FOR_PROCESSES or min(workers, cores()) <= WORKERS_OF_A_PROCESS:
+                if programs < MIN_PROGRAMS_FOR_PROCESSES or min(workers, cores()) <= MAX_WORKERS_OF_PROCESS:
                     return Local(pool)
                 from roboeval.evaluation.processes import Processes
 
-                pool.close()  # it has warned if need be
+                pool.close()  # it has warned of missing isolation
                 return Processes(workers, **isolation)
 
             yield local
@@ -44,5 +42,5 @@ def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[
         fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
-    cluster = RayCluster(workers, **isolation)  # refused before anything is written
+    cluster = RayCluster(workers, **isolation)  # fails before anything is written
     yield lambda _: cluster

@@ -1,10 +1,10 @@
-"""Commands that judge completions, and make a run of those from elsewhere: evaluate, import."""
+"""The commands evaluate, which judges completions, and import, which makes a run of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,16 +29,16 @@ from roboeval.cli.options import (
     WorkersOption,
     WorldSeedOption,
     WorldsOption,
-    named,
+    path_to,
 )
-from roboeval.cli.output import fail, metered, note, watched
+from roboeval.cli.output import fail, note, progress_meter, show_progress
 from roboeval.cli.show import house_of, print_summary
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.batches import Imported
+    from roboeval.evaluation.batches import ImportResult
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.runs.completions import Key
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.completions import CompletionKey
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.rows import Row
     from roboeval.evaluation.runs.source import Source
     from roboeval.evaluation.runs.table import TableBuilder
@@ -69,8 +69,9 @@ def evaluate(
         from roboeval.analysis.summary import summarise
         from roboeval.analysis.tally import Tally
         from roboeval.evaluation.runs.completions import how_many
-        from roboeval.evaluation.runs.folder import Run, about_of, tasks_to_judge
+        from roboeval.evaluation.runs.folder import RunFolder, about_of, tasks_to_judge
         from roboeval.evaluation.runs.scope import JudgingScope
+        from roboeval.evaluation.runs.source import open_source
 
         judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
@@ -79,19 +80,19 @@ def evaluate(
         if left:
             note(f"not judged, since they have no ablation: {', '.join(left)}")
         tally, table, is_started = Tally(), None if rules is None else _new_table(), False
-        run = None if out is None else Run(out)
+        run = None if out is None else RunFolder(out)
         try:
-            opened = opened_source(source, judged_by)
+            opened = open_source(source, judged_by)
             run = run or opened.run
             about = {} if opened.run is None else about_of(opened.run)
             scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
-                fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
+                fail(f"{source}: contains no completion of {tasks or 'a task with an ablation'}")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
                 run.keep(opened.completions)
             running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
-            for row in watched(rows, "judging", scope.total):
+            for row in show_progress(rows, "judging", scope.total):
                 is_started = True
                 tally.add(row)
                 if table is not None:
@@ -100,31 +101,25 @@ def evaluate(
             house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
         except KeyboardInterrupt:
-            note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
+            note(f"roboeval: {stop_sentence(is_kept=run is not None, is_started=is_started, redo=redo)}")
             raise SystemExit(STOPPED) from None
         if run is not None:
             _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
         if (left_out := scope.total - judged_count(counted.prompts)) > 0:
-            _fail_with_some_left(how_many(left_out), scope.total, is_kept=run is not None)
+            again = "the others are judged" if run is None else "the same command tries again"
+            note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
+            raise SystemExit(1)
 
 
 def _new_table() -> TableBuilder:
-    from roboeval.evaluation.runs.table import TableBuilder  # with polars, which takes a tenth of a second
+    from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which is slow
 
     return TableBuilder()
 
 
-def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoReturn:
-    """End with status 1, since some completions have no verdict."""
-    again = "the same command tries again" if is_kept else "the others are judged"
-    note(f"roboeval: not judged: {left_out} of {total:,}; {again}")
-    raise SystemExit(1)
-
-
 def _name_next_command(
-    run: Run, failed: Key | None, *, suite: str, ablated: bool, rules: Path | None
+    run: RunFolder, failed: CompletionKey | None, *, suite: str, ablated: bool, rules: Path | None
 ) -> None:
-    """Note where verdicts are kept, and the command that shows the first failure."""
     from roboeval.evaluation.runs.completions import name_of
 
     shown = [] if failed is None else [name_of(failed)]
@@ -133,18 +128,8 @@ def _name_next_command(
     note(f"verdicts are in {run.path}; `{again}` {does}")
 
 
-def opened_source(text: str, suite: Suite) -> Source:
-    """Completions that a user names; note which files were left aside."""
-    from roboeval.evaluation.runs.source import open_source
-
-    source = open_source(text, suite)
-    if source.left_aside is not None:
-        note(source.left_aside)
-    return source
-
-
-def after_a_stop(*, is_kept: bool, is_started: bool, redo: bool) -> str:
-    """What Ctrl-C leaves behind, and how to go on."""
+def stop_sentence(*, is_kept: bool, is_started: bool, redo: bool) -> str:
+    """Say what Ctrl-C leaves behind, and how to continue."""
     if not is_kept:
         return "stopped; nothing is kept (add --out RUN to keep verdicts)"
     if not is_started:
@@ -154,7 +139,7 @@ def after_a_stop(*, is_kept: bool, is_started: bool, redo: bool) -> str:
 
 def _judged(
     source: Source,
-    run: Run | None,
+    run: RunFolder | None,
     suite: Suite,
     tasks: frozenset[str] | None,
     *,
@@ -162,7 +147,6 @@ def _judged(
     redo: bool,
     engine: OpenEngine,
 ) -> Iterator[Row]:
-    """Judge completions, in a run if there is one to keep the rows."""
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import judgements
     from roboeval.evaluation.runs.rows import decode_row
@@ -182,7 +166,8 @@ def import_(
         str, typer.Argument(help="A .jsonl, a folder or zip of .py completions, or answers of a batch.")
     ],
     out: Annotated[
-        Path, typer.Option(help="The run folder to create, or for answers theirs.", parser=named("a run"))
+        Path,
+        typer.Option(help="The run folder to create, or for answers theirs.", parser=path_to("a run")),
     ],
     suite: SuiteOption = "paper",
 ) -> None:
@@ -191,14 +176,14 @@ def import_(
     Answers to `generate --requests` are added to its run.
     """
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run
-    from roboeval.evaluation.runs.source import is_answers
+    from roboeval.evaluation.runs.folder import RunFolder
+    from roboeval.evaluation.runs.source import is_answers, open_source
 
     if is_answers(Path(path)):
         import_batch(Path(path), out, suite)
         return
-    completions = opened_source(path, load(suite)).completions
-    Run(out).keep(completions)
+    completions = open_source(path, load(suite)).completions
+    RunFolder(out).keep(completions)
     count = len(completions)
     again = command("evaluate", out, suite=suite)
     they = ("is", "it") if count == 1 else ("are", "them")
@@ -210,12 +195,12 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     with installed():
         from roboeval.evaluation.batches import import_answers
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.folder import RunFolder
 
     with path.open("rb") as file:
         count = sum(1 for _ in file)
-    with metered("reading", count) as tell:
-        found = import_answers(Run(out), load(suite), path, progress=lambda done: tell(done, ""))
+    with progress_meter("reading", count) as update:
+        found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: update(done, ""))
     missing = len(found.failed) + len(found.unanswered)
     again = command("evaluate", out, suite=suite)
     note(
@@ -225,13 +210,13 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     for sentence in missing_sentences(found):
         note(sentence)
     if missing:
-        note(f"roboeval: {how_many(missing)} missing; `roboeval generate --requests` asks for them again")
+        note(f"roboeval: {how_many(missing)} missing; `roboeval generate --requests` requests them again")
         raise SystemExit(1)
 
 
-def missing_sentences(found: Imported) -> Iterator[str]:
-    """For each error, how many requests ended with it, and which; then those without an answer."""
-    by_error: dict[str, list[Key]] = {}
+def missing_sentences(found: ImportResult) -> Iterator[str]:
+    """Yield a sentence for each error with its requests, then one for requests without an answer."""
+    by_error: dict[str, list[CompletionKey]] = {}
     for key, error in found.failed.items():
         by_error.setdefault(error, []).append(key)
     for error, keys in by_error.items():
@@ -240,11 +225,11 @@ def missing_sentences(found: Imported) -> Iterator[str]:
         yield f"{counted(len(found.unanswered), 'request')} without an answer: {_named(found.unanswered)}"
 
 
-SHOWN = 10  # names of requests in a sentence
+MAX_NAMED_REQUESTS = 10  # in a sentence
 
 
-def _named(keys: Sequence[Key]) -> str:
+def _named(keys: Sequence[CompletionKey]) -> str:
     from roboeval.evaluation.runs.completions import name_of
 
-    more = len(keys) - SHOWN
-    return ", ".join(map(name_of, keys[:SHOWN])) + (f" and {more:,} more" if more > 0 else "")
+    more = len(keys) - MAX_NAMED_REQUESTS
+    return ", ".join(map(name_of, keys[:MAX_NAMED_REQUESTS])) + (f" and {more:,} more" if more > 0 else "")

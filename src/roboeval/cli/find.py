@@ -16,11 +16,11 @@ from roboeval.cli.options import (
     SuiteOption,
     TaskOption,
 )
-from roboeval.cli.output import fail, note, print_json, print_rich, watched
+from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
 if TYPE_CHECKING:
     from roboeval.analysis.search import TraceMatch, TraceQuery
-    from roboeval.evaluation.runs.completions import Key
+    from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.suites.load import Suite
 
 
@@ -48,47 +48,45 @@ def find(
     that failed by reason.
     """
     from codebotler.simulator.pool import cores
-    from roboeval.analysis.cluster import cluster_data, describe_groups, group_failures
+    from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
     from roboeval.analysis.search import TraceQuery, count_searched, matches_by_task, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run, as_judged
+    from roboeval.evaluation.runs.folder import RunFolder, with_judged_worlds
 
     if negated and formula is None:
         fail("--not needs a formula; add one, or leave --not out")
-    known = as_judged(Run(run), load(suite), ablated=ablation)
+    known = with_judged_worlds(RunFolder(run), load(suite), ablated=ablation)
     task = None if task is None else known.task(task).name
     query = TraceQuery(formula, negated, task, world)
     expect_query(query, known, ablated=ablation)
     lines: list[bytes] = []
     results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
-    every = list(watched(search(lines, query, workers=workers or cores()), "looking", len(lines)))
+    every = list(show_progress(search(lines, query, workers=workers or cores()), "searching", len(lines)))
     found = [one for one in every if one.worlds]
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = group_failures(failed, results.programs)
     shown = together if json else together[:most]
-    clusters = list(watched(describe_groups(shown, results), "comparing", len(shown)))
-    undecided = [one for one in every if one.undecided]
-    if cut := sum(bool(one.cut) for one in every):
-        note(f"undecided, since their traces were too long to keep: {how_many(cut)}")
-    if earlier := sum(bool(one.earlier) for one in every):
-        note(f"undecided, since an earlier version kept no places: {how_many(earlier)}; evaluate with --redo")
+    described = list(show_progress(describe_groups(shown, results), "comparing", len(shown)))
+    undecided = [one for one in every if one.cut]
+    if undecided:
+        note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")
     total, passed = count_searched(results.table, task), {*results.passed}
     if json:
         data = {
             "looked_at": total,
             "found": [found_data(one, one.worlds, passed) for one in found],
-            "undecided": [found_data(one, one.undecided, passed) for one in undecided],
+            "undecided": [found_data(one, one.cut, passed) for one in undecided],
         }
-        print_json({**data, "groups": list(map(cluster_data, clusters))})
+        print_json({**data, "groups": list(map(group_data, described))})
     else:
         counts = matches_by_task(found, results.table)
         is_search = formula is not None
-        print_rich(found_view(found, counts, total, clusters, groups=len(together), is_search=is_search))
+        print_rich(found_view(found, counts, total, described, groups=len(together), is_search=is_search))
 
 
 def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
-    """Refuse a wrong formula, and a world that no task has."""
+    """Raise UserError for an invalid formula or a world that no task has."""
     from codebotler.core.errors import UserError
     from codebotler.rtl import RtlSyntaxError, parse
 
@@ -108,8 +106,10 @@ def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
         fail(f'{where} has no world "{query.world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
-def found_data(one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[Key]) -> dict[str, Any]:
-    """A completion and the worlds in which it was found, as JSON."""
+def found_data(
+    one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[CompletionKey]
+) -> dict[str, Any]:
+    """Return a completion and the worlds in which it was found as JSON data."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {

@@ -1,4 +1,4 @@
-"""The commands generate and run; run evaluates and reports as well."""
+"""The commands generate, and run, which also evaluates and reports."""
 
 from __future__ import annotations
 
@@ -13,10 +13,7 @@ import typer
 
 from codebotler.cli.ending import STOPPED
 from codebotler.cli.model_options import inherit_options, model_settings, note_unsent
-from codebotler.cli.options import (
-    BaseUrlOption,
-    ModelOption,
-)
+from codebotler.cli.options import BaseUrlOption, ModelOption
 from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
 from roboeval.cli.engine_choice import engine_named
@@ -38,7 +35,7 @@ from roboeval.cli.options import (
     TasksOption,
     WorkersOption,
 )
-from roboeval.cli.output import fail, metered, note
+from roboeval.cli.output import fail, note, progress_meter
 from roboeval.cli.report import report
 from roboeval.cli.rounds import further_rounds
 
@@ -48,32 +45,32 @@ if TYPE_CHECKING:
     from codebotler.models.sampling import SamplingSettings
     from roboeval.evaluation.generate import GenerationProgress, Pace
     from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.folder import RunFolder
 
-MOST_REQUESTS = 50_000
+MAX_BATCH_REQUESTS = 50_000
 
 
 @dataclass(frozen=True)
-class Requested:
-    """What a command requests: of which model, and for which run."""
+class GenerationRequest:
+    """The completions that a command requests, of a model and for a run."""
 
     name: str  # of the model
     settings: SamplingSettings
     plan: GenerationPlan
     pace: Pace
-    suite: str  # as --suite takes it
+    suite: str  # the value of --suite
     out: Path | None
 
-    def run_of(self, model: Model | BatchModel) -> Run:
-        """The run that is named, or else that of the model."""
-        from roboeval.evaluation.runs.folder import Run
+    def run_of(self, model: Model | BatchModel) -> RunFolder:
+        """Return the run of --out, by default one named after the model."""
+        from roboeval.evaluation.runs.folder import RunFolder
 
         folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
         fresh = self.plan.suite.families is not None
-        return Run(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
+        return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
     def open(self) -> Model:
-        """Open the model that is asked."""
+        """Open the model."""
         from codebotler.models.open import open_model
         from codebotler.models.recorded import is_recorded
         from roboeval.evaluation.runs.source import recorded_model_for
@@ -84,7 +81,7 @@ class Requested:
 
 
 @inherit_options(model_settings)
-def requested(
+def read_options(
     model: ModelOption = None,
     out: OutOption = None,
     num_completions: NumOption = 50,
@@ -97,8 +94,8 @@ def requested(
     token_budget: BudgetOption = None,
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
-) -> Requested:
-    """What options request."""
+) -> GenerationRequest:
+    """Interpret the options that `generate` and `run` share."""
     from codebotler.models.chosen import choose_model
     from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
@@ -112,32 +109,32 @@ def requested(
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    return Requested(chosen.name, settings, plan, pace, suite, out)
+    return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
 
 
 def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
-    """The name of the suite that families make of a seed, which stands in the place of --suite."""
+    """Return the name of the suite of families, which replaces --suite."""
     from roboeval.suites.families.suite import FamilyTasks
     from roboeval.suites.families.tasks import family_names
 
     if families is None:
         fail("--num-tasks needs --families; add it")
     if suite != "paper":
-        fail("--families makes a suite of its own; leave out --suite")
+        fail("--families creates its own suite; leave out --suite")
     return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
-def complete(run: Run, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
-    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
+def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
+    """Generate the missing completions of a run; exit with status 1 if some are still missing."""
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
-    meter = Meter()
+    meter = GenerationMeter()
     try:
         with meter:
             progress = generate_run(run, plan, model, pace, on_progress=meter.show)
     except KeyboardInterrupt:
-        note(f"roboeval: {meter.after_a_stop()}")
+        note(f"roboeval: {meter.stop_sentence()}")
         raise SystemExit(STOPPED) from None
     if progress.missing is not None:
         note(f"roboeval: {progress.missing}; the same command continues where it stopped")
@@ -147,7 +144,7 @@ def complete(run: Run, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
     return run.path
 
 
-@inherit_options(requested)
+@inherit_options(read_options)
 def generate(
     *,
     requests: RequestsOption = None,
@@ -157,18 +154,18 @@ def generate(
 
     After an interruption, the same command continues.
     """
-    what = requested(**options)
+    what = read_options(**options)
     if requests is not None:
         write_batch(what, requests)
         return
     model = what.open()
     note_unsent(what.settings, model)
-    path = complete(what.run_of(model), what.plan, model, what.pace)
+    path = complete_run(what.run_of(model), what.plan, model, what.pace)
     note(f"the completions are in {path}; `{command('evaluate', path, suite=what.suite)}` judges them")
 
 
-def write_batch(what: Requested, path: Path) -> None:
-    """Write the requests of a run to a file, and note how to go on."""
+def write_batch(what: GenerationRequest, path: Path) -> None:
+    """Write the requests of a run to a file, and note how to continue."""
     with installed():
         from codebotler.models.batch import BatchModel
     from roboeval.evaluation.batches import write_requests
@@ -176,17 +173,17 @@ def write_batch(what: Requested, path: Path) -> None:
     with closing(BatchModel(what.name, what.settings)) as model:
         note_unsent(what.settings, model)
         run = what.run_of(model)
-        with metered("writing", len(what.plan.keys())) as tell:
-            count = write_requests(run, what.plan, model, path, progress=lambda done: tell(done, ""))
+        with progress_meter("writing", len(what.plan.keys())) as update:
+            count = write_requests(run, what.plan, model, path, progress=lambda done: update(done, ""))
     again = command("import", "ANSWERS.jsonl", "--out", run.path, suite=what.suite)
     note(
         f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` takes the answers"
     )
-    if count > MOST_REQUESTS:
-        note(f"OpenAI takes at most {MOST_REQUESTS:,} requests in a file; split it")
+    if count > MAX_BATCH_REQUESTS:
+        note(f"OpenAI takes at most {MAX_BATCH_REQUESTS:,} requests in a file; split it")
 
 
-@inherit_options(requested)
+@inherit_options(read_options)
 def run(
     *,
     tasks: TasksOption = None,
@@ -213,17 +210,17 @@ def run(
     if repair and retries:
         fail("--repair and --retries exclude each other; give one of them")
     if json and (repair or retries):
-        fail("--json prints the first programs only; leave it out, and evaluate each round's folder with it")
+        fail("--json excludes --repair and --retries; evaluate each round's folder with it instead")
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
 
-    what = requested(tasks=tasks, **options)
+    what = read_options(tasks=tasks, **options)
     suite, plan, model = what.suite, what.plan, what.open()
     note_unsent(what.settings, model)
     first = what.run_of(model)
-    expect_same_judge(first, plan.suite)  # before anything is paid for
-    path = complete(first, plan, model, what.pace)
+    expect_same_judge(first, plan.suite, ablated=False)  # before anything is paid for
+    path = complete_run(first, plan, model, what.pace)
     evaluate(
         str(path),
         suite=suite,
@@ -242,14 +239,14 @@ def run(
                 repair or retries,
                 repairs=bool(repair),
                 engine=lambda: engine_for(0),
-                complete=lambda run, plan: complete(run, plan, what.open(), what.pace),
+                complete=lambda run, plan: complete_run(run, plan, what.open(), what.pace),
             )
     if with_report:
         write_report_of(paths, suite, workers)
 
 
 def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
-    """Write the report of a run and its rounds to the folder of the run."""
+    """Write the report of a run and its rounds into the folder of the run."""
     folder = paths[0] / "report"
     try:
         report(paths, folder, suite=suite, workers=workers)
@@ -259,35 +256,37 @@ def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
         raise SystemExit(STOPPED) from None
 
 
-class Meter(ExitStack):
+class GenerationMeter(ExitStack):
     """Shows the progress of a run: its rate, its tokens and the time left."""
 
     progress: GenerationProgress | None = None
 
     def show(self, progress: GenerationProgress) -> None:
-        """Draw the bar; start it first, and note what was done before."""
+        """Update the progress bar; first start it, and note the completions there are."""
         if self.progress is None:
             self.progress = progress
             if progress.found:
                 note(f"{progress.found:,} of {counted(progress.total, 'completion')} were there already")
             if progress.interrupted:
-                note(f"{under_way(progress.interrupted)} when this was interrupted, which may be paid twice")
-            self._draw = self.enter_context(metered("generating", progress.total, progress.found))
+                note(
+                    f"{requests_under_way(progress.interrupted)} at the interruption; these may be paid twice"
+                )
+            self._draw = self.enter_context(progress_meter("generating", progress.total, progress.found))
         else:
             tokens = progress.usage.total()
             rate = f"{progress.rate:.1f} a second"
             self._draw(progress.done, f"{rate}, {tokens:,} tokens" if tokens else rate)
 
-    def after_a_stop(self) -> str:
-        """What Ctrl-C leaves behind, and how to go on."""
+    def stop_sentence(self) -> str:
+        """Say what Ctrl-C leaves behind, and how to continue."""
         if self.progress is None:
             return "stopped before the first request; run the same command again"
         kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are kept"
         open_requests = self.progress.under_way
-        paid = f"; {under_way(open_requests)}, which may be paid twice" if open_requests else ""
+        paid = f"; {requests_under_way(open_requests)}, which may be paid twice" if open_requests else ""
         return f"stopped; {kept}{paid}; the same command continues where it stopped"
 
 
-def under_way(requests: int) -> str:
-    """Such as `1 request was under way`."""
+def requests_under_way(requests: int) -> str:
+    """Format the number of pending requests, such as `1 request was under way`."""
     return f"{counted(requests, 'request')} {'was' if requests == 1 else 'were'} under way"

@@ -1,4 +1,4 @@
-"""The command for mutation testing of a suite."""
+"""The command mutate, which tests a suite by mutation."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import typer
 
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import load
-from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, named
-from roboeval.cli.output import note, print_rich, watched
+from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, path_to
+from roboeval.cli.output import note, print_rich, show_progress
 
 if TYPE_CHECKING:
     from roboeval.mutation.mutants import Original
@@ -32,7 +32,7 @@ def mutate(
     also: Annotated[
         list[str] | None,
         typer.Option(
-            help="Mutate the right ones of these programs, too: a run, or anything else that "
+            help="Mutate the right ones of these programs, too: a run, or another source that "
             "`roboeval evaluate` reads; may be given several times."
         ),
     ] = None,
@@ -53,7 +53,7 @@ def mutate(
     ] = 400,
     out: Annotated[
         Path | None,
-        typer.Option(help="Keep scores, mutants and survivors in this folder.", parser=named("a folder")),
+        typer.Option(help="Keep scores, mutants and survivors in this folder.", parser=path_to("a folder")),
     ] = None,
     brief: Annotated[bool, typer.Option("--brief", help="Only the tables, without the survivors.")] = False,
     at_least: Annotated[
@@ -71,9 +71,9 @@ def mutate(
     from roboeval.mutation.trials import mutation_score
 
     known = load(suite)
-    wanted = wanted_tasks(known, tasks)
+    wanted = select_tasks(known, tasks)
     further = named_programs(also or [], known)
-    score = partial(mutation_score, worlds=worlds, most=most, seed=seed, progress=watched)
+    score = partial(mutation_score, worlds=worlds, most=most, seed=seed, progress=show_progress)
     with WorkerPool(workers or cores(), one_process_per_run=one_process_per_run) as pool:
         scores = [score(task, known, pool, further=further.get(task.name, ())) for task in wanted]
     show_scores(scores, known.name, brief=brief)
@@ -84,14 +84,14 @@ def mutate(
         raise SystemExit(1)
 
 
-def wanted_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
-    """The tasks that a user names, also with commas, as other commands take them after --tasks."""
+def select_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
+    """Return the tasks with these names, which may be separated by commas."""
     names = [name for word in words or suite.tasks for name in word.split(",")]
     return [suite.task(name) for name in dict.fromkeys(names)]
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """The programs of a user's sources by task, with repetitions."""
+    """Read the programs of sources, by task and with repetitions."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original
@@ -105,7 +105,7 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
 
 
 def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> None:
-    """Print the tables and the survivors, and note what makes a score doubtful."""
+    """Print the tables and the survivors, and note warnings."""
     from rich.console import Group
     from rich.text import Text
 

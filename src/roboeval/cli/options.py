@@ -18,8 +18,8 @@ from roboeval.cli.completion_names import (
 from roboeval.cli.output import fail
 
 
-def named(what: str) -> Callable[[str], Path]:
-    """A reader of paths that refuses the empty one, which would be the current folder."""
+def path_to(what: str) -> Callable[[str], Path]:
+    """Return a parser of paths that refuses an empty string, which would be the current folder."""
 
     def path(text: str) -> Path:
         return Path(text) if text else fail(f"the argument is empty; name {what}")
@@ -32,7 +32,7 @@ SourceArgument = Annotated[
 ]
 KeepOption = Annotated[
     Path | None,
-    typer.Option(help="Keep completions and verdicts in this run folder.", parser=named("a run")),
+    typer.Option(help="Keep completions and verdicts in this run folder.", parser=path_to("a run")),
 ]
 RedoOption = Annotated[
     bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
@@ -43,7 +43,7 @@ TaskOption = Annotated[
 InWorldOption = Annotated[
     str | None, typer.Option(help="Only in this world: its number, from 1, or its description.")
 ]
-RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=named("a run"))]
+RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=path_to("a run"))]
 SuiteOption = Annotated[
     str,
     typer.Option(
@@ -60,8 +60,8 @@ HouseRulesOption = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="A file of house rules; a program is stopped where it breaks one, and has failed.",
-        parser=named("a file of rules"),
+        help="A file of house rules; a program that breaks one is stopped and fails.",
+        parser=path_to("a file of rules"),
     ),
 ]
 EngineOption = Annotated[
@@ -93,7 +93,7 @@ RequestsOption = Annotated[
     typer.Option(
         metavar="FILE",
         help="Ask no model, but write the requests to this file, for a batch endpoint.",
-        parser=named("a file"),
+        parser=path_to("a file"),
     ),
 ]
 FamiliesOption = Annotated[
@@ -110,7 +110,7 @@ NumTasksOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
-    Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=named("a run"))
+    Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=path_to("a run"))
 ]
 NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
 ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]

@@ -1,4 +1,4 @@
-"""Progress of commands, and how they end on wrong input."""
+"""Progress and errors of commands."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from typing import NoReturn, TypeVar
 
 from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, print_text, progress
 
-__all__ = ["fail", "metered", "note", "print_json", "print_rich", "print_text", "watched"]
+__all__ = ["fail", "note", "print_json", "print_rich", "print_text", "progress_meter", "show_progress"]
 
-FEWEST = 5  # things that must be done before it is told how long the rest takes
+MIN_DONE_FOR_ESTIMATE = 5  # items before the remaining time is estimated
 
-Item = TypeVar("Item")
+Watched = TypeVar("Watched")
 
 
-def watched(items: Iterable[Item], doing: str, total: int) -> Iterator[Item]:
-    """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
-    with metered(doing, total) as tell:
+def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
+    """Pass items on with a progress bar on a terminal, or else a line now and then."""
+    with progress_meter(doing, total) as update:
         for done, item in enumerate(items, 1):
             yield item
-            tell(done, "")  # only now it is done: who is interrupted by what this says has the item
+            update(done, "")  # the consumer has processed the item
 
 
 @contextmanager
-def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
-    """A progress bar, or lines; to be called with how much is done (`before` included) and a remark."""
+def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
+    """Show a progress bar, or lines; yield a function of the number done, `before` included, and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     more_column = TextColumn("{task.fields[more]}", markup=False)
@@ -37,7 +37,7 @@ def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, 
     with progress(*columns) as shown:
         job = shown.add_task(doing, total=total, completed=before, more="")
 
-        def tell(done: int, more: str) -> None:
+        def update(done: int, more: str) -> None:
             nonlocal next_line
             shown.update(job, completed=done, more=more)
             if shown.disable and monotonic() >= next_line:
@@ -45,17 +45,16 @@ def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, 
                 note(", ".join(filter(None, (f"{doing}: {done:,} of {total:,}", more, left))))
                 next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
 
-        yield tell
+        yield update
 
 
 def _left(done: int, to_do: int, seconds: float) -> str:
-    """How long the rest takes, at the rate so far."""
-    # At first, what starts takes most of the time.
-    is_telling = to_do and done >= FEWEST and done * 50 >= done + to_do
-    return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_telling else ""
+    # The first items are slow, since processes start.
+    is_reliable = to_do and done >= MIN_DONE_FOR_ESTIMATE and done * 50 >= done + to_do
+    return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_reliable else ""
 
 
 def fail(sentence: str) -> NoReturn:
-    """End with a sentence about what the user asked for."""
+    """Exit with status 2 and a sentence about the user's input."""
     note(f"roboeval: {sentence}")
     raise SystemExit(2)

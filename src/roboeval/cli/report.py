@@ -1,4 +1,4 @@
-"""The command report, which draws figures and a page about runs."""
+"""The command report, which writes figures and a page about runs."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.compare import checked
+from roboeval.cli.compare import check_run
 from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
-from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, named
-from roboeval.cli.output import fail, note, watched
+from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, path_to
+from roboeval.cli.output import fail, note, show_progress
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(help="Runs that were judged.", parser=named("a run"))],
-    out: Annotated[Path, typer.Option(help="The folder to write to.", parser=named("a folder"))],
+    runs: Annotated[list[Path], typer.Argument(help="Runs that were judged.", parser=path_to("a run"))],
+    out: Annotated[Path, typer.Option(help="The folder to write to.", parser=path_to("a folder"))],
     suite: SuiteOption = "paper",
     published: Annotated[
         bool, typer.Option("--published", help="Add the paper's published causes of failures.")
@@ -49,8 +49,8 @@ def report(
     import atexit
     import gc
 
-    gc.disable()  # a fifth of the time would go into looking for cycles among all that a report holds,
-    atexit.register(gc.freeze)  # for the last time when Python ends
+    gc.disable()  # garbage collection would take a fifth of the time,
+    atexit.register(gc.freeze)  # also when Python exits
     from codebotler.core.terminal import busy
     from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines import Local
@@ -80,7 +80,7 @@ def report(
     with busy("putting together"):
         parts = sections(read, with_published=published, prices=prices, command=again)
     written = write_report(*headline(read), parts, out)
-    for _ in watched(written, "writing", pieces(parts)):
+    for _ in show_progress(written, "writing", pieces(parts)):
         pass
     if rules is None:
         note_houses([one.results.run for one in opened], suite)
@@ -90,9 +90,9 @@ def report(
 def judged_run(
     results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
 ) -> JudgedRun:
-    """A run with its ablation, if that was judged, and its verdicts by the suite `beside` and with rules.
+    """Read a run with its ablation, if that was judged, its verdicts by another suite and with house rules.
 
-    Programs are checked on `engine`; without one, earlier answers of the check are left out, too.
+    The engine checks programs; without one, earlier results of the check are left out, too.
     """
     import polars as pl
 
@@ -106,7 +106,7 @@ def judged_run(
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
-        table = checked(results, engine=engine)
+        table = check_run(results, engine=engine)
     if beside is not None:
         other = open_current(run.path, beside, ablated=False, reuse_from=results).results
     if rules is not None:

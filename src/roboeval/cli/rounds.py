@@ -1,4 +1,4 @@
-"""Further rounds of `roboeval run`: rejected programs are requested again or repaired, and all are judged."""
+"""Further rounds of `roboeval run`, which request rejected programs again and judge all programs."""
 
 from __future__ import annotations
 
@@ -7,29 +7,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from codebotler.core.terminal import print_rich
-from roboeval.cli.output import watched
+from roboeval.cli.output import show_progress
 
 if TYPE_CHECKING:
     from roboeval.cli.views.rounds import Round
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.runs.completions import Completion, Key
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.completions import Completion, CompletionKey
+    from roboeval.evaluation.runs.folder import RunFolder
 
 
 def further_rounds(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
     most: int,
     *,
     repairs: bool,
     engine: Callable[[], OpenEngine],
-    complete: Callable[[Run, GenerationPlan], Path],
+    complete: Callable[[RunFolder, GenerationPlan], Path],
 ) -> list[Path]:
-    """Request rejected programs again, round by round, judge all, and print what that brings.
+    """Request rejected programs again, in at most `most` rounds, and print the results of each round.
 
-    Returns:
-        the folders of the rounds, of which there are fewer once the check accepts all programs.
+    Returns the folders of the rounds, which end when the check accepts all programs.
     """
     from roboeval.cli.views.rounds import rounds_view
     from roboeval.evaluation.rounds import RoundPlan
@@ -37,7 +36,8 @@ def further_rounds(
     found: list[Round] = []
     runs = [run]
     while True:
-        completions = {one.key: one for one in runs[-1].read(plan.suite) if _is_of(one.key, plan)}
+        planned = {*plan.keys()}
+        completions = {one.key: one for one in runs[-1].read(plan.suite) if one.key in planned}
         problems = dict(_rejected(runs[-1], plan, completions, engine()))
         found.append(_round(runs[-1], plan, completions, problems, len(found), engine()))
         if not problems or len(found) > most:
@@ -57,28 +57,24 @@ def further_rounds(
     return [one.path for one in runs[1:]]
 
 
-def _is_of(key: Key, plan: GenerationPlan) -> bool:
-    return (plan.tasks is None or key[0] in plan.tasks) and key[2] < plan.num_completions
-
-
 def _rejected(
-    run: Run, plan: GenerationPlan, completions: dict[Key, Completion], engine: OpenEngine
-) -> Iterator[tuple[Key, list[str]]]:
+    run: RunFolder, plan: GenerationPlan, completions: dict[CompletionKey, Completion], engine: OpenEngine
+) -> Iterator[tuple[CompletionKey, list[str]]]:
     from roboeval.evaluation.checks import check_programs
 
     programs = {(one.task, one.program_sha256) for one in completions.values()}
     checking = check_programs(run, plan.suite, completions.values(), engine, samples=5, seed=0)
-    problems = dict(watched(checking, "checking", len(programs)))
+    problems = dict(show_progress(checking, "checking", len(programs)))
     for key, one in completions.items():
         if listed := problems[one.task, one.program_sha256]:
             yield key, listed
 
 
 def _round(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
-    completions: dict[Key, Completion],
-    problems: dict[Key, list[str]],
+    completions: dict[CompletionKey, Completion],
+    problems: dict[CompletionKey, list[str]],
     number: int,
     engine: OpenEngine,
 ) -> Round:
@@ -93,7 +89,7 @@ def _round(
 
     rows = evaluate_run(run, plan.suite, ablated=False, tasks=plan.tasks, redo=False, engine=engine)
     tally, usage = Tally(), no_usage()
-    for row in watched(rows, "judging", len(completions)):
+    for row in show_progress(rows, "judging", len(completions)):
         if key_of(row) in completions:
             tally.add(row)
     requested = [one for one in completions.values() if round_of(one) == number]

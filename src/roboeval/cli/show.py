@@ -1,4 +1,4 @@
-"""The commands show, export and serve, which show what was judged."""
+"""The commands show, export and serve, which present judged runs."""
 
 from __future__ import annotations
 
@@ -19,14 +19,21 @@ from codebotler.cli.options import (
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import (
     command,
-    complaint_of,
     load,
     note_houses,
     open_current,
     open_run,
-    unfinished_of,
+    stale_sentence,
+    unfinished_sentence,
 )
-from roboeval.cli.options import AblationOption, HouseRulesOption, JsonOption, RunArgument, SuiteOption, named
+from roboeval.cli.options import (
+    AblationOption,
+    HouseRulesOption,
+    JsonOption,
+    RunArgument,
+    SuiteOption,
+    path_to,
+)
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:
@@ -34,8 +41,8 @@ if TYPE_CHECKING:
 
     from roboeval.analysis.broken_rules import BrokenRules
     from roboeval.analysis.summary import EvaluationSummary
-    from roboeval.evaluation.runs.completions import Key
-    from roboeval.evaluation.runs.folder import Run
+    from roboeval.evaluation.runs.completions import CompletionKey
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.results import Results
     from roboeval.evaluation.runs.selection import Selection
     from roboeval.suites.load import Suite
@@ -70,7 +77,7 @@ def show(
     if not is_one and (in_full or with_reply):
         option = "--all" if in_full else "--reply"
         fail(f"{option} applies to one completion; name it as TASK/PROMPT/INDEX, or leave out {option}")
-    judged, again = open_run(run, suite, ablated=ablation, rules=rules)
+    judged, again = open_run(run, suite, ablated=ablation, rules=rules, completion=what if is_one else None)
     selection = parse_selection(what, judged.known_suite)
     if selection.task is None:
         show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
@@ -81,14 +88,14 @@ def show(
     else:
         selection.expect_judged(judged)
         show_part(judged, selection.task, selection.prompt, as_json=json)
-    if (complaint := complaint_of(judged)) is not None:
+    if (complaint := stale_sentence(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
-    if not is_one and (unfinished := unfinished_of(judged)) is not None:
+    if not is_one and (unfinished := unfinished_sentence(judged)) is not None:
         note(f"{unfinished}; `{again}` continues")
 
 
-def house_of(run: Run | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
-    """How a run did by the rules of a house, beside its evaluation without them if there is one."""
+def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
+    """Count broken house rules, and compare with the evaluation without rules if there is one."""
     from roboeval.analysis.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.evaluation.runs.results import read_results
@@ -104,7 +111,7 @@ def print_summary(
     *,
     title: str,
     as_json: bool,
-    stale: Iterable[Key] = (),
+    stale: Iterable[CompletionKey] = (),
     house: BrokenRules | None = None,
 ) -> None:
     """Print the tables of an evaluation."""
@@ -158,12 +165,12 @@ def show_completion(
     with_reply: bool,
     as_json: bool,
 ) -> None:
-    """Print a completion, and the command that shows the program nearest to one that fails."""
+    """Print a completion, and for one that fails the command that shows the nearest program that passes."""
     from codebotler.core.words import counted
-    from roboeval.analysis.cluster import nearest_fix
+    from roboeval.analysis.failure_groups import nearest_fix
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.explanation import completion_data
-    from roboeval.evaluation.failures import NO_PROGRAM
+    from roboeval.evaluation.failures import NO_PROGRAM_CLASS
 
     selection.expect_judged(judged)
     key = selection.key
@@ -173,7 +180,7 @@ def show_completion(
         print_json({**data, "ablation": judged.is_ablated})
     else:
         print_rich(completion_view(data, in_full=in_full, with_reply=with_reply))
-    if data["passed"] or data["failure"]["class"] == NO_PROGRAM:
+    if data["passed"] or data["failure"]["class"] == NO_PROGRAM_CLASS:
         return
     if (fix := nearest_fix(judged, key)) is not None:
         again = command("show", judged.run.path, fix.name, suite=suite, ablated=judged.is_ablated)
@@ -186,7 +193,8 @@ def export(
         str | None, typer.Option(help="csv or parquet; by default the ending of --out, or csv.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="The file; by default beside the verdicts.", parser=named("a file"))
+        Path | None,
+        typer.Option(help="The file; by default next to the verdicts.", parser=path_to("a file")),
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
@@ -196,7 +204,7 @@ def export(
 ) -> None:
     """Write a run's verdicts as one flat table."""
     from codebotler.core.files import expect_replaceable
-    from roboeval.evaluation.runs.table import BEGINNINGS, Price, kind_of, with_cost, write_table
+    from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, kind_of, with_cost, write_table
 
     kind = format or kind_of(out)
     try:
@@ -206,7 +214,7 @@ def export(
     results = open_current(run, suite, ablated=ablation).results
     table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
-    expect_replaceable(path, *BEGINNINGS)
+    expect_replaceable(path, *TABLE_BEGINNINGS)
     write_table(table, path, kind)
     note(f"the table is in {path}")
 
@@ -236,10 +244,10 @@ def serve(
     from roboeval.web.run_store import RunStore
 
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
-    access = Access.asked_for(token, None, open_to_all=no_token, is_private=place.is_private)
+    access = Access.from_options(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
-        raise UserError("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
+        raise UserError("there is no such folder; `roboeval run` creates it with the first run", file=runs)
     suites = [load(each) for each in suite or ()]
     if not RunStore(runs).names():
-        note(f"{runs} has no runs yet; new ones will be shown")
+        note(f"{runs} has no runs yet; new ones will appear")
     server.serve(None, place, access, (pages(suites),), runs)

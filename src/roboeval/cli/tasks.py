@@ -1,4 +1,4 @@
-"""The command tasks."""
+"""The command tasks, which lists, shows, lints and starts tasks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import command, load
 from roboeval.cli.options import JsonOption, SuiteOption
-from roboeval.cli.output import fail, note, print_json, print_rich, print_text, watched
+from roboeval.cli.output import fail, note, print_json, print_rich, print_text, show_progress
 
 if TYPE_CHECKING:
     from roboeval.suites.load import Suite
@@ -55,7 +55,7 @@ def tasks(
 
 
 def show(suite: Suite, task: str | None, *, clauses: bool) -> None:
-    """Print the tasks of a suite, or one; or the clauses of their prompts."""
+    """Print the tasks of a suite, one task, or the clauses of their prompts."""
     from roboeval.cli.views.tasks import clauses_view, suite_task_view, suite_view
 
     if clauses:
@@ -72,7 +72,7 @@ def show(suite: Suite, task: str | None, *, clauses: bool) -> None:
 
 
 def start(task: str, suite: str) -> None:
-    """Start a task in a folder, and note how to go on."""
+    """Start a task in a folder."""
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import shipped_suites
     from roboeval.suites.new_task import new_task
@@ -80,14 +80,14 @@ def start(task: str, suite: str) -> None:
     brought = [one.package for one in installed_suites() if one.name == suite]
     if suite in shipped_suites() or brought:
         whose = f"belongs to the package {brought[0]}" if brought else "ships with RoboEval"
-        fail(f'the suite "{suite}" {whose} and stays as it is; name a folder of your own with --suite')
+        fail(f'the suite "{suite}" {whose} and cannot be changed; name your own folder with --suite')
     path = new_task(Path(suite), task)
     lint = command("tasks", "--lint", suite=suite)
     note(f"{path} is a complete task; edit it, and check it with `{lint}`")
 
 
 def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
-    """Print what the linter finds in all tasks or one; status 1 if anything is open."""
+    """Print the findings of the linter; exit with status 1 if one is not accepted."""
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint
@@ -95,14 +95,14 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     linted = (lint(one, judge_solutions(one, suite, workers=cores())) for one in wanted)
-    findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
+    findings = [found for several in show_progress(linted, "linting", len(wanted)) for found in several]
     print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)
 
 
 def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
-    """The tasks of a suite, or only one, as JSON."""
+    """Return the tasks of a suite, or only one, as JSON data."""
     tasks = [
         {
             "task": task.name,
@@ -119,19 +119,15 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
 
 
 def other_suites(name: str) -> Iterator[str]:
-    """Sentences about the other suites that --suite takes, and about installed ones that are unusable."""
+    """Yield sentences about the other suites that --suite takes, and about installed ones that fail."""
     from codebotler.core.errors import UserError
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import load_suite, shipped_suites
 
-    shipped = shipped_suites()
-    others = [one for one in shipped if one != name]
+    others = [one for one in shipped_suites() if one != name]
     for suite in installed_suites():
-        if suite.name in shipped:
-            yield (
-                f'the package {suite.package} names a suite "{suite.name}", as one is named that ships '
-                "with RoboEval, so that nobody can ask for it; rename it there"
-            )
+        if suite.name in shipped_suites():
+            yield f'the suite "{suite.name}" of {suite.package} has the name of a built-in suite; rename it'
             continue
         try:
             load_suite(suite.name)
@@ -140,4 +136,4 @@ def other_suites(name: str) -> Iterator[str]:
         else:
             others += [f"{suite.name} ({suite.package})"] * (suite.name != name)
     if others:
-        yield f"other suites, by --suite: {', '.join(others)}; or the folder of your own"
+        yield f"other suites, by --suite: {', '.join(others)}; or your own folder"

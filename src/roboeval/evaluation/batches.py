@@ -1,4 +1,4 @@
-"""Completions by way of files: the requests of a run for a batch endpoint, and its answers."""
+"""Batch endpoints: files with the requests of a run, and files of answers."""
 
 from __future__ import annotations
 
@@ -36,35 +36,28 @@ from roboeval.evaluation.requests import (
     timestamp,
     with_batch,
 )
-from roboeval.evaluation.runs.completions import Key, how_many, reply_row
-from roboeval.evaluation.runs.folder import Run, load_head
-from roboeval.evaluation.runs.source import LONGEST_ANSWER
+from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
+from roboeval.evaluation.runs.folder import RunFolder, load_json_object
+from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
 from roboeval.suites.load import Suite
 
 BEGINNING = b'{"custom_id": '
 IDENTITY = ("model", "settings", "template", "suite")  # entries of run.json
-ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
+REQUEST_ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
 
 
 def write_requests(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
     model: BatchModel,
     path: Path,
     *,
     progress: Callable[[int], object] = bool,
 ) -> int:
-    """Write requests for the completions that a run lacks, and begin the run; return how many there are.
+    """Write requests for the missing completions of a run to a file, start the run, and return their number.
 
-    Args:
-        run: the run in which the answers will be kept.
-        plan: the completions that it should have.
-        model: the model that is to be asked.
-        path: the file of JSON lines to write.
-        progress: called with the number of requests that are written, each time that it has grown.
-
-    Raises:
-        UserError: no completion is missing, the run is of another kind, or the file holds something else.
+    `progress` is called with the number of requests so far. Raises UserError if no completion is missing,
+    the run was generated otherwise, or the file is not one of requests.
     """
     expect_replaceable(path, BEGINNING)
     with run.writing():
@@ -86,14 +79,8 @@ def write_requests(
     return len(todo)
 
 
-def request_id(about: Mapping[str, Any], key: Key, instruction: str) -> str:
-    """The name of a request, with a hash of all that it depends on: no other run has the same one.
-
-    Args:
-        about: the run.json of its run.
-        key: of the completion.
-        instruction: the instruction that the completion is for.
-    """
+def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -> str:
+    """Return a name of a request that is unique among runs, by a hash of its instruction and of run.json."""
     mark = hashlib.sha256(to_line([*(about.get(name) for name in IDENTITY), instruction])).hexdigest()[:8]
     task, prompt, index = key
     return f"{task}/{prompt}/{index}/{mark}"
@@ -103,46 +90,32 @@ def request_id(about: Mapping[str, Any], key: Key, instruction: str) -> str:
 
 
 @dataclass(frozen=True)
-class Imported:
-    """What a run holds after answers were added.
+class ImportResult:
+    """The state of a run after answers were added."""
 
-    Args:
-        new: how many completions were added.
-        total: how many the run should have.
-        failed: the error of each request that failed and has no completion.
-        unanswered: the requests that have neither a completion nor an error.
-    """
-
-    new: int
-    total: int
-    failed: Mapping[Key, str] = field(repr=False)
-    unanswered: Sequence[Key] = field(repr=False)
+    new: int  # completions that were added
+    total: int  # completions that the run should have
+    failed: Mapping[CompletionKey, str] = field(repr=False)  # errors of requests without a completion
+    unanswered: Sequence[CompletionKey] = field(repr=False)  # requests without completion and error
 
 
 @dataclass(frozen=True)
 class _Answer:
-    """What a batch endpoint says of a request."""
+    """An answer of a batch endpoint to a request."""
 
-    key: Key
+    key: CompletionKey
     status: int
     body: object
 
 
 def import_answers(
-    run: Run, suite: Suite, path: Path, *, progress: Callable[[int], object] = bool
-) -> Imported:
-    """Add the completions in a file of answers to the run that `write_requests` began.
+    run: RunFolder, suite: Suite, path: Path, *, progress: Callable[[int], object] = bool
+) -> ImportResult:
+    """Add the completions in a file of answers to the run that `write_requests` started.
 
-    A completion that is there stays; the first reply to a request counts.
-
-    Args:
-        run: the run.
-        suite: the suite of the run.
-        path: the file of answers.
-        progress: called with the number of answers that are read, each time that it has grown.
-
-    Raises:
-        UserError: the run is of another kind, or a line is no answer to a request of it. Nothing is added.
+    Completions of the run stay; the first reply to a request counts. `progress` is called with the number
+    of answers so far. Raises UserError, and adds nothing, if the run was generated otherwise or a line is
+    not an answer to one of its requests.
     """
     about = _expect_begun(run, suite)
     plans = [_plan(suite, batch) for batch in batches(about)]
@@ -165,18 +138,15 @@ def import_answers(
         if new:
             _add(run, about, new, usage, is_whole=not missing)
     failed = {key: found.failed[key] for key in missing if key in found.failed}
-    return Imported(len(new), len(expected), failed, [key for key in missing if key not in failed])
+    return ImportResult(len(new), len(expected), failed, [key for key in missing if key not in failed])
 
 
-BatchLine: TypeAlias = tuple[
-    bytes, Mapping[str, Any]
-]  # a row of completions.jsonl, and the tokens that it took
+BatchLine: TypeAlias = tuple[bytes, Mapping[str, Any]]  # a line of completions.jsonl, and its tokens
 
 
 def _add(
-    run: Run, about: dict[str, Any], lines: list[BatchLine], usage: Counter[str], *, is_whole: bool
+    run: RunFolder, about: dict[str, Any], lines: list[BatchLine], usage: Counter[str], *, is_whole: bool
 ) -> None:
-    """Add rows to a run, and to its run.json the tokens."""
     with closing(Appender(run.completions)) as file:
         for line, used in lines:
             file.append(line)
@@ -189,14 +159,14 @@ def _add(
 
 @dataclass
 class _Replies:
-    """The replies in answers, as lines of completions.jsonl."""
+    """Collects the replies in answers as lines of completions.jsonl."""
 
     model: BatchModel
     plan: GenerationPlan
-    there: set[Key]  # completions that the run has
-    lines: dict[Key, BatchLine] = field(default_factory=dict)
-    failed: dict[Key, str] = field(default_factory=dict)
-    refused: dict[Key, ModelError] = field(default_factory=dict)
+    there: set[CompletionKey]  # completions that the run has
+    lines: dict[CompletionKey, BatchLine] = field(default_factory=dict)
+    failed: dict[CompletionKey, str] = field(default_factory=dict)
+    refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def add(self, answer: _Answer) -> None:
         """Add an answer, unless its request has a reply."""
@@ -217,13 +187,13 @@ class _Replies:
                 self.refused[key] = error
 
     def keep_refused(self) -> None:
-        """Keep what the endpoint refused for good, if it took another request of the run."""
+        """Keep requests that the endpoint refused permanently, if it accepted another request."""
         if self.there or self.lines:
             for key, error in self.refused.items():
                 if key not in self.lines:
                     self._keep(key, reply_of_refusal(error))
 
-    def _keep(self, key: Key, reply: Reply) -> None:
+    def _keep(self, key: CompletionKey, reply: Reply) -> None:
         row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
         line = to_line(row)
         if len(line) > MAX_ROW:
@@ -232,14 +202,12 @@ class _Replies:
         self.failed.pop(key, None)
 
 
-def _expect_begun(run: Run, suite: Suite) -> dict[str, Any]:
-    """The run.json of a run that `write_requests` began by a suite."""
+def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     if not run.about.is_file():
-        begin = "name the run of `roboeval generate --requests`, which keeps them"
-        raise UserError(f"is no run; these are answers to requests of a run; {begin}", file=run.path)
-    about = load_head(run.about)
+        raise UserError("is not the run of `roboeval generate --requests`; name that one", file=run.path)
+    about = load_json_object(run.about)
     if not isinstance(about.get("settings"), dict) or not batches(about):
-        raise UserError("holds imported completions, which answers cannot be added to", file=run.path)
+        raise UserError("holds imported completions; name the run of the requests", file=run.path)
     if about.get("suite") != suite.name:
         raise UserError(f'is of the suite "{about.get("suite")}"; name it with --suite', file=run.path)
     return about
@@ -250,9 +218,8 @@ def _plan(suite: Suite, batch: Mapping[str, Any]) -> GenerationPlan:
     return GenerationPlan(suite, None if tasks is None else frozenset(tasks), batch["num_completions"])
 
 
-def _answers(path: Path, ids: Mapping[str, Key]) -> Iterator[_Answer]:
-    """The answers in a file; raises UserError if a line is none, or one to another request."""
-    for number, line in read_lines(path, limit=LONGEST_ANSWER):
+def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[_Answer]:
+    for number, line in read_lines(path, limit=MAX_ANSWER_BYTES):
         if not line.strip():
             continue
         try:
@@ -261,16 +228,16 @@ def _answers(path: Path, ids: Mapping[str, Key]) -> Iterator[_Answer]:
             raise UserError(error.sentence, file=path, line=number) from None
 
 
-def _answer(line: bytes, ids: Mapping[str, Key]) -> _Answer:
+def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> _Answer:
     row = parsed_row(line)
     if row is None:
         raise UserError("this line is not JSON; perhaps the file is incomplete")
     name = row.get("custom_id")
     if "response" not in row and "error" not in row:
-        what = "a request" if "method" in row else "no answer of a batch endpoint"
+        what = "a request" if "method" in row else "not an answer of a batch endpoint"
         raise UserError(f"this line is {what}; name the file of answers")
     if not isinstance(name, str) or name not in ids:
-        known = isinstance(name, str) and ID.fullmatch(name)
+        known = isinstance(name, str) and REQUEST_ID.fullmatch(name)
         whose = "of another run, or of other settings" if known else "that no run has"
         raise UserError(f"this line answers a request {whose}: {name!r}")
     response, error = row.get("response"), row.get("error")

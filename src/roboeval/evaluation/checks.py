@@ -1,4 +1,4 @@
-"""The problems that checking finds in a run's programs, kept in the run so that each is checked once."""
+"""The check of a run's programs, whose results the run keeps so that each program is checked once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON_VERSION, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_json_object
 from roboeval.evaluation.runs.rows import read_checks
 from roboeval.suites.load import Suite
 
@@ -24,11 +24,17 @@ ProgramKey: TypeAlias = tuple[str, str]  # a task and the hash of a program
 
 
 def check_programs(
-    run: Run, suite: Suite, completions: Iterable[Completion], engine: OpenEngine, *, samples: int, seed: int
+    run: RunFolder,
+    suite: Suite,
+    completions: Iterable[Completion],
+    engine: OpenEngine,
+    *,
+    samples: int,
+    seed: int,
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Yield the problems of each program, checking those that nobody has checked with these settings.
+    """Yield the problems of each program; check those that were not checked with these settings before.
 
-    Of the world, a check knows the rooms: those of the first world of the task. House rules are the suite's.
+    A check knows the rooms of the task's first world, and the suite's house rules.
     """
     metadata = {
         "suite": suite.name,
@@ -42,7 +48,7 @@ def check_programs(
         metadata["house_rules"] = suite.house.digest
     with (
         run.writing(),
-        contextlib.closing(_open(run, evaluation_key(suite, ablated=False), metadata)) as file,
+        contextlib.closing(_open_checks(run, evaluation_key(suite, ablated=False), metadata)) as file,
     ):
         known = dict(read_checks(file.path))
         programs = {(c.task, c.program_sha256): c.program for c in completions}
@@ -54,22 +60,22 @@ def check_programs(
         settings = CheckSettings(
             samples=samples,
             seed=seed,
-            rules=suite.rules,
+            simulation=suite.settings,
             skills=suite.skills,
             house_rules=() if suite.house is None else suite.house.rules,
         )
         check = partial(_check, plans, settings)
         works = ((task, program) for (task, _), program in new.items())
         with engine as opened:
-            for key, problems in zip(new, opened.map_distinct(check, works, _sentences), strict=True):
+            for key, problems in zip(new, opened.map_distinct(check, works, _problem_sentences), strict=True):
                 file.append(to_line({"task": key[0], "program_sha256": key[1], "problems": problems}))
                 yield key, problems
 
 
-def _open(run: Run, key: str, metadata: dict[str, Any]) -> Appender:
-    rows, about = run.checks(key), run.checks_head(key)
+def _open_checks(run: RunFolder, key: str, metadata: dict[str, Any]) -> Appender:
+    rows, about = run.checks(key), run.checks_manifest(key)
     about.parent.mkdir(exist_ok=True)
-    if not about.exists() or load_head(about) != metadata:
+    if not about.exists() or load_json_object(about) != metadata:
         rows.unlink(missing_ok=True)
         write_whole(about, to_text(metadata))
     return Appender(rows)
@@ -81,5 +87,5 @@ def _check(
     return checks_on(worker, [(program, plans[task]) for task, program in works], settings)
 
 
-def _sentences(check: Check) -> list[str]:
+def _problem_sentences(check: Check) -> list[str]:
     return [problem.sentence for problem in check.problems]

@@ -1,4 +1,4 @@
-"""Where programs run: on the cores of this machine, or on those of a Ray cluster."""
+"""Engines, which run programs on this machine or on a Ray cluster."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool, without_filter
 from codebotler.simulator.worker import EngineError, Worker
 
-PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
+PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # verdicts depend on it
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
-Ran = TypeVar("Ran")
-Value = TypeVar("Value")
-RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[Ran]]
-"""Runs a few programs on a worker, and returns a result for each."""
+RawResult = TypeVar("RawResult")
+WorkResult = TypeVar("WorkResult")
+RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[RawResult]]
+"""Runs a few programs on a worker and returns a result for each."""
 
 
 class Engine(Protocol):
-    """Calls functions that run programs isolated."""
+    """Runs programs isolated."""
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
-        """The values of `then`, in the order of the programs, which are read as needed; equal ones run once.
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
+    ) -> Iterator[WorkResult]:
+        """Run programs, equal ones once, and yield `then` of each result, in their order.
 
-        `function` and its results can be pickled; `then` runs in the main thread of a process if possible.
+        `function` and its results must be picklable; `then` runs in the main thread of a process if possible.
         """
         ...
 
@@ -37,13 +37,15 @@ class Engine(Protocol):
 OpenEngine = AbstractContextManager[Engine]
 
 
-BRIEF = 100_000  # events and the like that are made before garbage is looked for: nearly all live briefly
+GC_THRESHOLD = (
+    100_000  # events and the like that are made before garbage is looked for: nearly all live briefly
+)
 
 
 class Local:
-    """The cores of this machine: given pool, or some of its own, which end with the context."""
+    """Engine on this machine: uses a given pool, or one of its own with so many workers."""
 
-    def __init__(self, pool: WorkerPool | int, **isolation: bool) -> None:  # as of `WorkerPool`
+    def __init__(self, pool: WorkerPool | int, **isolation: bool) -> None:
         self._given, self._isolation = pool, isolation
 
     def __enter__(self) -> Self:
@@ -52,7 +54,7 @@ class Local:
         else:
             self._pool = WorkerPool(self._given, **self._isolation).__enter__()
         self._threshold = gc.get_threshold()
-        gc.set_threshold(BRIEF, *self._threshold[1:])
+        gc.set_threshold(GC_THRESHOLD, *self._threshold[1:])
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -61,8 +63,8 @@ class Local:
             self._pool.__exit__()
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
+    ) -> Iterator[WorkResult]:
         """See `Engine`."""
         here = self._pool.here
         return self._pool.map_distinct(
@@ -70,12 +72,9 @@ class Local:
         )
 
 
-# --- in other processes
-
-
 @cache
 def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """The worker of this process, kept for the next programs."""
+    """Return the worker of this process, and start it first if need be."""
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()

@@ -1,4 +1,4 @@
-"""Judges a run's completions, going on where an earlier evaluation stopped, and only if it judged alike."""
+"""Judges a run's completions, and continues an earlier evaluation if suite and tool are the same."""
 
 from __future__ import annotations
 
@@ -14,41 +14,42 @@ from codebotler.core.files import Appender, to_text, write_whole
 from codebotler.core.skills.files import files_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import brief
-from codebotler.simulator.settings import PAPER
+from codebotler.simulator.settings import PAPER_SETTINGS
 from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
 from roboeval.evaluation.judge import judgements
-from roboeval.evaluation.runs.completions import Completion, Key, name_of
-from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head, selected_tasks
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
 from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 
 def evaluate_run(
-    run: Run,
+    run: RunFolder,
     suite: Suite,
     *,
     ablated: bool,
-    tasks: frozenset[str] | None,  # None for all
+    tasks: frozenset[str] | None,
     redo: bool,
     workers: int = 1,
     engine: OpenEngine | None = None,
-    completions: Iterable[Completion] | None = None,  # those of the run, if they were read before
+    completions: Iterable[Completion] | None = None,
 ) -> Iterator[Row]:
-    """Judge those completions of tasks that an earlier evaluation has not judged; yield all their rows.
+    """Judge the completions of tasks that have no row yet; yield the rows of all completions of the tasks.
 
-    Rows of other tasks stay. A completion whose judging takes too long has no row, and is tried again.
+    Rows of other tasks stay. A completion that takes too long to judge has no row, so the next evaluation
+    tries it again. `completions` are those of the run, if they were read before.
     """
     key = evaluation_key(suite, ablated=ablated)
     with run.writing():
         run.rows(key).parent.mkdir(exist_ok=True)
         if redo:
-            for path in (run.rows(key), run.head(key)):
+            for path in (run.rows(key), run.manifest(key)):
                 path.unlink(missing_ok=True)
-        was = _expect_same(run, suite, ablated=ablated)
+        was = expect_same_judge(run, suite, ablated=ablated)
         about = evaluation_metadata(suite, ablated=ablated, tasks=_selected(tasks, was))
         if was is None:
-            write_whole(run.head(key), to_text(about))
+            write_whole(run.manifest(key), to_text(about))
         written = {one.key: one for one in (run.read(suite) if completions is None else completions)}
         with contextlib.closing(Appender(run.rows(key))) as rows:
             seal, left = Seal(), dict(written)
@@ -59,7 +60,7 @@ def evaluate_run(
                     yield line.row
             left = {key: one for key, one in left.items() if _is_in(one.task, selected_tasks(about))}
             if was is not None and is_sealed(was) and (left or seal.is_broken(was)):
-                write_whole(run.head(key), to_text(about))
+                write_whole(run.manifest(key), to_text(about))
             wanted = [one for one in left.values() if _is_in(one.task, tasks)]
             for completion, judgement in judgements(
                 wanted, suite, ablated=ablated, engine=engine or Local(workers)
@@ -74,7 +75,7 @@ def evaluate_run(
             finished = {**about, **seal.data()}
             if not left and finished != was:
                 rows.sync()
-                write_whole(run.head(key), to_text(finished))
+                write_whole(run.manifest(key), to_text(finished))
 
 
 def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
@@ -82,9 +83,11 @@ def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
 
 
 def _expect_of_run(
-    line: LocatedRow, written: Mapping[Key, Completion], left: Mapping[Key, Completion], file: Path
+    line: LocatedRow,
+    written: Mapping[CompletionKey, Completion],
+    left: Mapping[CompletionKey, Completion],
+    file: Path,
 ) -> None:
-    """Raise UserError where a row judges what is not in the run, or judges it again."""
     key = key_of(line.row)
     completion = written.get(key)
     if completion is None:
@@ -98,31 +101,31 @@ def _expect_of_run(
     raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
-# --- by what a run is judged
+# --- the suite and tool of an evaluation
 
 
-OPTIONAL_RULES = ("words_for_people", "words_for_yes", "words_for_no")  # rules that are left out where empty
+OPTIONAL_SETTINGS = ("words_for_people", "words_for_yes", "words_for_no")  # left out if empty
 
 
 def evaluation_metadata(
     suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
 ) -> dict[str, Any]:
-    """The content of KEY.json: by what the rows of some tasks, or of all, are judged."""
-    rules = suite.rules
+    """Return the content of KEY.json, which identifies what judges the rows of some tasks, or of all."""
+    settings = suite.settings
     return {
         "suite": suite.name,
         "version": suite.version,
         "digest": suite.digest,
         **({} if suite.worlds is None else {"worlds": suite.worlds, "seed": suite.seed}),
         "rules": {
-            "literals": rules.literals,
-            "matching": rules.matching,
-            "people": rules.people,
-            **{name: list(words) for name in OPTIONAL_RULES if (words := getattr(rules, name))},
-            **({"events": rules.events} if rules.events != PAPER.events else {}),
-            "limits": {name: getattr(rules.limits, name) for name in ("seconds", "calls", "ticks")},
+            "literals": settings.literals,
+            "matching": settings.matching,
+            "people": settings.people,
+            **{name: list(words) for name in OPTIONAL_SETTINGS if (words := getattr(settings, name))},
+            **({"events": settings.events} if settings.events != PAPER_SETTINGS.events else {}),
+            "limits": {name: getattr(settings.limits, name) for name in ("seconds", "calls", "ticks")},
             "skill_seconds": 0,
-            "clock_starts": rules.clock_starts.isoformat(),
+            "clock_starts": settings.clock_starts.isoformat(),
         },
         **(
             {}
@@ -138,35 +141,29 @@ def evaluation_metadata(
 
 
 def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> frozenset[str] | None:
-    """The tasks that an evaluation has judged, and those that it judges now."""
     before = frozenset() if was is None else selected_tasks(was)
     return None if tasks is None or before is None else tasks | before
 
 
-def expect_same_judge(run: Run, suite: Suite) -> None:
-    """Raise UserError if an evaluation of a run cannot go on, since the suite or the tool has changed."""
-    _expect_same(run, suite, ablated=False)
-
-
-def _expect_same(run: Run, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
-    """The content of KEY.json, None if there is none; raises UserError if the rows were judged otherwise."""
+def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
+    """Return the content of KEY.json, if any; raise UserError if the suite or the tool has changed."""
     key = evaluation_key(suite, ablated=ablated)
-    path, rows = run.head(key), run.rows(key)
+    path, rows = run.manifest(key), run.rows(key)
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise UserError(
-                "is missing, so it is unknown how the rows were judged; --redo starts over", file=path
+                "is missing, so nobody knows how the rows were judged; --redo starts over", file=path
             )
         return None
-    was = load_head(path)
+    was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
-            what = f"{CALLED.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
+            what = f"{METADATA_NAMES.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
             raise UserError(f"was judged with another {what}; --redo starts over", file=path)
     return was
 
 
-CALLED = {
+METADATA_NAMES = {
     "version": "version of the suite",
     "digest": "content of the suite",
     "rules": "set of rules of simulation",

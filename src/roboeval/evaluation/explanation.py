@@ -1,4 +1,4 @@
-"""Why a program passes or fails: what it did in each world, and which step broke which requirement."""
+"""Explanations of verdicts: what a program did in each world, and which step broke a requirement."""
 
 from __future__ import annotations
 
@@ -15,25 +15,24 @@ from roboeval.evaluation.failures import no_program_sentence
 from roboeval.evaluation.remarks import remarks_on
 from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.evaluation.runs.replies import reply_data
-from roboeval.evaluation.runs.traces import can_judge, has_circumstances, trace_of
+from roboeval.evaluation.runs.traces import trace_of
 from roboeval.suites.load import Scenario, Suite
 
-NOT_RECORDED = "instruction not recorded"
+INSTRUCTION_NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "this is the suite's text of the prompt:"
-GONE = "the judged program is no longer in this run"
-CHANGED = "the suite has changed since this was judged"
-EARLIER = "judged by an earlier version, which kept no places; evaluate again with --redo"
-CUT = "the trace was too long to keep, so this cannot be explained"
-TOO_LONG = "the traces of this program are too long to explain this as well"
+PROGRAM_GONE = "the judged program is no longer in this run"
+SUITE_CHANGED = "the suite has changed since this was judged"
+TRACE_CUT = "the trace was too long to keep, so this cannot be explained"
+TRACES_TOO_LONG = "the traces of this program are too long to explain this as well"
 
-LOWERED = "This suite lower-cases strings before running; they are shown as it judges them."
-MOST_LINES = 1_000  # of a program that is shown
-MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
-EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one
+LOWERCASED_NOTE = "This suite lower-cases strings before running; shown as judged."
+MAX_PROGRAM_LINES = 1_000
+MAX_EXPLAINED_SIZE = 1_000_000  # of all traces of a completion, with these weights:
+EVENT_WEIGHT, SPOKEN_WEIGHT, OTHER_WEIGHT = 20, 10, 1  # of an event, a spoken character, another character
 
 
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
-    """Why a completion fails: the world that decided, and its error or failed check, explained."""
+    """Explain why a completion fails: the world that decided, and its error or failed check."""
     why = row["failure"]
     verdict = row["verdicts"][why["world"]]
     ending = {key: verdict[key] for key in ("world", "error", "line")}
@@ -41,23 +40,23 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
         explanation = no_program_sentence(why)
         return {"passed": False, "failure": why, **ending, "explanation": explanation, "step": None}
     scenario = _scenario(suite, row, why["world"], ablated=ablated)
-    explained = _explained(why["check"], scenario, verdict, trace_of(verdict), Patience())
+    explained = _explained(why["check"], scenario, verdict, trace_of(verdict), ExplanationBudget())
     return {"passed": False, "failure": why, **ending, **explained}
 
 
 def completion_data(
     row: Mapping[str, Any], completion: Completion | None, suite: Suite | None, *, ablated: bool = False
 ) -> dict[str, Any]:
-    """A completion: its instruction, its program, and each world with every step and failed check."""
-    patience = Patience()
+    """Describe a completion: its instruction, its program, and each world with steps and failed checks."""
+    budget = ExplanationBudget()
     return {
         **{key: row[key] for key in (*KEY, "passed", "failure")},
         **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
         "suite_instruction": suite_instruction(suite, row["task"], row["prompt"]),
         "reply": reply_data(completion),
-        "lowered": suite is not None and suite.rules.literals == "lowercase",
+        "lowered": suite is not None and suite.settings.literals == "lowercase",
         "worlds": [
-            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), patience, suite)
+            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), budget, suite)
             for number, verdict in enumerate(row["verdicts"])
         ],
     }
@@ -70,36 +69,35 @@ def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None
 
 
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
-    """A line on where the instruction is from, if that needs saying, and the instruction, if it is known."""
+    """Return a note on the origin of the instruction, if needed, and the instruction, if it is known."""
     if recorded is not None or of_suite is None:
-        return NOT_RECORDED if recorded is None else None, recorded
-    return f"{NOT_RECORDED}; {OF_SUITE}", of_suite
+        return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
+    return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
 
 
 def failing_first(worlds: Iterable[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
-    """The worlds with their numbers, from 1: those that fail, of which the first decided, and the others."""
+    """Number the worlds from 1 and sort those that fail first."""
     return sorted(enumerate(worlds, 1), key=lambda one: bool(one[1]["satisfied"]))
 
 
-class Patience:
-    """How much of the traces of one completion is still compared with what was required."""
+class ExplanationBudget:
+    """Limits how much of the traces of one completion is compared with its requirements."""
 
     def __init__(self) -> None:
-        self._left = MOST_COMPARED
+        self._left = MAX_EXPLAINED_SIZE
 
-    def reaches_for(self, trace: Trace) -> bool:
-        """Take a trace into account; whether a check on it is still explained."""
+    def covers(self, trace: Trace) -> bool:
+        """Count a trace; return whether to explain a check on it."""
         self._left -= sum(map(_weight, trace))
         return self._left >= 0
 
 
 def _weight(event: Event) -> int:
-    each = SPOKEN if event.kind in {SAY, ASK} else OTHER
-    return EVENT + each * (len(event.text) + sum(len(option.text) for option in event.options))
+    each = SPOKEN_WEIGHT if event.kind in {SAY, ASK} else OTHER_WEIGHT
+    return EVENT_WEIGHT + each * (len(event.text) + sum(len(option.text) for option in event.options))
 
 
 def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablated: bool) -> Scenario | None:
-    """The scenario of a verdict; None if the suite no longer has it."""
     task = None if suite is None else suite.tasks.get(row["task"])
     scenarios = () if task is None else task.judged_in(ablated=ablated)
     about = row["verdicts"][number]["world"]
@@ -107,56 +105,53 @@ def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablat
 
 
 def _world_data(
-    verdict: Mapping[str, Any], scenario: Scenario | None, patience: Patience, suite: Suite | None
+    verdict: Mapping[str, Any], scenario: Scenario | None, budget: ExplanationBudget, suite: Suite | None
 ) -> dict[str, Any]:
     trace, cut = trace_of(verdict), verdict.get("cut")
-    world, rules = None if scenario is None else scenario.world, None if suite is None else suite.rules
+    world, settings = None if scenario is None else scenario.world, None if suite is None else suite.settings
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
-        "steps": steps_of(trace, has_places=has_circumstances(verdict)),
+        "steps": steps_of(trace, has_places=True),
         **({} if cut is None else {"cut": cut}),
-        "remarks": remarks_on(verdict, trace, world, rules),
+        "remarks": remarks_on(verdict, trace, world, settings),
         "failed_checks": [
-            {"check": check, **_explained(check, scenario, verdict, trace, patience)}
+            {"check": check, **_explained(check, scenario, verdict, trace, budget)}
             for check in verdict["failed_checks"]
         ],
     }
 
 
 def _explained(
-    check: str, scenario: Scenario | None, verdict: Mapping[str, Any], trace: Trace, patience: Patience
+    check: str, scenario: Scenario | None, verdict: Mapping[str, Any], trace: Trace, budget: ExplanationBudget
 ) -> dict[str, Any]:
-    """Why a check fails, and the number of the step, from 1, that makes it fail, if it is one."""
     if "cut" in verdict:
-        return {"explanation": CUT, "step": None}
+        return {"explanation": TRACE_CUT, "step": None}
     require = () if scenario is None else scenario.require
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
-        return {"explanation": f"{CHANGED} and no longer requires this here", "step": None}
-    if not can_judge(requirement.formula, verdict):
-        return {"explanation": EARLIER, "step": None}
-    if not patience.reaches_for(trace):
-        return {"explanation": TOO_LONG, "step": None}
+        return {"explanation": f"{SUITE_CHANGED} and no longer requires this here", "step": None}
+    if not budget.covers(trace):
+        return {"explanation": TRACES_TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)
     if why is None:
-        return {"explanation": f"{CHANGED}; by now this is satisfied", "step": None}
+        return {"explanation": f"{SUITE_CHANGED}; by now this is satisfied", "step": None}
     return {"explanation": why.sentence, "step": None if why.event is None else why.event + 1}
 
 
 def error_sentence(verdict: Mapping[str, Any]) -> str:
-    """The line and the message of the error by which a run ended; either may be unknown."""
+    """Return the line and the message of the error that ended a run, as far as they are known."""
     where = "" if verdict["line"] is None else f"line {verdict['line']}"
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
 
 
-def shown_lines(program: str) -> tuple[str, int]:
-    """A program for people, in short lines without tabs, and how many lines are left out at its end."""
+def first_lines(program: str) -> tuple[str, int]:
+    """Shorten a program to be read by people; also return how many lines are left out."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
-    shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
-    return shown, max(0, len(lines) - MOST_LINES)
+    shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
+    return shown, max(0, len(lines) - MAX_PROGRAM_LINES)
 
 
 def cut_sentence(cut: Mapping[str, Any]) -> str:
-    """How much of a trace was not kept, in a sentence."""
+    """Say how much of a trace was not kept."""
     were = "was" if cut["events"] == 1 else "were"
     return f"{counted(cut['events'], 'more step')} {were} not kept, since the trace is too long"

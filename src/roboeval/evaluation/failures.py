@@ -1,4 +1,4 @@
-"""Why completions fail: no program, or one of the classes of the paper (section V.B), each with kinds."""
+"""Classes of failures: those of the paper (section V.B) and replies without a program."""
 
 from __future__ import annotations
 
@@ -12,8 +12,12 @@ from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
 
-NO_PROGRAM = "NoProgram"
-PYTHON, ROBOT, TASK = "PythonError", "RobotExecutionError", "TaskCompletionError"
+NO_PROGRAM_CLASS = "NoProgram"
+PYTHON_ERROR_CLASS, ROBOT_ERROR_CLASS, TASK_ERROR_CLASS = (
+    "PythonError",
+    "RobotExecutionError",
+    "TaskCompletionError",
+)
 
 
 @dataclass(frozen=True)
@@ -23,16 +27,16 @@ class FailureClass:
     name: str  # in rows
     label: str  # for people
     plural: str
-    kinds: tuple[str, ...]  # those that tables always show; others appear as they come
-    ending: str = ""  # how a program ends by it, for people; by default "in a" with the label
-    is_always_shown: bool = True  # to people; of the others, only those that happened
+    kinds: tuple[str, ...]  # tables always show them; other kinds only if they happened
+    ending: str = ""  # how a program ends, for people; by default "in a" and the label
+    is_always_shown: bool = True  # other classes only if they happened
 
 
-CLASSES: Mapping[str, FailureClass] = {
+FAILURE_CLASSES: Mapping[str, FailureClass] = {
     one.name: one
     for one in (
         FailureClass(
-            NO_PROGRAM,
+            NO_PROGRAM_CLASS,
             "no program",
             "without a program",
             NO_PROGRAM_KINDS,
@@ -40,7 +44,7 @@ CLASSES: Mapping[str, FailureClass] = {
             is_always_shown=False,
         ),
         FailureClass(
-            PYTHON,
+            PYTHON_ERROR_CLASS,
             "Python error",
             "Python errors",
             (
@@ -56,7 +60,7 @@ CLASSES: Mapping[str, FailureClass] = {
             ),
         ),
         FailureClass(
-            ROBOT,
+            ROBOT_ERROR_CLASS,
             "robot error",
             "robot errors",
             (
@@ -69,73 +73,75 @@ CLASSES: Mapping[str, FailureClass] = {
                 "AskInvalidOptions",  # beyond the paper's six
             ),
         ),
-        FailureClass(TASK, "failed check", "failed checks", get_args(Category)),
+        FailureClass(TASK_ERROR_CLASS, "failed check", "failed checks", get_args(Category)),
     )
 }
 """All classes; the kind of a failed check is the check's category. `failure` assigns them."""
 
 
 def label_of(name: str) -> str:
-    """The label of a class; of an unknown one its name."""
-    return CLASSES[name].label if name in CLASSES else name
+    """Return the label of a class, or its name if it is unknown."""
+    return FAILURE_CLASSES[name].label if name in FAILURE_CLASSES else name
 
 
 def plural_of(name: str) -> str:
-    """The plural label of a class; of an unknown one its name."""
-    return CLASSES[name].plural if name in CLASSES else name
+    """Return the plural label of a class, or its name if it is unknown."""
+    return FAILURE_CLASSES[name].plural if name in FAILURE_CLASSES else name
 
 
 def ending_of(name: str) -> str:
-    """How programs end that fail by a class, such as `in a Python error`."""
-    return (CLASSES[name].ending if name in CLASSES else "") or f"in a {label_of(name)}"
+    """Return how programs of a class end, such as `in a Python error`."""
+    return (FAILURE_CLASSES[name].ending if name in FAILURE_CLASSES else "") or f"in a {label_of(name)}"
 
 
-def shown_classes(happened: Collection[str]) -> list[str]:
-    """The classes that people are shown, given those by which something failed.
-
-    The paper's three are always shown, so that runs can be compared; `NoProgram` only where it happened.
-    """
-    return [name for name, one in CLASSES.items() if one.is_always_shown or name in happened]
+def classes_to_show(happened: Collection[str]) -> list[str]:
+    """Return the paper's three classes, so that runs can be compared, and those that happened."""
+    return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
 def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
-    """Why a reply held no program, in a sentence, from the failure of a row; None if it fails otherwise."""
-    if failure["class"] != NO_PROGRAM:
+    """Explain in a sentence why a reply held no program; None for other failures."""
+    if failure["class"] != NO_PROGRAM_CLASS:
         return None
     return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a program did in one world."""
+    """The judgement on a program in one world."""
 
-    world: str  # what the world is about
+    world: str  # its description
     outcome: Outcome
     failed: tuple[Requirement, ...]  # in the task's order
     satisfied: bool
 
     def on(self, prompt: int) -> Verdict:
-        """The verdict on the program as one that was written for a prompt."""
+        """Return the verdict for one prompt, which may ask for less."""
         asked = tuple(requirement for requirement in self.failed if requirement.is_asked_by(prompt))
         if len(asked) == len(self.failed):
             return self
         return replace(self, failed=asked, satisfied=not asked)
 
 
-def failure(verdicts: Sequence[Verdict]) -> Failure | None:
-    """The failure of a completion: the first unsatisfied world decides; None if all are satisfied.
+def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
+    """Return the failure of a completion, which the first unsatisfied world decides; None if it passes.
 
-    Within that world the error decides, else the first failed check. Where a world may wait for ever,
-    reaching a limit is no error, so there the checks decide.
+    Within that world the error decides, or else the first failed check. In a world that may wait for ever,
+    reaching a limit is no error.
     """
     for index, verdict in enumerate(verdicts):
         if not verdict.satisfied:
             error = verdict.outcome.error
             if verdict.failed:
                 first = verdict.failed[0]
-                return {"class": TASK, "kind": first.category, "world": index, "check": first.text}
+                return {
+                    "class": TASK_ERROR_CLASS,
+                    "kind": first.category,
+                    "world": index,
+                    "check": first.text,
+                }
             assert error is not None, "a world without error and failed checks is satisfied"
             is_robots = verdict.outcome.status is Status.ROBOT_ERROR
-            name = ROBOT if is_robots else PYTHON
+            name = ROBOT_ERROR_CLASS if is_robots else PYTHON_ERROR_CLASS
             return {"class": name, "kind": error.kind, "world": index, "check": None}
     return None

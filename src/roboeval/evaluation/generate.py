@@ -1,4 +1,4 @@
-"""Generation of a run's completions, which an interrupted run goes on with."""
+"""Generation of a run's completions, which continues after an interruption."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from roboeval.evaluation.requests import (
     timestamp,
     with_batch,
 )
-from roboeval.evaluation.runs.completions import Key, how_many, reply_row
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
+from roboeval.evaluation.runs.folder import RunFolder
 
-FAILURES_IN_A_ROW = 3  # after so many, or one for each request under way, a model is given up
+FAILURES_IN_A_ROW = 3  # stop after so many, or as many as there are concurrent requests
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How many requests are sent: at a time, in a minute, and until so many tokens are used."""
+    """Limits on concurrent requests, requests per minute, and tokens in total."""
 
     concurrency: int = 8
     requests_per_minute: float | None = None
@@ -50,14 +50,14 @@ class Pace:
 
 @dataclass
 class GenerationProgress:
-    """How much of a run is generated."""
+    """Progress of the generation of a run."""
 
     total: int
-    found: int  # of these, at the start
-    interrupted: int  # requests under way at the last interruption, which may be paid twice
+    found: int  # completions at the start
+    interrupted: int  # pending requests at the last interruption, which may be paid twice
     usage: Counter[str]  # tokens of all completions
-    under_way: int = 0  # requests at the end, if this was an interruption
-    failures: dict[Key, str] = field(default_factory=dict)  # error messages
+    under_way: int = 0  # pending requests at the end, after an interruption
+    failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages
     stopped: str | None = None  # why no further request is sent
 
     def __post_init__(self) -> None:
@@ -66,26 +66,26 @@ class GenerationProgress:
 
     @property
     def rate(self) -> float:
-        """Completions a second."""
+        """Completions per second."""
         return (self.done - self.found) / max(time.monotonic() - self._started, 0.001)
 
     @property
     def missing(self) -> str | None:
-        """What is missing at the end, and why; None if nothing is."""
+        """A sentence on what is missing at the end, and why; None if nothing is."""
         left = self.total - self.done
         reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
         return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else None
 
 
 def generate_run(
-    run: Run,
+    run: RunFolder,
     plan: GenerationPlan,
     model: Model,
     pace: Pace,
     *,
     on_progress: Callable[[GenerationProgress], None] = lambda _: None,
 ) -> GenerationProgress:
-    """Request the completions that a run lacks, each on the disk before it counts; close the model."""
+    """Request the missing completions of a run, save each before it counts, and close the model."""
     with run.writing():
         metadata = run_metadata(run, plan, model)
         with contextlib.closing(Appender(run.completions)) as file:
@@ -124,16 +124,16 @@ def generate_run(
 
 
 def reply_of_refusal(error: ModelError) -> Reply:
-    """The reply that stands for a request that the server refused for good."""
+    """Return the reply to record for a request that the server refuses permanently."""
     return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
 
 
-_KEY: ContextVar[Key] = ContextVar("_KEY")
+_KEY: ContextVar[CompletionKey] = ContextVar("_KEY")
 
 
 @dataclass(frozen=True)
 class _LoggedModel:
-    """A model that notes each request before it is sent, further tries as well."""
+    """A model that logs each request before it is sent, also each retry."""
 
     model: Model
     log: RequestLog
@@ -160,7 +160,7 @@ class _LoggedModel:
 
 @dataclass
 class _Generation:
-    """Requests completions, several at a time, and keeps each."""
+    """Requests completions concurrently and saves each."""
 
     plan: GenerationPlan
     model: Model
@@ -171,13 +171,13 @@ class _Generation:
     on_progress: Callable[[GenerationProgress], None]
     error: ModelError | None = None
     _failures_in_a_row: int = 0
-    _budget: int | None = None  # once it is spent
-    _refused: dict[Key, ModelError] = field(default_factory=dict)
+    _budget: int | None = None  # set once it is spent
+    _refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._paced = RateLimited(_LoggedModel(self.model, self.log), **asdict(self.pace))
 
-    async def generate(self, keys: list[Key]) -> None:
+    async def generate(self, keys: list[CompletionKey]) -> None:
         waiting = iter(keys)
         try:
             async with asyncio.TaskGroup() as group:
@@ -185,19 +185,19 @@ class _Generation:
                     group.create_task(self._request_each(waiting))
             if self.progress.stopped is None and self.progress.done:
                 self._keep_refused()
-            if self._budget is not None:  # requests that were under way have used more since
+            if self._budget is not None:  # pending requests have used more since
                 self.progress.stopped = BudgetSpentError(self._budget, self._paced.tokens_used).sentence
         except BaseExceptionGroup as errors:
             raise errors.exceptions[0] from None
         finally:
             await self.model.close()
 
-    async def _request_each(self, waiting: Iterator[Key]) -> None:
+    async def _request_each(self, waiting: Iterator[CompletionKey]) -> None:
         for key in waiting:
             if self.progress.stopped is None:
                 await self._request(key)
 
-    async def _request(self, key: Key) -> None:
+    async def _request(self, key: CompletionKey) -> None:
         _KEY.set(key)
         try:
             reply = await self._paced.reply(self.plan.prompt(key), number=self.plan.sample(key))
@@ -214,7 +214,7 @@ class _Generation:
             if self._failures_in_a_row >= max(FAILURES_IN_A_ROW, self.pace.concurrency):
                 self.progress.stopped = error.sentence
 
-    async def _keep(self, key: Key, reply: Reply) -> None:
+    async def _keep(self, key: CompletionKey, reply: Reply) -> None:
         line = self._line(key, reply)
         if len(line) > MAX_ROW:
             raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=True)
@@ -222,20 +222,20 @@ class _Generation:
         self.log.kept(key)
         try:
             await asyncio.to_thread(self.file.sync)
-        finally:  # after an interrupt, too: the file is synced when it is closed
+        finally:  # also after an interrupt, since closing the file syncs it
             add_usage(self.progress.usage, asdict(reply.usage))
             self.progress.done += 1
         self._failures_in_a_row = 0
         self.on_progress(self.progress)
 
     def _keep_refused(self) -> None:
-        """Keep requests that the server refused for good, now that it has taken another one."""
+        # The server accepts other requests, so these refusals are about the requests themselves.
         for key, error in self._refused.items():
             self.file.append(self._line(key, reply_of_refusal(error)))
             del self.progress.failures[key]
             self.progress.done += 1
         self._refused.clear()
 
-    def _line(self, key: Key, reply: Reply) -> bytes:
+    def _line(self, key: CompletionKey, reply: Reply) -> bytes:
         row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
         return to_line({**row, **self.plan.mark()})

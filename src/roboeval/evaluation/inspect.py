@@ -1,4 +1,4 @@
-"""The benchmark as a task of Inspect: `inspect eval codebotler/roboeval --model ...`."""
+"""The benchmark as an Inspect task: `inspect eval codebotler/roboeval --model ...`."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from roboeval.suites.load import Suite, load_suite
 Registered = TypeVar("Registered", bound=Callable[..., object])
 
 
-def of_codebotler(function: Registered) -> Registered:
-    """Have Inspect name a function `codebotler/...`, by what its module is called."""
+def register_as_codebotler(function: Registered) -> Registered:
+    """Make Inspect name a function `codebotler/...`, which it derives from the module."""
     function.__module__ = "codebotler"
     return function
 
 
 @task
-@of_codebotler
+@register_as_codebotler
 def roboeval(
     suite: str = "paper",
     tasks: str | list[str] | None = None,
@@ -42,10 +42,10 @@ def roboeval(
     """Programs for service robots, each judged in every world of its task; a sample is a prompt.
 
     Args:
-        suite: the name of a suite that ships with the package, or its folder.
-        tasks: some tasks only.
-        worlds: how many worlds to draw, 1 to 10,000, for a suite whose worlds are drawn.
-        seed: from which to draw them.
+        suite: the name or folder of a suite.
+        tasks: tasks to select; all by default.
+        worlds: how many worlds to draw, 1 to 10,000, if the suite draws worlds.
+        seed: the seed of the drawn worlds.
     """
     our, drawn = SamplingSettings(), _suite(suite, worlds, seed)
     samples = [
@@ -72,13 +72,13 @@ def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
 
 
 @solver
-@of_codebotler
+@register_as_codebotler
 def prompting(suite: str = "paper") -> Solver:
-    """The prompt of `roboeval generate`: with the skills and some examples before the instruction."""
+    """Return a solver that writes the prompt of `roboeval generate`: skills, examples and instruction."""
     known = load_suite(suite)
     rules = known.house_sentences
 
-    async def prompt(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - comes later
+    async def prompt(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - another solver generates
         state.messages = [
             getattr(model, f"ChatMessage{message.role.title()}")(content=message.text)
             for message in prompt_for(state.input_text, rules=rules, skills=known.skills).messages
@@ -89,9 +89,9 @@ def prompting(suite: str = "paper") -> Solver:
 
 
 @scorer(metrics=[accuracy(), stderr(cluster="task"), grouped(accuracy(), "task", all=False)])
-@of_codebotler
+@register_as_codebotler
 def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = None) -> Scorer:
-    """The verdict of `roboeval evaluate` on the program in a reply, in a thread beside the event loop."""
+    """Return a scorer with the verdicts of `roboeval evaluate`, which runs in a thread."""
 
     def judged(state: TaskState) -> Score:
         by, reply = _suite(suite, worlds, seed), state.output.completion
@@ -100,7 +100,7 @@ def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = 
         completion = Completion(**state.metadata, index=0, program=program_of(reply).source, more=said)
         (row,) = evaluate([completion], by, engine=Local(shared_pool()))
         text = json.dumps(completion_data(row, completion, by), ensure_ascii=False)
-        data = json.loads(text.encode(errors="replace"))  # a log cannot hold half of a surrogate pair
+        data = json.loads(text.encode(errors="replace"))  # a log cannot hold lone surrogates
         return Score(
             value=CORRECT if row["passed"] else INCORRECT,
             answer=data["program"],
@@ -108,7 +108,7 @@ def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = 
             metadata={"failure": data["failure"], "worlds": data["worlds"]},
         )
 
-    async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001 - each world says what is right
+    async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001 - worlds define what is right
         return await anyio.to_thread.run_sync(judged, state)
 
     return score

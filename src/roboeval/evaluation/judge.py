@@ -1,4 +1,4 @@
-"""The authority on right and wrong: runs completions in the worlds of their tasks and judges the traces."""
+"""The authority on right and wrong: runs completions in worlds and judges the traces."""
 
 from __future__ import annotations
 
@@ -19,26 +19,25 @@ from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.result_cache import ResultCache
-from roboeval.evaluation.runs.completions import Completion, name_of, unknown
+from roboeval.evaluation.runs.completions import Completion, find_key_fault, name_of
 from roboeval.evaluation.runs.rows import Row
-from roboeval.evaluation.serialization import judgements_for, row_line, with_reply
+from roboeval.evaluation.serialization import add_reply_fault, judgements_for, row_line
 from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Requirement, Scenario, Suite
 
-LOG = logging.getLogger("roboeval.evaluation.judge")
+_log = logging.getLogger("roboeval.evaluation.judge")
 
-BUDGET = 60  # seconds of processor time that judging one program may take, in all its worlds
-
+BUDGET = 60  # seconds of processor time for judging one program in all its worlds
 
 REQUIREMENT_CACHE: ResultCache[tuple[bool, ...]] = ResultCache()
 JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
-    """Judge how a run ended in a world, by all that any prompt asks for.
+    """Judge a run in a world, by the requirements of all prompts.
 
-    A run that ended in an error is unsatisfied whatever it did; one that reached a limit is judged by the
-    requirements only in a world that may wait for ever.
+    A run that ends in an error fails whatever it did. One that reaches a limit fails, too, except in a world
+    that may wait for ever, where the requirements decide.
     """
     if not may_satisfy(outcome, scenario):
         return Verdict(scenario.world.about, outcome, (), satisfied=False)
@@ -47,7 +46,7 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Whether the requirements decide: the run ended by itself, or waits where that is allowed."""
+    """Whether the requirements decide: the run ended normally, or waits and may do so."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
@@ -55,15 +54,15 @@ def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
 def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
     """Whether the trace of a run satisfies each requirement."""
 
-    def found() -> tuple[bool, ...]:
+    def check() -> tuple[bool, ...]:
         return tuple([is_met(one, outcome.trace) for one in scenario.require])
 
     formulas = [id(one.formula) for one in scenario.require]
-    return REQUIREMENT_CACHE.of((visible(outcome.trace), *formulas), scenario, [outcome], found)
+    return REQUIREMENT_CACHE.of((visible(outcome.trace), *formulas), scenario, [outcome], check)
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:
-    """Whether a trace satisfies a requirement; one that cannot be judged is not satisfied."""
+    """Whether a trace satisfies a requirement; an inconclusive one does not."""
     try:
         return holds(requirement.formula, trace)
     except Inconclusive:
@@ -79,22 +78,21 @@ def evaluate(
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
 ) -> Iterator[Row]:
-    """Judge completions, yielding one row each in their order; equal programs of a task run once.
+    """Judge completions and yield a row for each, in their order; equal programs of a task run once.
 
-    One whose judging takes more than 60 seconds of processor time has no row, and a warning is logged; this
-    limit holds only where rows are asked for in the main thread.
+    A completion that takes more than 60 seconds of processor time to judge has no row, and a warning is
+    logged; this limit applies only in the main thread.
 
     Args:
-        completions: whose tasks the suite knows; read as they are needed.
+        completions: completions of tasks of the suite, which are read as needed.
         suite: tasks and rules.
-        ablated: whether to require common sense only; then all tasks have an ablation.
-        workers: how many programs are run at the same time.
-        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
-        engine: where programs are run; by default in a pool of so many workers on this machine, started and
-            ended for it.
+        ablated: whether to require common sense only, for which all tasks need an ablation.
+        workers: how many programs to run at the same time.
+        require_isolation: whether to raise an error, rather than warn, if programs are not fully isolated.
+        engine: the engine that runs programs; by default a pool of workers on this machine.
 
     Raises:
-        UserError: there are no workers; or, when it is read, a completion is none or not of the suite.
+        UserError: there are no workers, or a completion is not of the suite.
         EngineError: no isolated process can be started.
     """
     chosen = engine or Local(workers, require_isolation=require_isolation)
@@ -105,7 +103,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, bytes | None]]:
-    """Each completion, in order, with its judgement as JSON; None, and a warning, if it takes too long."""
+    """Yield each completion with its judgement as JSON; None, and a warning, if judging takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -116,27 +114,27 @@ def judgements(
 
     with engine as opened:
         running = partial(run_in_worlds, suite, ablated=ablated)
-        judging = partial(judged, suite, ablated=ablated)
+        judging = partial(judge_outcomes, suite, ablated=ablated)
         for by_prompt in opened.map_distinct(running, works(), judging):
             completion = waiting.popleft()
             if by_prompt is None:
-                LOG.warning(
-                    "%s is not judged: that took more than %g seconds of processor time; "
+                _log.warning(
+                    "%s is not judged, since that takes more than %g seconds of processor time; "
                     "`roboeval tasks --lint` finds slow regexes",
                     name_of(completion.key),
                     BUDGET,
                 )
                 yield completion, None
             else:
-                yield completion, with_reply(completion, by_prompt[completion.prompt])
+                yield completion, add_reply_fault(completion, by_prompt[completion.prompt])
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
-    if not isinstance(completion, Completion):  # such as a row of a file
+    if not isinstance(completion, Completion):  # a row of a file, perhaps
         kind = type(completion).__name__
         what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
         raise UserError(f"a completion is of the type {kind}; {what}")
-    if (problem := unknown(completion.key, suite)) is not None:
+    if (problem := find_key_fault(completion.key, suite)) is not None:
         raise UserError(problem)
     if ablated and suite.tasks[completion.task].ablation is None:
         raise UserError(f'the task "{completion.task}" has no ablation')
@@ -145,7 +143,7 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
 def run_in_worlds(
     suite: Suite, worker: Worker, works: Sequence[tuple[str, str]], *, ablated: bool
 ) -> list[tuple[str, Sequence[Outcome]]]:
-    """Run programs, each in the worlds of its task; return for each the task and how each run ended."""
+    """Run programs in the worlds of their tasks; return the task and the outcomes of each."""
     jobs = [
         (program, [partial(robot_in, one.world, suite) for one in scenarios])
         for task, program in works
@@ -155,27 +153,26 @@ def run_in_worlds(
 
 
 def robot_in(world: World, suite: Suite) -> SimulatedRobot:
-    """A robot in a world, by the rules of a suite and of its house."""
+    """Return a robot in a world, with the rules of a suite and its house."""
     guard = None if suite.house is None else RuleGuard(suite.house.rules)
-    return SimulatedRobot(world, suite.rules, suite.skills, guard=guard)
+    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard)
 
 
-def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> tuple[bytes, ...] | None:
-    """The judgements on a program that ran in all worlds of a task, as JSON; None if judging takes too long.
-
-    There is one for each prompt; until then it does not matter for which of them a program was written.
-    """
+def judge_outcomes(
+    suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool
+) -> tuple[bytes, ...] | None:
+    """Judge a program by its outcomes, for each prompt, as JSON; None if that takes too long."""
     name, outcomes = ran
     task = suite.tasks[name]
     scenarios = task.judged_in(ablated=ablated)
 
-    def found() -> tuple[bytes, ...]:
+    def compute() -> tuple[bytes, ...]:
         with time_limit(BUDGET):
             verdicts = [judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)]
             return judgements_for(verdicts, len(task.prompts))
 
     try:
         key = (*map(id, outcomes), *map(id, scenarios))
-        return JUDGEMENT_CACHE.of(key, (tuple(outcomes), scenarios), outcomes, found)
+        return JUDGEMENT_CACHE.of(key, (tuple(outcomes), scenarios), outcomes, compute)
     except TimeLimitExceeded:
         return None

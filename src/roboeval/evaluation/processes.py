@@ -1,4 +1,4 @@
-"""Several processes of this machine: an engine that runs and judges programs in them, and other work."""
+"""An engine that runs and judges programs in several processes of this machine."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from typing import Any, Self, TypeVar
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import map_batches
 from codebotler.simulator.worker import EngineError
-from roboeval.evaluation.engines import BRIEF, Ran, RunPrograms, Value, Work, own_worker
+from roboeval.evaluation.engines import GC_THRESHOLD, RawResult, RunPrograms, Work, WorkResult, own_worker
 
-Key = TypeVar("Key")
+JobKey = TypeVar("JobKey")
 
 
 class Processes:
-    """Processes that each have a worker, and replay and judge by themselves what it has run.
+    """Engine of processes that each have a worker, and replay and judge its programs themselves.
 
-    With threads, one core does that for all of them, and more than two wait for it. A process starts when
-    there is work for it. Where programs are less isolated, whoever asks for processes warns of it.
+    With threads instead, one core would replay and judge for all workers. A process starts when there is work
+    for it. The caller warns if programs are not fully isolated.
     """
 
-    def __init__(self, workers: int, **isolation: bool) -> None:  # as of `WorkerPool`
+    def __init__(self, workers: int, **isolation: bool) -> None:
         self._workers, self._isolation = workers, isolation
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Nothing is left: the processes end with the results."""
+        """Do nothing: the processes end with the results."""
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
+    ) -> Iterator[WorkResult]:
         """See `Engine`."""
         functions = pickle.dumps((function, then))
         batch = partial(run_batch, functions, self._isolation)
@@ -49,20 +49,20 @@ class Processes:
 
 
 def map_in_processes(
-    function: Callable[[Sequence[Key]], Sequence[Value]],
-    keys: Iterable[Key],
+    function: Callable[[Sequence[JobKey]], Sequence[WorkResult]],
+    keys: Iterable[JobKey],
     *,
     workers: int,
-    name: Callable[[Key], bytes],
-) -> Iterator[Value]:
-    """Call a function with a few keys at a time, in processes; yield the values in the order of the keys.
+    name: Callable[[JobKey], bytes],
+) -> Iterator[WorkResult]:
+    """Call a function with a few keys at a time, in processes, and yield the values in order.
 
-    `name` gives each key a short name of its own; equal keys are called once.
+    `name` returns a short unique name of each key; the function gets equal keys once.
     """
     with process_pool(workers) as processes:
 
-        def submit(keys: Sequence[Key]) -> Future[Sequence[Value]]:
-            with starting():
+        def submit(keys: Sequence[JobKey]) -> Future[Sequence[WorkResult]]:
+            with starting_processes():
                 return processes.submit(function, keys)
 
         try:
@@ -73,10 +73,10 @@ def map_in_processes(
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that end with the block, or with this process."""
+    """Start processes that end with the block, or with this process."""
     context = get_context("spawn")
     with ExitStack() as held:
-        with starting():
+        with starting_processes():
             pipe, ours = context.Pipe(duplex=False)
             held.enter_context(pipe)
             processes = ProcessPoolExecutor(workers, context, exit_with_parent, (pipe,))
@@ -86,9 +86,9 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def starting() -> Iterator[None]:
-    """Start processes that do not hear Ctrl-C, or raise EngineError."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which they inherit
+def starting_processes() -> Iterator[None]:
+    """Let processes that start in the block ignore Ctrl-C; raise EngineError if they cannot start."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # child processes inherit it
     try:
         yield
     except OSError as error:
@@ -98,8 +98,8 @@ def starting() -> Iterator[None]:
 
 
 def exit_with_parent(pipe: Connection) -> None:
-    """Let this process end as soon as the other end of a pipe is closed."""
-    gc.set_threshold(BRIEF, *gc.get_threshold()[1:])
+    """End this process as soon as the other end of a pipe is closed."""
+    gc.set_threshold(GC_THRESHOLD, *gc.get_threshold()[1:])
 
     def end() -> None:
         pipe.poll(None)
@@ -109,12 +109,12 @@ def exit_with_parent(pipe: Connection) -> None:
 
 
 def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
-    """The results for programs, on the worker of this process."""
-    function, then = loaded(functions)
+    """Run programs on the worker of this process."""
+    function, then = load_functions(functions)
     return [then(ran) for ran in function(own_worker(**isolation), works)]
 
 
 @lru_cache(maxsize=1)
-def loaded(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
-    """The functions that this side has pickled: they hold a whole suite, which is loaded once."""
-    return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - see above
+def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
+    """Unpickle functions once: they hold a whole suite."""
+    return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - pickled by our own parent process

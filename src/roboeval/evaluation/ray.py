@@ -1,4 +1,4 @@
-"""The engine that runs programs on a Ray cluster: in shards, which Ray retries where a machine is lost."""
+"""An engine that runs programs on a Ray cluster, in shards that Ray retries if it loses a machine."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from codebotler.core.errors import UserError, installed
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import NO_SECCOMP, DistinctKeys, ResultFile
 from codebotler.simulator.worker import EngineError
-from roboeval.evaluation.engines import PYTHON_VERSION, Ran, RunPrograms, Value, Work, own_worker
+from roboeval.evaluation.engines import PYTHON_VERSION, RawResult, RunPrograms, Work, WorkResult, own_worker
 
-LOG = logging.getLogger("roboeval.ray")
+_log = logging.getLogger("roboeval.ray")
 VERSIONS = f"codebotler {__version__} with Python {PYTHON_VERSION}"
 
-AHEAD = 2  # shards for each core that are under way, so that none waits for this process
-RETRIES = 20  # of a shard whose machine is lost
-PATIENCE_S = 10  # until it is asked whether the cluster has any core left
-CONNECT_S = 5  # until something must have accepted a connection
+SHARDS_PER_CORE = 2  # submitted shards, so that no core waits for this process
+RETRIES = 20  # of a shard whose machine was lost
+RAY_POLL_SECONDS = 10  # between checks whether the cluster still has cores
+RAY_CONNECT_SECONDS = 5
 
 
 class RayCluster:
-    """The cores of the Ray cluster that RAY_ADDRESS names, or else that this machine is part of.
+    """Engine on the Ray cluster that RAY_ADDRESS names, or else the one that this machine belongs to.
 
-    Where there is none, or RAY_ADDRESS is "local", one is started on this machine, which no other machine
-    reaches, and ended again. By default twice as many shards are under way as the cluster has cores.
+    Without a cluster, or if RAY_ADDRESS is "local", it starts one that only this machine reaches, and ends
+    it again. By default it submits two shards per core.
 
     Raises UserError if Ray is not installed, or no cluster answers at the address.
     """
 
-    def __init__(self, workers: int | None = None, **isolation: bool) -> None:  # as of `WorkerPool`
+    def __init__(self, workers: int | None = None, **isolation: bool) -> None:
         self._workers, self._isolation = workers, isolation
         self._warned = False
         self._address = os.environ.get("RAY_ADDRESS") or "auto"
@@ -60,19 +60,18 @@ class RayCluster:
         self._ray.shutdown()
 
     def map_distinct(
-        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
-    ) -> Iterator[Value]:
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
+    ) -> Iterator[WorkResult]:
         """See `Engine`.
 
-        Shards that are under way when no more results are wanted run to their end: Ray 2.60 can abort this
-        process when a shard is cancelled that has just ended.
+        It never cancels shards: Ray 2.60 can abort this process if a cancelled shard has just ended.
         """
         remote = self._ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(run_shard)
         functions = self._ray.put((function, then))
         distinct = DistinctKeys(works, lambda work: digest(*work))
         waiting = distinct.waiting
         shards: dict[Any, list[bytes]] = {}
-        most = self._most()
+        most = self._max_shards()
         with ResultFile() as done:
             while True:
                 while len(shards) < most and (batch := distinct.batch(most)):
@@ -85,20 +84,19 @@ class RayCluster:
                 if waiting[0] in done:
                     yield done[waiting.popleft()]
                     continue
-                for shard, values in self._ended(shards):
+                for shard, values in self._wait_for_some(shards):
                     for name, value in zip(shards.pop(shard), values, strict=True):
                         done[name] = value
-                most = self._most()
+                most = self._max_shards()
 
-    def _most(self) -> int:  # shards under way
-        return self._workers or AHEAD * max(1, self._cores())
+    def _max_shards(self) -> int:
+        return self._workers or SHARDS_PER_CORE * max(1, self._cores())
 
     def _cores(self) -> int:
         return int(self._ray.cluster_resources().get("CPU", 0))
 
-    def _ended(self, shards: Iterable[Any]) -> Iterator[tuple[Any, list[Any]]]:
-        """Wait until some shards have ended, and get their results."""
-        ended, _ = self._ray.wait(list(shards), timeout=PATIENCE_S)
+    def _wait_for_some(self, shards: Iterable[Any]) -> Iterator[tuple[Any, list[Any]]]:
+        ended, _ = self._ray.wait(list(shards), timeout=RAY_POLL_SECONDS)
         if not ended and not self._cores():
             raise EngineError("the Ray cluster has no free core; start another node and try again")
         for shard in ended:
@@ -109,35 +107,35 @@ class RayCluster:
             except self._ray.exceptions.RayError as error:
                 raise EngineError(f"Ray lost a shard for good: {str(error).splitlines()[0]}") from None
             if warning and not self._warned:
-                LOG.warning(warning)
+                _log.warning(warning)
                 self._warned = True
             yield shard, values
 
     def _expect_listener(self) -> None:
-        """Refuse an address at which nothing listens, before Ray tries for half a minute."""
+        # Ray itself would try for half a minute.
         host, _, port = self._address.rpartition(":")
         try:
-            socket.create_connection((host.strip("[]"), int(port)), CONNECT_S).close()
+            socket.create_connection((host.strip("[]"), int(port)), RAY_CONNECT_SECONDS).close()
         except (OSError, ValueError, OverflowError) as error:
             raise self._no_cluster(str(error)) from None
 
     def _no_cluster(self, why: str) -> UserError:
         return UserError(
             f"RAY_ADDRESS: no Ray cluster answers at {self._address} ({why}); start its head with "
-            "`ray start --head`, or set RAY_ADDRESS=local to use the cores of this machine"
+            "`ray start --head`, or set RAY_ADDRESS=local to use this machine"
         )
 
 
 def run_shard(
-    functions: tuple[RunPrograms[Ran], Callable[[Ran], Value]],
+    functions: tuple[RunPrograms[RawResult], Callable[[RawResult], WorkResult]],
     works: Sequence[Work],
-    versions: str,  # others might judge otherwise
+    versions: str,  # other versions might judge otherwise
     isolation: Mapping[str, bool],
-) -> tuple[list[Value], str | None]:
-    """The results for programs, and a warning if they are not fully isolated; in a process of Ray's."""
+) -> tuple[list[WorkResult], str | None]:
+    """Run programs in a process of Ray's; return results, and a warning if they were not fully isolated."""
     machine = platform.node()
     if versions != VERSIONS:
-        raise EngineError(f"{machine} has {VERSIONS}, and not {versions}")
+        raise EngineError(f"{machine} has {VERSIONS}, not {versions}")
     function, then = functions
     try:
         worker = own_worker(**isolation)
@@ -147,9 +145,11 @@ def run_shard(
     return values, None if worker.has_seccomp else f"{machine}: {NO_SECCOMP}"
 
 
-def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types here
+def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # else it calls home
-    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # its warning about accelerators
+    os.environ.setdefault(
+        "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0"
+    )  # suppress its warning about accelerators
     with installed():
         import ray  # noqa: PLC0415 - an extra, which starts slowly
     return ray

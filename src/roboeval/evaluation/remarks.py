@@ -1,4 +1,4 @@
-"""Remarks on a run in a world: what it repeated until a limit, and questions that got others' answers."""
+"""Remarks on a run in a world: steps it repeated until a limit, and questions that got wrong answers."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from codebotler.rtl.regex_words import choices, one_of
 from codebotler.rtl.wording import few, quoted, room_name
 from codebotler.simulator.settings import SimulationSettings, choose, finds
 
-FEWEST_TIMES = 3  # that steps must be repeated to be a cycle
-LONGEST_CYCLE = 100  # steps
+MIN_REPETITIONS = 3  # of a cycle
+MAX_CYCLE_STEPS = 100
 
 
 def remarks_on(
-    verdict: Mapping[str, Any], trace: Trace, world: World | None, rules: SimulationSettings | None
+    verdict: Mapping[str, Any], trace: Trace, world: World | None, settings: SimulationSettings | None
 ) -> list[str]:
-    """Return sentences that explain a run beside its failed checks; events of the trace have their places."""
+    """Return sentences that explain a run in addition to its failed checks."""
     remarks = []
     if verdict["status"] == Status.TIMEOUT and (cycle := cycle_at_end(trace)) is not None:
-        remarks.append(cycle.sentence if verdict.get("cut") is None else cycle.sentence_at_least)
-    if not verdict["satisfied"] and world is not None and rules is not None:
-        remarks += misplaced_questions(trace, world, rules)
+        more = " times: " if verdict.get("cut") is None else " times or more: "
+        remarks.append(cycle.sentence.replace(" times: ", more, 1))
+    if not verdict["satisfied"] and world is not None and settings is not None:
+        remarks += misplaced_questions(trace, world, settings)
     return remarks
 
 
@@ -35,10 +36,10 @@ def remarks_on(
 
 @dataclass(frozen=True)
 class Cycle:
-    """Steps at the end of a trace that were repeated."""
+    """Repeated steps at the end of a trace."""
 
     first: int  # the number of the first step, from 1
-    steps: Trace  # of one turn
+    steps: Trace  # of one repetition
     times: int
 
     @property
@@ -48,23 +49,18 @@ class Cycle:
         deeds = ", ".join(few([*(phrase(step, "base") for step in self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
 
-    @property
-    def sentence_at_least(self) -> str:
-        """The same of a trace of which only the first part was kept."""
-        return self.sentence.replace(" times: ", " times or more: ", 1)
-
 
 def cycle_at_end(trace: Trace) -> Cycle | None:
     """Return the cycle that covers most of a trace's end, the shortest of equal ones; None without any."""
     numbers: dict[Event, int] = {}
     each = [numbers.setdefault(event, len(numbers)) for event in trace]
     most, found = 0, None
-    for length in range(1, min(LONGEST_CYCLE, len(each) // FEWEST_TIMES) + 1):
+    for length in range(1, min(MAX_CYCLE_STEPS, len(each) // MIN_REPETITIONS) + 1):
         start = len(each) - length
         while start > 0 and each[start - 1] == each[start - 1 + length]:
             start -= 1
         covered = len(each) - start
-        if covered >= FEWEST_TIMES * length and covered > most:
+        if covered >= MIN_REPETITIONS * length and covered > most:
             most, found = covered, Cycle(start + 1, trace[start : start + length], covered // length)
     return found
 
@@ -72,32 +68,33 @@ def cycle_at_end(trace: Trace) -> Cycle | None:
 # --- answers in a fixed order
 
 
-def misplaced_questions(trace: Trace, world: World, rules: SimulationSettings) -> Iterator[str]:
-    """Yield a sentence for each room where a question got the answer to another, which does not fit."""
+def misplaced_questions(trace: Trace, world: World, settings: SimulationSettings) -> Iterator[str]:
+    """Yield a sentence for each room where a question got the answer to another question."""
     for room in world.rooms:
         match room.people:
             case [Person(answers=[_, _, *_], after_looks=0) as person]:
                 pass
-            case _:  # rows do not say who of several people was asked
+            case _:  # rows do not say which of several people was asked
                 continue
-        asked = [e for e in trace if e.options and e.place == room.name and not _has_topic(e, person, rules)]
+        asked = [
+            e for e in trace if e.options and e.place == room.name and not _has_topic(e, person, settings)
+        ]
         for number, question in enumerate(asked):
             own = person.answers[min(number, len(person.answers) - 1)]
             others = [answer for answer in person.answers if answer != own]
-            if not _fits(own, question, rules) and any(_fits(each, question, rules) for each in others):
+            if not _fits(own, question, settings) and any(_fits(each, question, settings) for each in others):
                 yield _misplaced(room.name, person, number, question)
                 break
 
 
-def _has_topic(question: Event, person: Person, rules: SimulationSettings) -> bool:
-    return any(finds(question.text, topic, rules.matching) for topic, _ in person.topics)
+def _has_topic(question: Event, person: Person, settings: SimulationSettings) -> bool:
+    return any(finds(question.text, topic, settings.matching) for topic, _ in person.topics)
 
 
-def _fits(answer: Answer, question: Event, rules: SimulationSettings) -> bool:
-    """Whether an option says the answer, rather than a yes or a no to it."""
-    chosen = choose(answer, question.text, question.options, rules)
+def _fits(answer: Answer, question: Event, settings: SimulationSettings) -> bool:
+    chosen = choose(answer, question.text, question.options, settings)
     return chosen is not None and (
-        isinstance(answer, int) or finds(question.options[chosen].text, answer, rules.matching)
+        isinstance(answer, int) or finds(question.options[chosen].text, answer, settings.matching)
     )
 
 

@@ -1,4 +1,4 @@
-"""What a run requests of a model: which completions, with which settings, and which are under way."""
+"""The requests of a run: its completions, its run.json, and the log of pending requests."""
 
 from __future__ import annotations
 
@@ -18,54 +18,54 @@ from codebotler.core.words import brief
 from codebotler.models.base import Model
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for, template_hash
-from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
-from roboeval.evaluation.runs.folder import Run, load_head
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of, read_completions
+from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
 
 if TYPE_CHECKING:
     from codebotler.models.batch import BatchModel  # which imports large libraries
 
-WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies
-LATER = ("reasoning_effort", "extra_body")  # settings that runs of earlier versions do not name
+WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
+OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # run.json leaves them out if unset
 
 
 @dataclass(frozen=True)
 class GenerationPlan:
-    """Which completions a run should have: so many for each prompt of some tasks, by default of all."""
+    """The completions that a run should have: a number for each prompt of some tasks, by default of all."""
 
     suite: Suite
     tasks: frozenset[str] | None = None
     num_completions: int = 50
 
-    def keys(self) -> list[Key]:
-        """The completions: the first of each prompt, then the second, so that a part covers all tasks."""
+    def keys(self) -> list[CompletionKey]:
+        """Return the keys: the first completion of each prompt, then the second; a part covers all tasks."""
         tasks = [task for name, task in self.suite.tasks.items() if self.tasks is None or name in self.tasks]
         prompts = [(task.name, prompt) for task in tasks for prompt in range(len(task.prompts))]
         return [(*prompt, index) for index in range(self.num_completions) for prompt in prompts]
 
-    def instruction(self, key: Key) -> str:
-        """The instruction that a completion is for."""
+    def instruction(self, key: CompletionKey) -> str:
+        """Return the instruction of a completion."""
         return self.suite.tasks[key[0]].prompts[key[1]]
 
-    def prompt(self, key: Key) -> Prompt:
-        """The request for a completion."""
+    def prompt(self, key: CompletionKey) -> Prompt:
+        """Return the prompt that requests a completion."""
         rules, skills = self.suite.house_sentences, self.suite.skills
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
-    def sample(self, key: Key) -> int:
-        """The number of the sample, from which its seed comes."""
+    def sample(self, key: CompletionKey) -> int:
+        """Return the number of the sample, which determines its seed."""
         return key[2]
 
     def given(self) -> Iterable[Completion]:
-        """Completions that are taken over from elsewhere."""
+        """Return the completions to copy from another run."""
         return ()
 
     def mark(self) -> Mapping[str, int]:
-        """What rows of completions.jsonl say besides the reply."""
+        """Return the entries to add to each row of completions.jsonl."""
         return {}
 
-    def completed(self, run: Run) -> Iterator[Completion]:
-        """The completions that a run has; raises UserError if one's instruction is no longer the suite's."""
+    def completed(self, run: RunFolder) -> Iterator[Completion]:
+        """Read the completions of a run; raise UserError if one has another instruction than the suite."""
         if not run.completions.is_file() or not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
@@ -76,12 +76,12 @@ class GenerationPlan:
 
 
 def no_usage() -> Counter[str]:
-    """The token counts of no completions."""
+    """Return token counts of zero."""
     return Counter(input_tokens=0, output_tokens=0)
 
 
 def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> None:
-    """Add the token counts of a row of completions.jsonl, null where the model does not count."""
+    """Add the token counts of a row; they are null if the model does not count tokens."""
     for name in total:
         total[name] += (usage or {}).get(name) or 0
 
@@ -89,17 +89,21 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 # --- run.json
 
 
-def run_metadata(run: Run, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
-    """The content of run.json; raises UserError where completions are there that were generated otherwise."""
+def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
+    """Return the content of run.json; raise UserError if the run's completions were generated otherwise."""
+    suite = plan.suite
     fixed = {
         "model": model.name,
         "settings": _recorded(model.settings),
-        "template": template_hash(plan.suite.skills),
-        "suite": plan.suite.name,
+        "template": template_hash(suite.skills),
+        "suite": suite.name,
     }
+    families = {}
+    if suite.families is not None:
+        families["families"] = {**suite.families, "version": suite.version, "digest": suite.digest}
     earlier: dict[str, Any] = {}
     if run.about.exists():
-        earlier = load_head(run.about)
+        earlier = load_json_object(run.about)
         if not isinstance(earlier.get("settings"), dict):
             raise UserError("holds imported completions; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
@@ -108,7 +112,7 @@ def run_metadata(run: Run, plan: GenerationPlan, model: Model | BatchModel) -> d
         raise UserError(f"{why}; name another folder", file=run.about)
     return {
         **fixed,
-        **_families(plan.suite),
+        **families,
         "batches": batches(earlier),
         "usage": no_usage(),
         "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
@@ -116,18 +120,17 @@ def run_metadata(run: Run, plan: GenerationPlan, model: Model | BatchModel) -> d
 
 
 def _recorded(settings: SamplingSettings) -> dict[str, Any]:
-    """The settings that change what a model replies; those that came later are left out where unset."""
     return {
         name: value
         for name, value in asdict(settings).items()
-        if name not in WITHOUT_EFFECT and (value is not None or name not in LATER)
+        if name not in WITHOUT_EFFECT and (value is not None or name not in OPTIONAL_SETTINGS)
     }
 
 
 def with_batch(
     earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
 ) -> list[dict[str, Any]]:
-    """Request batches of a run with that of a plan, which is the last one if that was interrupted."""
+    """Add the batch of a plan, unless the last batch is the same one and was interrupted."""
     batch = {
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
         "num_completions": plan.num_completions,
@@ -142,30 +145,14 @@ def with_batch(
     return [*earlier, {**batch, "started": timestamp()}]
 
 
-BATCH = ("tasks", "num_completions", "settings", "codebotler", "python", "started", "ended")
-
-
 def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The request batches of a run.json, in order; one of an earlier version says what it has of its one."""
+    """Return the request batches of a run.json, in order."""
     found = metadata.get("batches")
-    if isinstance(found, list):
-        return [dict(one) for one in found if isinstance(one, dict)]
-    return (
-        [{name: metadata[name] for name in BATCH if name in metadata}]
-        if "num_completions" in metadata
-        else []
-    )
-
-
-def _families(suite: Suite) -> dict[str, Any]:
-    """From which families the tasks were made, and what a later version must make of them."""
-    if suite.families is None:
-        return {}
-    return {"families": {**suite.families, "version": suite.version, "digest": suite.digest}}
+    return [dict(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
 
 
 def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
-    """The tasks of which a run.json says that completions were requested; None for all."""
+    """Return the tasks whose completions were requested, by a run.json; None for all."""
     requested: set[str] = set()
     for batch in batches(metadata):
         if not isinstance(batch.get("tasks"), list):
@@ -189,69 +176,69 @@ def _brief(value: object) -> str:
 
 
 def timestamp() -> str:
-    """The time now, to the second."""
+    """Return the current time, to the second."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-# --- requests under way
+# --- pending requests
 
 
 class RequestLog:
-    """The file that notes each request before it is sent, and each that fails.
+    """Log of each request before it is sent, and of each failure.
 
-    A request that is noted, and has neither failed nor left a completion, was under way when the run was
-    interrupted, and may be paid twice. The first line counts those of earlier interruptions, so that an
-    interruption at any moment has none counted twice. The file goes when a run ends in order.
+    A request without failure and completion was pending when the run was interrupted, and may be paid twice.
+    The first line counts such requests of earlier interruptions, so that none is counted twice. The file is
+    deleted when a run ends normally.
     """
 
-    def __init__(self, path: Path, done: set[Key], lost: int) -> None:  # `lost` as run.json has it
+    def __init__(self, path: Path, done: set[CompletionKey], lost: int) -> None:  # `lost` is from run.json
         self.path = path
-        earlier, noted = self._read()
-        self.interrupted = len(noted - done)  # at the last interruption
-        self.lost = max(lost, earlier + self.interrupted)
-        self.under_way: set[Key] = set()
+        lost_before, pending = self._read()
+        self.interrupted = len(pending - done)  # at the last interruption
+        self.lost = max(lost, lost_before + self.interrupted)
+        self.under_way: set[CompletionKey] = set()
 
     def __enter__(self) -> Self:
-        """Start the file anew, now that run.json knows of `lost`."""
+        """Start a new file, since run.json now counts the lost requests."""
         write_whole(self.path, to_line({"lost": self.lost}))
         self._file = Appender(self.path)
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
-        with contextlib.suppress(OSError):  # a full disk has been reported already
+        with contextlib.suppress(OSError):  # a full disk was reported before
             self._file.close()
         if kind is None and not self.under_way:
             self.path.unlink()
 
-    def sent(self, key: Key) -> None:
-        """Note a request before it is sent; if the disk is full, the OSError keeps it from being sent."""
+    def sent(self, key: CompletionKey) -> None:
+        """Log a request before it is sent; on a full disk, the OSError prevents the request."""
         self._file.append(to_line({"sent": key}))
         self.under_way.add(key)
 
-    def failed(self, key: Key) -> None:
-        """Note that a request ended without a reply."""
+    def failed(self, key: CompletionKey) -> None:
+        """Log that a request ended without a reply."""
         if key in self.under_way:
             self.kept(key)
             self._file.append(to_line({"failed": key}))
 
-    def kept(self, key: Key) -> None:
-        """Forget a request; its completion, which is in its file now, shows that it has ended."""
+    def kept(self, key: CompletionKey) -> None:
+        """Forget a request whose completion is in its file."""
         self.under_way.remove(key)
 
-    def _read(self) -> tuple[int, set[Key]]:
-        """How many requests were lost before the file was started, and which ones it leaves open."""
+    def _read(self) -> tuple[int, set[CompletionKey]]:
+        """Return how many requests were lost before the file was started, and which are pending in it."""
         lost = 0
-        noted: set[Key] = set()
+        pending: set[CompletionKey] = set()
         for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():
             match row:
                 case {"lost": int(lost)}:
                     pass
                 case {"sent": [str(task), int(prompt), int(index)]}:
-                    noted.add((task, prompt, index))
+                    pending.add((task, prompt, index))
                 case {"failed": [str(task), int(prompt), int(index)]}:
-                    noted.discard((task, prompt, index))
+                    pending.discard((task, prompt, index))
                 case _:
                     raise UserError(
                         "this line is not a request; delete the file", file=self.path, line=number
                     )
-        return lost, noted
+        return lost, pending

@@ -1,7 +1,6 @@
-"""Further rounds of a run, in which rejected programs are requested again or repaired (paper, section VI).
+"""Further rounds of a run, which request or repair rejected programs again (paper, section VI).
 
-Each round is a run in a folder of its own: it takes over the programs that the check accepts, and requests
-the others.
+Each round is a run in its own folder: it copies the programs that the check accepts and requests the others.
 """
 
 from __future__ import annotations
@@ -11,12 +10,11 @@ from dataclasses import dataclass, field
 
 from codebotler.prompts import Prompt
 from roboeval.evaluation.requests import GenerationPlan
-from roboeval.evaluation.runs.completions import Completion, Key
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.completions import Completion, CompletionKey
+from roboeval.evaluation.runs.folder import RunFolder
 
-ROUND = "round"  # the column of rows: in which round a program was written; absent in those of the first
-STRIDE = 1_000_000
-"""The distance between the numbers of samples of two rounds, so that each has a seed of its own."""
+ROUND = "round"  # entry of rows: the round of the program; missing in the first round
+SAMPLE_STRIDE = 1_000_000  # between the sample numbers of two rounds, so that all seeds differ
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,40 +22,40 @@ class RoundPlan(GenerationPlan):
     """The completions of a round after the first.
 
     Args:
-        number: the round, at least 1; the first programs were written in round 0.
+        number: the round, at least 1; round 0 wrote the first programs.
         repairs: whether the model sees the rejected program and its problems.
-        earlier: the completions of the round before.
+        earlier: the completions of the previous round.
         problems: the problems of each rejected program, by its key.
     """
 
     number: int
     repairs: bool
-    earlier: Mapping[Key, Completion] = field(repr=False)
-    problems: Mapping[Key, Sequence[str]] = field(repr=False)
+    earlier: Mapping[CompletionKey, Completion] = field(repr=False)
+    problems: Mapping[CompletionKey, Sequence[str]] = field(repr=False)
 
-    def prompt(self, key: Key) -> Prompt:
-        """The request for a completion; without a program there is nothing to repair."""
+    def prompt(self, key: CompletionKey) -> Prompt:
+        """Return the prompt for a completion, which includes the program to repair if there is one."""
         first, program = super().prompt(key), self.earlier[key].program
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
-    def sample(self, key: Key) -> int:
-        """The number of the sample, from which its seed comes."""
-        return key[2] + self.number * STRIDE
+    def sample(self, key: CompletionKey) -> int:
+        """Return the number of the sample, which determines its seed."""
+        return key[2] + self.number * SAMPLE_STRIDE
 
     def given(self) -> Iterator[Completion]:
-        """The completions that are taken over, since the check accepted them."""
+        """Return the completions that the check accepted."""
         return (one for key, one in self.earlier.items() if key not in self.problems)
 
     def mark(self) -> Mapping[str, int]:
-        """What the rows of this round say of it."""
+        """Return the entry that marks rows of this round."""
         return {ROUND: self.number}
 
-    def folder(self, run: Run) -> Run:
-        """The run of this round, beside the first one's files."""
-        return Run(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
+    def folder(self, run: RunFolder) -> RunFolder:
+        """Return the run of this round, a folder within the first run."""
+        return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
 
 
 def round_of(completion: Completion) -> int:
-    """In which round a program was written, from 0."""
+    """Return the round in which a program was written, from 0."""
     number = completion.more.get(ROUND, 0)
     return number if type(number) is int else 0

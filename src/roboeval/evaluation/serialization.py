@@ -1,4 +1,4 @@
-"""Verdicts as the JSON of rows, which are bounded in size."""
+"""Serialization of verdicts as the JSON of rows, whose size is limited."""
 
 from __future__ import annotations
 
@@ -10,44 +10,44 @@ from typing import Any
 
 from codebotler.core.files import to_line
 from codebotler.core.trace import outcome_data
-from roboeval.evaluation.failures import NO_PROGRAM, Verdict, failure
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS, Verdict, failure_of_verdicts
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
 
-ROW_BYTES = 1_000_000  # bytes of a row
-WORLD_BYTES = 20_000  # bytes for each world, where there are so many worlds that they come to more
-ROW_HEADER_BYTES = 2_000  # left for the completion: the task's name is that of a file
-SEPARATOR_BYTES = 2  # bytes between two events
+ROW_BYTES = 1_000_000  # of a row, unless it has very many worlds
+WORLD_BYTES = 20_000  # of each world in that case
+ROW_HEADER_BYTES = 2_000  # for the key and the hash
+SEPARATOR_BYTES = 2  # between two events
 HASH_PLACEHOLDER = "0" * 64
 
 FAILED_PREFIX = b'{"passed": false, '  # as `judgement` writes it
 
 
-def with_reply(completion: Completion, judgement_json: bytes) -> bytes:
-    """The judgement on a program, given as JSON, with what is wrong with its reply if that held no program.
+def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
+    """Replace the failure in a judgement, given as JSON, if the reply held no program.
 
-    Text that is no program ends in some error, and half a program fails some check: neither is the cause.
+    Text that is no program ends in an error, and half a program fails a check, but neither is the cause.
     """
     if not judgement_json.startswith(FAILED_PREFIX) or (kind := completion.no_program) is None:
         return judgement_json
     found = json.loads(judgement_json)
-    cause = {"class": NO_PROGRAM, "kind": kind, "world": found["failure"]["world"], "check": None}
+    cause = {"class": NO_PROGRAM_CLASS, "kind": kind, "world": found["failure"]["world"], "check": None}
     return to_line({**found, "failure": cause}).removesuffix(b"\n")
 
 
 def row_line(completion: Completion, judgement_json: bytes) -> bytes:
-    """The row of an evaluation for a completion whose judgement is given as JSON, as a line."""
-    of_whom = {
+    """Return the row of a completion, whose judgement is given as JSON, as a line."""
+    identity = {
         "task": completion.task,
         "prompt": completion.prompt,
         "index": completion.index,
         "program_sha256": completion.program_sha256,
     }
-    return b"%b, %b\n" % (to_line(of_whom).removesuffix(b"}\n"), judgement_json.removeprefix(b"{"))
+    return b"%b, %b\n" % (to_line(identity).removesuffix(b"}\n"), judgement_json.removeprefix(b"{"))
 
 
 def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
-    """The judgements on a program as one written for each prompt; where they are alike, the same object."""
+    """Return the judgement on a program for each prompt; equal judgements are the same object."""
     known_judgements: list[tuple[list[Verdict], bytes]] = []
     chosen = []
     for prompt in range(prompts):
@@ -61,9 +61,9 @@ def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
 
 
 def judgement(verdicts: list[Verdict]) -> bytes:
-    """The judgement on a program, as JSON that fits into a row."""
-    why = failure(verdicts)
-    return bounded(
+    """Return the judgement on a program as JSON that fits into a row."""
+    why = failure_of_verdicts(verdicts)
+    return limit_size(
         {
             "passed": why is None,
             "failure": why,
@@ -73,7 +73,7 @@ def judgement(verdicts: list[Verdict]) -> bytes:
 
 
 def verdict_data(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as a row writes it."""
+    """Return a verdict as data of a row."""
     outcome = outcome_data(verdict.outcome)
     return {
         "world": verdict.world,
@@ -85,11 +85,11 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-# --- how large a row may be
+# --- the size of rows
 
 
-def bounded(judgement: Mapping[str, Any]) -> bytes:
-    """A judgement as JSON that fits into a row: of a longer one each world has an equal share of it."""
+def limit_size(judgement: Mapping[str, Any]) -> bytes:
+    """Return a judgement as JSON that fits into a row; traces are cut to an equal share for each world."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]
     most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES
@@ -117,7 +117,6 @@ def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
 
 
 def _circumstance_sizes(verdict: Mapping[str, Any]) -> Counter[int]:
-    """How many bytes the circumstances of each event take, with the place where it led."""
     sizes: Counter[int] = Counter()
     for name in CIRCUMSTANCES:
         for entry in verdict.get(name, ()):

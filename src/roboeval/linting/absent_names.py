@@ -15,7 +15,7 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
 from roboeval.suites.load import Requirement, Scenario, Task
 
-ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
+WORDS_FOR_ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
 
 
 def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
@@ -34,7 +34,7 @@ def _names(
     known_names = {
         "room": [room.name for room in rooms],
         "object": objects,
-        "object or person": [*objects, *people, *ANYBODY],
+        "object or person": [*objects, *people, *WORDS_FOR_ANYBODY],
     }
     for element in elements(requirement.formula):
         row = by_event(element.kind)
@@ -47,7 +47,7 @@ def _names(
         if element.holding is not None:
             yield from (("object", one, objects) for one in patterns(element.holding))
         if element.to is not None:
-            known = [*people, *_owners(rooms), *ANYBODY]
+            known = [*people, *_owners(rooms), *WORDS_FOR_ANYBODY]
             yield from (("person", one, known) for one in patterns(element.to))
         if element.place is not None:
             yield from (("room", one, known_names["room"]) for one in _alternatives(element.place))
@@ -61,7 +61,6 @@ def _names(
 
 
 def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
-    """Yield the names of the task's people that occur in the texts of an event."""
     texts = (text for text in (element.text, element.options) if text is not None)
     found = " | ".join(pattern for text in texts for pattern in patterns(text)).lower()
     plain = re.sub(r"\\(.)", lambda escape: " " if escape[1].isalnum() else escape[1], found)

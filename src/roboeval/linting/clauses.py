@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from roboeval.suites.load import Task
 
-FEW = 4  # words; a shorter clause is merged with its neighbour in the same sentence
+MIN_CLAUSE_WORDS = 4  # words; a shorter clause is merged with its neighbour in the same sentence
 _SENTENCE = re.compile(r"(?:[!?]|(?<!\w\.\w)\.)[\"”)]*\s+")  # but not within "e.g. a cup" or "5 p.m. sharp"
 _JOINT = re.compile(r"[,;:]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
 _WORD = re.compile(r"\w+")
@@ -76,13 +76,12 @@ def _find(words: str, text: str) -> Iterator[Span]:
 
 
 def _split_clauses(text: str) -> Iterator[Span]:
-    """The spans of the clauses of a text."""
     first = 0
     for last in [*(match.end() for match in _SENTENCE.finditer(text)), len(text)]:
         spans: list[Span] = []
         start = first
         for end in [*(match.end() for match in _JOINT.finditer(text, first, last)), last]:
-            is_short = len(_WORD.findall(text, start, end)) < FEW
+            is_short = len(_WORD.findall(text, start, end)) < MIN_CLAUSE_WORDS
             if is_short and spans:
                 spans[-1] = (spans[-1][0], end)
             elif is_short and end < last:

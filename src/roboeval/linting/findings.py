@@ -9,7 +9,7 @@ from typing import Literal
 
 from codebotler.core.words import counted
 
-Kind = Literal[
+FindingKind = Literal[
     "unsatisfiable",
     "implied",
     "undecided",
@@ -31,7 +31,7 @@ Kind = Literal[
 class Finding:
     """A likely mistake in a task."""
 
-    kind: Kind
+    kind: FindingKind
     subject: str  # identifies the finding, together with its kind
     message: str
     path: Path

@@ -8,13 +8,11 @@ from dataclasses import replace
 from itertools import combinations
 
 from codebotler.core.yaml_files import YamlFile
-from codebotler.rtl import Not
-from codebotler.rtl.reasoning import Reasoner, Undecided
 from roboeval.linting.findings import Finding
 from roboeval.linting.task_findings import task_findings
 from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import JudgedWorld, judged_worlds
-from roboeval.suites.load import Requirement, Scenario, Task
+from roboeval.suites.load import Requirement, Task
 
 _MOST_SAMPLED = 6  # sampled worlds with different requirements to search for conflicts and implications
 _MOST_ALIKE = 5  # requirements that a single `for` generates
@@ -91,27 +89,11 @@ def _with_few_alike(world: JudgedWorld) -> JudgedWorld:
 
 def _same_worlds(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
     for first, second in combinations(worlds, 2):
-        if first.ablated == second.ablated and _is_equivalent(first.scenario, second.scenario):
+        required = [{requirement.formula for requirement in world.require} for world in (first, second)]
+        if first.ablated == second.ablated and required[0] == required[1]:
             message = (
                 f'{second.name} ("{second.scenario.world.about}") has the same requirements as '
                 f'{first.name} ("{first.scenario.world.about}"); change or remove one'
             )
             subject = f"{'ablation ' if first.ablated else ''}{first.number} and {second.number}"
             yield second.finding("same-worlds", subject, message, second.line)
-
-
-def _is_equivalent(one: Scenario, other: Scenario) -> bool:
-    """Whether the same traces satisfy both; False if no trace satisfies them, unless the text is equal."""
-    first, second = ({r.formula: None for r in scenario.require} for scenario in (one, other))
-    if first.keys() == second.keys():
-        return True
-    reasoner = Reasoner([*first, *second])
-    try:
-        return reasoner.trace(first) is not None and all(
-            reasoner.trace([*held, Not(denied)]) is None
-            for held, others in ((first, second), (second, first))
-            for denied in others
-            if denied not in held
-        )
-    except Undecided:
-        return False

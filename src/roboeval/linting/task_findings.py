@@ -16,14 +16,14 @@ from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
 from codebotler.rtl.wording import is_clear
 from codebotler.simulator.settings import whole_words
-from roboeval.evaluation.failures import failure
+from roboeval.evaluation.failures import failure_of_verdicts
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of
 from roboeval.linting.findings import Finding
 from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import judged_worlds
 from roboeval.suites.load import Requirement, Task
-from roboeval.suites.solutions import place_of, solutions
+from roboeval.suites.solutions import locate_solution, solutions
 from roboeval.suites.task import check_label
 
 
@@ -80,7 +80,6 @@ def _uncovered(task: Task) -> Iterator[Finding]:
 
 
 def _unworded(task: Task) -> Iterator[Finding]:
-    """Checks with a regex that explanations cannot describe."""
     unclear = {
         requirement.check
         for requirement in _required(task)
@@ -98,7 +97,6 @@ def _unworded(task: Task) -> Iterator[Finding]:
 
 
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Solutions whose verdict differs from their file."""
     if task.borrows:  # its programs were written for other requirements
         return
     for solution, judged in zip(solutions(task), verdicts, strict=False):  # verdicts on an ablation follow
@@ -111,19 +109,20 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
             f'the solution "{solution.about}" should {expected}, but it '
             f"{'passes' if failed is None else 'fails'}{where}; correct the program, its `fails`, or a check"
         )
-        path, line = place_of(task, solution)
+        path, line = locate_solution(task, solution)
         yield Finding("misjudged", solution.about, message, path, line)
 
 
 def _why(failed: Failure, judged: Verdicts) -> str:
-    """The check or error by which a program fails, and the world."""
     by = failed["kind"] if failed["check"] is None else f'{failed["kind"]}, by "{failed["check"]}",'
     return f' by {by} in world {failed["world"] + 1}, "{judged[failed["world"]].world}"'
 
 
 def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
     """The failure of a program; None if it satisfies at least one prompt."""
-    failures = [failure([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)]
+    failures = [
+        failure_of_verdicts([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)
+    ]
     return None if None in failures else failures[0]
 
 

@@ -19,7 +19,7 @@ from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
 from codebotler.simulator.settings import resolve_room
 from roboeval.linting.absent_names import absent_names
-from roboeval.linting.findings import Finding, Kind
+from roboeval.linting.findings import Finding, FindingKind
 from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck
 
 _PLAIN = ", if each visit names one room of the world"
@@ -49,7 +49,7 @@ class JudgedWorld:
         """The line of the world in the task file."""
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
-    def finding(self, kind: Kind, subject: str, message: str, line: int | None) -> Finding:
+    def finding(self, kind: FindingKind, subject: str, message: str, line: int | None) -> Finding:
         """Create a finding in the task file."""
         return Finding(kind, subject, message, self.task.path, line)
 

@@ -12,12 +12,12 @@ from itertools import chain, zip_longest
 from codebotler.core.cachedproperty import cached_property
 from roboeval.mutation.operator import Context, Operator, operators_in
 from roboeval.mutation.operators import control_flow, counting, manipulation, misuse, navigation, speech
-from roboeval.mutation.program_tree import ProgramTree, apply_edit, read
+from roboeval.mutation.program_tree import ProgramTree, apply_edit, parse_tree
 from roboeval.suites.load import Task
 from roboeval.suites.solutions import bare_diff, solutions
 
-MODULES = navigation, speech, manipulation, counting, control_flow, misuse
-OPERATORS = tuple(chain.from_iterable(map(operators_in, MODULES)))
+OPERATOR_MODULES = navigation, speech, manipulation, counting, control_flow, misuse
+MUTATION_OPERATORS = tuple(chain.from_iterable(map(operators_in, OPERATOR_MODULES)))
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Original:
     @cached_property
     def tree(self) -> ProgramTree | None:
         """The syntax tree; None if the program does not parse."""
-        return read(self.program)
+        return parse_tree(self.program)
 
     @property
     def text(self) -> str:
@@ -69,7 +69,7 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
 
 
 def mutants(
-    right: Sequence[Original], context: Context, operators: Iterable[Operator] = OPERATORS
+    right: Sequence[Original], context: Context, operators: Iterable[Operator] = MUTATION_OPERATORS
 ) -> Iterator[Mutant]:
     """All distinct mutants of right programs that are not themselves right programs."""
     seen = {original.text for original in right}

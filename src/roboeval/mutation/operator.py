@@ -64,7 +64,7 @@ def operators_in(module: ModuleType) -> Iterator[Operator]:
             yield Operator(name.replace("_", "-"), function.__doc__ or "", function)
 
 
-def where(condition: Condition) -> Callable[[Mutate], Mutate]:
+def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
     """Restrict an operator to tasks that meet a condition, since others do not require what it changes."""
 
     def conditional(edits: Mutate) -> Mutate:
@@ -77,13 +77,13 @@ def where(condition: Condition) -> Callable[[Mutate], Mutate]:
     return conditional
 
 
-def asks(pattern: str) -> Condition:
+def prompt_matches(pattern: str) -> Condition:
     """The condition that a prompt matches, since a program may omit what no prompt asks for."""
     compiled = re.compile(pattern)
     return lambda context: not context.prompts or any(map(compiled.search, context.prompts))
 
 
-def others(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
+def next_names(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
     """The names that follow a name in a cyclic list."""
     folded = [one.lower() for one in names]
     at = folded.index(name.lower()) if name.lower() in folded else -1

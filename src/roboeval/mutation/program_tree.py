@@ -54,7 +54,7 @@ class ProgramTree:
                     yield node, call
 
 
-def read(program: str) -> ProgramTree | None:
+def parse_tree(program: str) -> ProgramTree | None:
     """Parse a program; None if that fails or if it is nested too deeply."""
     tree = parsed(program)
     if isinstance(tree, Flaw) or not is_compilable(program):

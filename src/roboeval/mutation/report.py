@@ -14,11 +14,11 @@ from rich.text import Text
 
 from codebotler.core.files import to_line, to_text, write_whole
 from codebotler.core.terminal import visible
-from roboeval.mutation.mutants import OPERATORS, Mutant
-from roboeval.mutation.score import CHANGED, MutantStatus, MutationScore
+from roboeval.mutation.mutants import MUTATION_OPERATORS, Mutant
+from roboeval.mutation.score import CHANGING_STATUSES, MutantStatus, MutationScore
 
-STYLES = {"+": "green", "-": "red"}
-ABOUT = {operator.name: operator.about for operator in OPERATORS}
+DIFF_STYLES = {"+": "green", "-": "red"}
+DESCRIPTIONS = {operator.name: operator.about for operator in MUTATION_OPERATORS}
 
 
 def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
@@ -29,7 +29,7 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
         outcomes = MutantStatus.KILLED, MutantStatus.EQUIVALENT, MutantStatus.SURVIVED
         table.add_row(
             score.task,
-            *(f"{n:,}" for n in (score.worlds, len(score.right), score.count(*CHANGED))),
+            *(f"{n:,}" for n in (score.worlds, len(score.right), score.count(*CHANGING_STATUSES))),
             *(f"{score.count(status):,}" for status in outcomes),
             *("-" if share is None else f"{share:.3f}" for share in (score.score, score.score_of_all)),
             *(f"{score.count(status):,}" for status in (MutantStatus.SAME, MutantStatus.CRASHES)),
@@ -43,8 +43,8 @@ def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
     table = _table("operator", "mutants", "killed", "survived")
     tried = (one for score in scores for one in score.mutants)
     counts = Counter((one.mutant.operator, one.result.status) for one in tried)
-    for name in ABOUT:
-        if changing := sum(counts[name, status] for status in CHANGED):
+    for name in DESCRIPTIONS:
+        if changing := sum(counts[name, status] for status in CHANGING_STATUSES):
             killed, survived = counts[name, MutantStatus.KILLED], counts[name, MutantStatus.SURVIVED]
             table.add_row(name, *map(str, (changing, killed, survived)))
     return Group(Text("By operator", "bold"), Text(), table)
@@ -54,12 +54,12 @@ def survivors_view(score: MutationScore) -> RenderableType:
     """The surviving mutants of a task with their operators and diffs."""
     parts: list[RenderableType] = []
     for number, mutant in enumerate(score.survivors, 1):
-        of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
-        head = Text.assemble((f"{score.task} {number}", "bold"), of)
-        lines = (Text(visible(line), STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
+        origin = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
+        head = Text.assemble((f"{score.task} {number}", "bold"), origin)
+        lines = (Text(visible(line), DIFF_STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
         diff = Text("\n").join(lines)
         diff.rstrip()
-        parts += [Text(), head, Text(ABOUT[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2))]
+        parts += [Text(), head, Text(DESCRIPTIONS[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2))]
     return Group(*parts)
 
 

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from roboeval.mutation.mutants import Mutant, Original
 
-ENOUGH = 60  # mutants that change behaviour, for a reliable score
-MOST_EQUIVALENT = 0.15  # share of mutants that change behaviour
+MIN_RELIABLE_MUTANTS = 60  # mutants that change behaviour, for a reliable score
+MAX_EQUIVALENT_SHARE = 0.15  # share of mutants that change behaviour
 
 
 class MutantStatus(StrEnum):
@@ -22,7 +22,7 @@ class MutantStatus(StrEnum):
     CRASHES = "crashes"
 
 
-CHANGED = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQUIVALENT
+CHANGING_STATUSES = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQUIVALENT
 
 
 class MutantResult(NamedTuple):
@@ -72,7 +72,7 @@ class MutationScore:
     @property
     def score_of_all(self) -> float | None:
         """The share of killed mutants among all that change behaviour, including equivalent ones."""
-        return self._killed_of(*CHANGED)
+        return self._killed_of(*CHANGING_STATUSES)
 
     def _killed_of(self, *statuses: MutantStatus) -> float | None:
         whole = self.count(*statuses)
@@ -86,12 +86,12 @@ class MutationScore:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons to doubt the score."""
-        changing, equivalent = self.count(*CHANGED), self.count(MutantStatus.EQUIVALENT)
+        changing, equivalent = self.count(*CHANGING_STATUSES), self.count(MutantStatus.EQUIVALENT)
         found = []
-        if changing < ENOUGH:
+        if changing < MIN_RELIABLE_MUTANTS:
             found.append(f"{self.task}: only {changing} mutants change behaviour")
-        if equivalent > MOST_EQUIVALENT * changing:
-            share = f"more than {MOST_EQUIVALENT:.0%}"
+        if equivalent > MAX_EQUIVALENT_SHARE * changing:
+            share = f"more than {MAX_EQUIVALENT_SHARE:.0%}"
             found.append(f"{self.task}: {equivalent} of {changing} mutants are equivalent, {share}")
         return tuple(found)
 

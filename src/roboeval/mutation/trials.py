@@ -18,9 +18,9 @@ from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, T
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import equivalent_mutants
 
-WORLDS = 200  # sampled by default
-AT_ONCE = 16  # worlds per batch; a killed mutant skips further batches
-CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})
+DEFAULT_MUTANT_WORLDS = 200  # sampled by default
+WORLDS_PER_BATCH = 16  # worlds per batch; a killed mutant skips further batches
+CRASH_STATUSES = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
 ProgressBar: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # items, label and count
 
@@ -41,19 +41,19 @@ def mutation_score(
     An original is right if it satisfies some prompt. A mutant is killed if it fails any prompt that its
     original satisfies. Raises UserError if `worlds` is given for a suite with listed worlds.
     """
-    scenarios = worlds_of(suite, task, worlds, seed)
+    scenarios = mutation_worlds(suite, task, worlds, seed)
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
 
     def run(program: str) -> Iterator[Outcome]:
-        for start in range(0, len(robots), AT_ONCE):
-            yield from pool.here().run_all([(program, robots[start : start + AT_ONCE])])[0]
+        for start in range(0, len(robots), WORLDS_PER_BATCH):
+            yield from pool.here().run_all([(program, robots[start : start + WORLDS_PER_BATCH])])[0]
 
     def outcomes(some: Sequence[Original]) -> list[tuple[Outcome, ...]]:
         return [tuple(run(original.program)) for original in some]
 
     def result(mutant: Mutant) -> MutantResult:
         original = mutant.original
-        found = result_of(run(mutant.program), before[original], judges[original])
+        found = judge_mutant(run(mutant.program), before[original], judges[original])
         if found.status is MutantStatus.SURVIVED and mutant.key in equivalent:
             return MutantResult(MutantStatus.EQUIVALENT, why=equivalent[mutant.key])
         return found
@@ -63,7 +63,7 @@ def mutation_score(
     ran = pool.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
     before = dict(zip(programs, progress(ran, f"running {task.name}", len(programs)), strict=True))
     asked = [tuple(one.asked_by(prompt) for one in scenarios) for prompt in range(len(task.prompts))]
-    faults = {original: [fault_in(before[original], one) for one in asked] for original in programs}
+    faults = {original: [find_failure(before[original], one) for one in asked] for original in programs}
     judges = {one: _satisfied(scenarios, found) for one, found in faults.items() if None in found}
     right = tuple(original for original in programs if original in judges)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
@@ -87,22 +87,26 @@ def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | No
     return tuple(one.asked_by(*fitting) for one in scenarios)
 
 
-def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
+def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
     """The worlds for mutants; sampled ones use another seed than the suite."""
     if suite.worlds is not None:
-        return suite.with_worlds(count or WORLDS, seed + 1 + (suite.seed or 0)).tasks[task.name].scenarios
+        return (
+            suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
+            .tasks[task.name]
+            .scenarios
+        )
     if count is not None:
         raise UserError(f'the worlds of the suite "{suite.name}" are written by hand; omit --worlds')
     return task.scenarios
 
 
-def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:
+def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:
     """The first failure of an original; None if it is right."""
     verdicts = map(judge, outcomes, scenarios)
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 
 
-def result_of(
+def judge_mutant(
     outcomes: Iterable[Outcome], before: Sequence[Outcome], scenarios: Sequence[Scenario]
 ) -> MutantResult:
     """Judge a mutant; outcomes are read until a check kills it.
@@ -113,7 +117,7 @@ def result_of(
     changed = False
     for now, outcome, scenario in zip(outcomes, before, scenarios, strict=True):
         verdict = judge(now, scenario)
-        if verdict.outcome.status in CRASHED:
+        if verdict.outcome.status in CRASH_STATUSES:
             crashes.append(verdict)
         elif not verdict.satisfied:
             return _killed(verdict)

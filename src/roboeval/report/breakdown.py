@@ -10,14 +10,14 @@ import polars as pl
 
 from roboeval.analysis.breakdown import by_ability, compare_phrasings, compare_report_back, spread_by_task
 from roboeval.analysis.counts import prompt_scores
-from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.failures import FAILURE_CLASSES
 from roboeval.report.runs import JudgedRun, tasks_of
 from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet
 
-NOT_RECORDED = "instruction not recorded"
-WITH_REPORT = "come back and report"
-MOST_WORDS = 12
-MOST_SENTENCES = 20
+NO_INSTRUCTION = "instruction not recorded"
+REPORTING_TASKS = "come back and report"
+UNKNOWN_COUNT = "an unknown number (judged by an earlier version)"
+MAX_DISTINCT_WORDS = 12
 
 
 def abilities(runs: Sequence[JudgedRun]) -> Section:
@@ -33,8 +33,10 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows: list[list[Cell]] = []
     for ability, name in sorted(found, key=lambda key: order.index(key[0])):
         tasks, at, failed = found[ability, name]
-        rows.append([ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in CLASSES)])
-    return sheet("abilities", rows, shares=[one.plural for one in CLASSES.values()])
+        rows.append(
+            [ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in FAILURE_CLASSES)]
+        )
+    return sheet("abilities", rows, shares=[one.plural for one in FAILURE_CLASSES.values()])
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -42,7 +44,7 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows: list[list[Cell]] = []
     for run in runs:
         for reports, completions, failed, away, lost, passed in compare_report_back(run.results).iter_rows():
-            tasks = WITH_REPORT if reports else "others"
+            tasks = REPORTING_TASKS if reports else "others"
             shares = [count / failed if failed and count is not None else None for count in (away, lost)]
             rows.append([run.name, tasks, completions, passed, failed, away, shares[0], lost, shares[1]])
     return sheet("coming-back", rows)
@@ -51,15 +53,12 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 def report_back_sentences(table: Sheet) -> list[str]:
     """Sentences about tasks that end with a report."""
     return [
-        f"{name}: of {failed:,} failures in tasks that end with a report, {_count_or_unknown(away)} never "
-        f"returned and {lost:,} went to a room that does not exist."
-        for name, tasks, _, _, failed, away, _, lost, _ in table.rows[:MOST_SENTENCES]
-        if tasks == WITH_REPORT and failed
+        f"{name}: of {failed:,} failures in tasks that end with a report, "
+        f"{away:,} never returned and {lost:,} went to a room "
+        "that does not exist."
+        for name, tasks, _, _, failed, away, _, lost, _ in table.rows
+        if tasks == REPORTING_TASKS and failed
     ]
-
-
-def _count_or_unknown(count: int | None) -> str:
-    return "an unknown number (judged by an earlier version)" if count is None else f"{count:,}"
 
 
 # --- phrasing
@@ -84,15 +83,15 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
     """The words that only the first text has, and those that only the second has."""
     if one is None or other is None:
-        return NOT_RECORDED, NOT_RECORDED
+        return NO_INSTRUCTION, NO_INSTRUCTION
     words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))
     first, second = map(dict.fromkeys, words)
     return _join([w for w in first if w not in second]), _join([w for w in second if w not in first])
 
 
 def _join(words: Sequence[str]) -> str:
-    more = len(words) - MOST_WORDS
-    return " ".join(words[:MOST_WORDS]) + (f" and {more} more" if more > 0 else "")
+    more = len(words) - MAX_DISTINCT_WORDS
+    return " ".join(words[:MAX_DISTINCT_WORDS]) + (f" and {more} more" if more > 0 else "")
 
 
 def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -106,4 +105,4 @@ def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 def _instructions(runs: Sequence[JudgedRun], key: Any) -> str:  # noqa: ANN401 - cells of a table have any type
     found = {run.instructions.get(key) for run in runs} - {None}
-    return " / ".join(sorted(map(str, found))) or NOT_RECORDED
+    return " / ".join(sorted(map(str, found))) or NO_INSTRUCTION

@@ -9,7 +9,7 @@ from roboeval.analysis.cost import budgets, cost_of
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
 from roboeval.evaluation.runs.table import Price
-from roboeval.report import figures
+from roboeval.report.curves import draw_accepted, draw_limits, most_completions
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, sheet
 
@@ -17,20 +17,20 @@ from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, 
 def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     """Results by limit of retries, for runs with checked programs."""
     checked = {run.name: run.trials for run in runs if run.trials}
-    points = {name: curves(prompts) for name, prompts in checked.items()}
+    points = {name: retry_curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
     steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
     parts = (
-        ReportFigure("rejection-sampling", lambda: figures.limits(points, figures.most_completions(runs))),
+        ReportFigure("rejection-sampling", lambda: draw_limits(points, most_completions(runs))),
         retries_sheet(checked),
-        ReportFigure("accepted", lambda: figures.accepted(shares)),
+        ReportFigure("accepted", lambda: draw_accepted(shares)),
         curves_sheet(points),
         sheet("accepted", steps, shares=[*shares]),
     )
     return section("rejection-sampling", *(parts if checked else ()))
 
 
-def curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
+def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
     """Share of prompts by threshold of pass@1, for each limit of retries."""
     found = {limit: resample(prompts, limit).by_prompt for limit in LIMITS}
     return {limit: threshold_curve([one.passed for one in each]) for limit, each in found.items()}
@@ -103,8 +103,6 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
             price = None
         if price is None or not model:
             raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, per million tokens')
-        if model in prices:
-            raise UserError(f'--price names "{model}" twice; give one price')
         prices[model] = price
     return prices
 

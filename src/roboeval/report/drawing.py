@@ -11,30 +11,37 @@ from functools import cache
 from typing import Any
 
 import matplotlib as mpl
-from fontTools import subset
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 
 from codebotler.core.terminal import visible
 
-WIDE, NARROW = 7.16, 3.5  # inches: the width of two columns of a paper, and of one
+PAGE_WIDTH, COLUMN_WIDTH = 7.16, 3.5  # inches: the width of two columns of a paper, and of one
 DPI, POINTS = 300, 72  # per inch
 
-PAPER, INK, FAINT, QUIET = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
+BACKGROUND, FOREGROUND, PALE, MUTED = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
 BLACK, WHITE = "#010101", "#fefefe"  # not #000000, which matplotlib omits from SVG and `darken` would miss
-FULL = "#00507d"  # the shade of a share of 1; a single hue suits colour-blind readers and print
-MIDDLE = "#7fb5d5"
+DARKEST_SHADE = "#00507d"  # the shade of a share of 1; a single hue suits colour-blind readers and print
+MIDDLE_SHADE = "#7fb5d5"
 DARK_MIDDLE = "#2b5f80"
 # Colours of data stay the same on a dark page.
-DARK = {PAPER: "#17181c", INK: "#e6e6ea", FAINT: "#3d3f47", QUIET: "#8f919b", BLACK: "#ffffff"}
+DARK_COLOURS = {
+    BACKGROUND: "#17181c",
+    FOREGROUND: "#e6e6ea",
+    PALE: "#3d3f47",
+    MUTED: "#8f919b",
+    BLACK: "#ffffff",
+}
 # The palette of Okabe and Ito, which colour-blind readers can distinguish.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", BLACK, "#F0E442")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-LONGEST_NAME = 26
+MAX_FIGURE_NAME = 26
+MAX_COLOURED_RUNS = len(COLOURS)
+MAX_LEGEND_NAME = 16  # letters; two names of this length fit side by side below a narrow figure
 
-STYLE: dict[Any, Any] = {
+FIGURE_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 7.5,
     "axes.titlesize": 8,
@@ -46,14 +53,16 @@ STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
-    **dict.fromkeys(("axes.edgecolor", "axes.labelcolor", "text.color", "xtick.color", "ytick.color"), INK),
-    **dict.fromkeys(("axes.facecolor", "figure.facecolor", "savefig.facecolor"), PAPER),
+    **dict.fromkeys(
+        ("axes.edgecolor", "axes.labelcolor", "text.color", "xtick.color", "ytick.color"), FOREGROUND
+    ),
+    **dict.fromkeys(("axes.facecolor", "figure.facecolor", "savefig.facecolor"), BACKGROUND),
     "axes.axisbelow": True,
     "text.hinting": "none",  # at 300 dpi, hinting only distorts letters
     "text.parse_math": False,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
-    "grid.color": FAINT,
+    "grid.color": PALE,
     "grid.linewidth": 0.5,
     "hatch.linewidth": 0.5,
     "lines.linewidth": 1.4,
@@ -64,27 +73,13 @@ STYLE: dict[Any, Any] = {
 }
 
 
-load_font = subset.load_font
-
-
-def _load_font(*args: Any, **more: Any) -> Any:  # noqa: ANN401 - the signature of fontTools
-    """Load a font without kerning tables: PDF places each letter itself, and copying the tables is slow."""
-    font = load_font(*args, **more)
-    for table in {"GDEF", "GPOS", "GSUB"}.intersection(font.keys()):
-        del font[table]
-    return font
-
-
-subset.load_font = _load_font
-
-
 @contextmanager
 def use_style() -> Iterator[None]:
     """Apply the style of reports, ignoring the user's own matplotlib settings."""
     with warnings.catch_warnings(), mpl.rc_context():
         warnings.simplefilter("ignore")  # names may contain letters that the font lacks
         mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+        mpl.rcParams.update(FIGURE_STYLE)
         yield
 
 
@@ -121,16 +116,16 @@ def _slim(svg: bytes) -> bytes:
     return re.sub(rb"<defs>\s*</defs>|\s*\n\s*", b"\n", svg)
 
 
-def shades(paper: str = PAPER, middle: str = MIDDLE) -> LinearSegmentedColormap:
+def shades(paper: str = BACKGROUND, middle: str = MIDDLE_SHADE) -> LinearSegmentedColormap:
     """Return the colour map for shares from 0 to 1."""
-    return LinearSegmentedColormap.from_list("shades", [paper, middle, FULL])
+    return LinearSegmentedColormap.from_list("shades", [paper, middle, DARKEST_SHADE])
 
 
 @cache
 def dark_colours() -> dict[bytes, bytes]:
     """Map the colours of a light page to those of a dark one."""
-    light, dark = shades(), shades(DARK[PAPER], DARK_MIDDLE)
-    pairs = {to_hex(light(n)): to_hex(dark(n)) for n in range(light.N)} | DARK
+    light, dark = shades(), shades(DARK_COLOURS[BACKGROUND], DARK_MIDDLE)
+    pairs = {to_hex(light(n)): to_hex(dark(n)) for n in range(light.N)} | DARK_COLOURS
     return {old.encode(): new.encode() for old, new in pairs.items()}
 
 
@@ -140,7 +135,7 @@ def darken(svg: bytes) -> bytes:
     return re.sub(rb"#[0-9a-f]{6}\b", lambda colour: colours.get(colour[0], colour[0]), svg)
 
 
-def short_name(name: str, most: int = LONGEST_NAME) -> str:
+def short_name(name: str, most: int = MAX_FIGURE_NAME) -> str:
     """Shorten a name for a figure; keep its beginning and end, which distinguish names."""
     name, end = visible(name), (most - 1) // 2
     return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboeval.analysis.cluster import Cluster, describe_groups, group_failures
 from roboeval.analysis.counts import tally_of
+from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_failures
 from roboeval.analysis.summary import ALL, Causes, causes, cut_off_replies
 from roboeval.analysis.summary import failures as count_failures
 from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences, verdict_changes
@@ -16,17 +16,20 @@ from roboeval.report.runs import JudgedRun, coverage_of
 from roboeval.report.sheets import Cell, Groups, Prose, ReportFigure, Section, Sheet, note, section, sheet
 from roboeval.suites.task import check_label
 
-MOST, FEWEST, ALTOGETHER = 100, 4, 200  # groups on the page: at most and at least per run, and in all
-MOST_REVERSALS = 100  # groups in the table, per run
+MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN, MAX_GROUPS_SHOWN = (
+    100,
+    4,
+    200,
+)  # groups on the page: at most and at least per run, and in all
 
 
 # --- causes
 
 
-def why(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
+def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
     """Causes of failures (paper, section V.B)."""
     found = all_causes(runs, with_published=with_published)
-    figure = ReportFigure("causes", lambda: figures.causes(found), coverage_of(runs))
+    figure = ReportFigure("causes", lambda: figures.draw_causes(found), coverage_of(runs))
     notes = Prose(published_notes(runs) if with_published else [])
     return section("causes", figure, notes, causes_sheet(found))
 
@@ -46,11 +49,11 @@ def most_frequent(run: JudgedRun) -> str:
     counts = {key: count for key, count in causes(tally_of(run.table)).counts.items() if key[1] != ALL}
     if not counts:
         return ""
-    (of, kind), count = max(counts.items(), key=lambda one: one[1])
-    return f"{kind} ({plural_of(of)}), {count / run.completions.height:.0%} of all completions"
+    (name, kind), count = max(counts.items(), key=lambda one: one[1])
+    return f"{kind} ({plural_of(name)}), {count / run.completions.height:.0%} of all completions"
 
 
-def warnings(run: JudgedRun) -> list[str]:
+def cut_off_warnings(run: JudgedRun) -> list[str]:
     """Warn if many replies of a run were cut off."""
     warning = cut_off_replies(count_failures(tally_of(run.table)), run.results.scope).warning
     return [] if warning is None else [f"{warning}."]
@@ -59,10 +62,10 @@ def warnings(run: JudgedRun) -> list[str]:
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
     """Shares and counts of all causes."""
     rows = [
-        [name, of, kind, one.counts.get((of, kind)), share]
+        [name, cause, kind, one.counts.get((cause, kind)), share]
         for name, one in found
-        for of, whole in one.classes.items()
-        for kind, share in [(ALL, whole), *one.kinds.get(of, {}).items()]
+        for cause, whole in one.classes.items()
+        for kind, share in [(ALL, whole), *one.kinds.get(cause, {}).items()]
     ]
     return sheet("causes", rows)
 
@@ -81,11 +84,11 @@ def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
 # --- groups
 
 
-def similar_failures(runs: Sequence[JudgedRun]) -> Section:
+def failures_section(runs: Sequence[JudgedRun]) -> Section:
     """Groups of similar failures; the page shows the programs of the largest groups of each run."""
-    most = max(FEWEST, min(MOST, ALTOGETHER // len(runs)))
-    every: list[tuple[str, Cluster]] = []
-    shown: list[tuple[str, Cluster]] = []
+    most = max(MIN_GROUPS_PER_RUN, min(MAX_GROUPS_PER_RUN, MAX_GROUPS_SHOWN // len(runs)))
+    every: list[tuple[str, FailureGroup]] = []
+    shown: list[tuple[str, FailureGroup]] = []
     notes: list[str] = []
     for run in runs:
         groups = group_failures(map(run.results.failed_row, run.results.failed), run.results.programs)
@@ -98,7 +101,7 @@ def similar_failures(runs: Sequence[JudgedRun]) -> Section:
     return section("failures", about, Groups(shown), groups_sheet(every))
 
 
-def groups_sheet(every: Sequence[tuple[str, Cluster]]) -> Sheet:
+def groups_sheet(every: Sequence[tuple[str, FailureGroup]]) -> Sheet:
     """All groups as a table."""
     rows = [
         [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
@@ -107,7 +110,7 @@ def groups_sheet(every: Sequence[tuple[str, Cluster]]) -> Sheet:
     return sheet("failures", rows)
 
 
-def _cells(one: Cluster) -> list[Cell]:
+def _cells(one: FailureGroup) -> list[Cell]:
     check = one.failure["check"]
     ground = [one.failure["class"], one.failure["kind"], check and check_label(check)]
     return [one.task, *ground, one.why, name_of(one.representative)]
@@ -150,14 +153,9 @@ def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
 def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
     """Groups of completions that pass under one suite only."""
     rows: list[list[Cell]] = []
-    notes: list[str] = []
     for one in found:
         sides = zip(one.suites, (one.first_only, one.second_only), strict=True)
         those = [(suite, group) for suite, groups in sides for group in groups]
-        those.sort(key=lambda pair: -len(pair[1].members))
-        for suite, group in those[:MOST_REVERSALS]:
+        for suite, group in sorted(those, key=lambda pair: -len(pair[1].members)):
             rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
-        if (left := len(those) - MOST_REVERSALS) > 0:
-            more = f"{left:,} more groups are not shown; list them with `roboeval compare --suites`."
-            notes.append(f"{one.name}: {more}")
-    return sheet("reversals", rows, notes=notes)
+    return sheet("reversals", rows)

@@ -23,8 +23,8 @@ for (const table of document.querySelectorAll("table")) {
     });
   });
 }
-for (const list of document.querySelectorAll(".clusters")) {
-  const items = [...list.querySelectorAll(".cluster")];
+for (const list of document.querySelectorAll(".groups")) {
+  const items = [...list.querySelectorAll(".group")];
   const controls = document.createElement("div");
   controls.className = "filters";
   controls.setAttribute("role", "search");

@@ -9,8 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from codebotler.core.terminal import shortened
 from codebotler.core.words import counted
-from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report.sheets import (
@@ -30,25 +31,25 @@ from roboeval.report.sheets import (
 )
 from roboeval.suites.task import check_label
 
-WORDS, CHARACTERS, LINES = 500, 6_000, 80  # limits for text that models wrote
-MOST_ROWS = 1_000  # per table on the page; the CSV file has all
-LONG = 24  # tables with more rows are folded
-LONG_TEXT = 70  # longer cells take several lines
-STYLE = Path(__file__).with_name("page.css")
-SCRIPT = Path(__file__).with_name("page.js")
+MAX_TEXT, MAX_PROGRAM_CHARACTERS, MAX_DIFF_LINES = 500, 6_000, 80  # limits for text that models wrote
+MAX_TABLE_ROWS = 1_000  # per table on the page; the CSV file has all
+MAX_UNFOLDED_ROWS = 24  # tables with more rows are folded
+LONG_CELL = 70  # longer cells take several lines
+PAGE_STYLE = Path(__file__).with_name("page.css")
+PAGE_SCRIPT = Path(__file__).with_name("page.js")
 GENERATOR = '<meta name="generator" content="RoboEval">'  # identifies a page as a report
 DrawnFigure = tuple[bytes, bytes]  # SVG for light pages, and for dark ones
 DrawnFigures = Mapping[str, DrawnFigure]
 
 
-def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: DrawnFigures) -> str:
+def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings: DrawnFigures) -> str:
     """Return the page as HTML; all text is escaped, so nothing that a model wrote has an effect."""
-    script = SCRIPT.read_text()
+    script = PAGE_SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
     titles = {_text(section.name): _text(page_text("sections", section.name)) for section in sections}
     links = "".join(f'<li><a href="#{name}">{title}</a></li>' for name, title in titles.items())
-    body = "".join(_section(section, drawn) for section in sections)
+    body = "".join(_section(section, drawings) for section in sections)
     paragraphs = "".join(f"<p>{_text(words)}</p>" for words in lead)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -56,19 +57,12 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Dr
         f"{GENERATOR}\n"
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
-        f"<title>{_text(title)}</title>\n<style>\n{STYLE.read_text()}</style>\n</head>\n<body>\n"
+        f"<title>{_text(title)}</title>\n<style>\n{PAGE_STYLE.read_text()}</style>\n</head>\n<body>\n"
         f'<a class="skip" href="#main">To the results</a>\n'
         f"<header><h1>{_text(title)}</h1>{paragraphs}</header>\n"
-        f'<nav aria-label="Sections"><ol>{links}</ol></nav>\n{_files(sections)}'
+        f'<nav aria-label="Sections"><ol>{links}</ol></nav>\n'
         f'<main id="main">\n{body}</main>\n<script>{script}</script>\n</body>\n</html>\n'
     )
-
-
-def _files(sections: Sequence[Section]) -> str:
-    """Links to the CSV files of all tables."""
-    names = [part.name for section in sections for part in section.parts if isinstance(part, Sheet)]
-    links = ", ".join(f'<a href="tables/{_text(name)}.csv">{_text(name)}</a>' for name in names)
-    return f'<p class="files">Tables as CSV: {links}</p>\n' if names else ""
 
 
 def _text(words: str) -> str:
@@ -84,19 +78,19 @@ def _prose(words: str) -> str:
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", _text(words))
 
 
-def _section(section: Section, drawn: DrawnFigures) -> str:
-    parts = "".join(_part(part, drawn) for part in section.parts)
+def _section(section: Section, drawings: DrawnFigures) -> str:
+    parts = "".join(_part(part, drawings) for part in section.parts)
     name = _text(section.name)
     head = f'<h2 id="{name}-h">{_text(page_text("sections", section.name))}</h2>'
     return f'<section id="{name}" aria-labelledby="{name}-h">{head}\n{parts}</section>\n'
 
 
-def _part(part: Part, drawn: DrawnFigures) -> str:
+def _part(part: Part, drawings: DrawnFigures) -> str:
     match part:
         case Sheet():
             return _table(part)
         case ReportFigure():
-            return _figure(part, drawn)
+            return _figure(part, drawings)
         case Prose(paragraphs):
             return "".join(f"<p>{_prose(words)}</p>\n" for words in paragraphs)
         case Code(text):
@@ -104,7 +98,7 @@ def _part(part: Part, drawn: DrawnFigures) -> str:
         case Cards(cards):
             return f'<div class="cards">{"".join(map(_card, cards))}</div>\n'
         case Groups(shown):
-            return f'<div class="clusters">{"".join(_cluster(*one) for one in shown)}</div>\n'
+            return f'<div class="groups">{"".join(_failure_group(*one) for one in shown)}</div>\n'
 
 
 def _card(card: Card) -> str:
@@ -127,10 +121,10 @@ def _card(card: Card) -> str:
 # --- figures
 
 
-def _figure(figure: ReportFigure, drawn: DrawnFigures) -> str:
-    if figure.name not in drawn:
+def _figure(figure: ReportFigure, drawings: DrawnFigures) -> str:
+    if figure.name not in drawings:
         return ""
-    links = (base64.b64encode(svg).decode() for svg in drawn[figure.name])
+    links = (base64.b64encode(svg).decode() for svg in drawings[figure.name])
     light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
     caption = _text(" ".join([page_text("figures", figure.name), *figure.about]))
     name = _text(figure.name)
@@ -151,27 +145,27 @@ def _table(sheet: Sheet) -> str:
     filled = [n for n in range(len(sheet.columns)) if any(row[n] is not None for row in sheet.rows)]
     columns = [sheet.columns[n] for n in filled]
     heads = "".join(f'<th scope="col" class="{_css(c)}">{_text(c.head)}</th>' for c in columns)
-    rows = "".join(_row([row[n] for n in filled], columns) for row in sheet.rows[:MOST_ROWS])
+    rows = "".join(_row([row[n] for n in filled], columns) for row in sheet.rows[:MAX_TABLE_ROWS])
     texts = page_text("tables", sheet.name)
     title, about = (_text(texts.get(name, "")) for name in ("title", "about"))
     about = f"<p>{about}</p>" if about else ""
-    left = len(sheet.rows) - MOST_ROWS
+    left = len(sheet.rows) - MAX_TABLE_ROWS
     more = [f"{counted(left, 'more row')} in the CSV file."] if left > 0 else []
     notes = "".join(f'<p class="note">{_prose(note)}</p>' for note in (*sheet.notes, *more))
     table = (
         f'<div class="wide" tabindex="0" role="region" aria-label="{title}"><table>'
         f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
-    files = f'<p class="files">tables/{_text(sheet.name)}.csv</p>'
-    inside = f"{about}{table}{notes}{files}"
     name = _text(sheet.name)
-    if len(sheet.rows) > LONG:
+    link = f'<p class="files"><a href="tables/{name}.csv">tables/{name}.csv</a></p>'
+    inside = f"{about}{table}{notes}{link}"
+    if len(sheet.rows) > MAX_UNFOLDED_ROWS:
         summary = f"<summary>{title} <span>{len(sheet.rows):,} rows</span></summary>"
         return f'<details class="sheet" id="table-{name}">{summary}{inside}</details>\n'
     return f'<div class="sheet" id="table-{name}"><h3>{title}</h3>{inside}</div>\n'
 
 
-BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")  # line breaks allowed in long names
+NAME_BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")  # line breaks allowed in long names
 
 
 def _css(column: Column) -> str:
@@ -182,10 +176,10 @@ def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
     cells = []
     for number, (cell, column) in enumerate(zip(row, columns, strict=True)):
         sort = "" if cell is None or isinstance(cell, str) else f' data-v="{cell!r}"'
-        words = BREAKS.sub("<wbr>", _text(format_cell(cell, column.kind)))
+        words = NAME_BREAKS.sub("<wbr>", _text(format_cell(cell, column.kind)))
         is_head = number == 0 and column.kind == "text"
         tag = 'th scope="row"' if is_head else "td"
-        long = " long" if isinstance(cell, str) and len(cell) > LONG_TEXT else ""
+        long = " long" if isinstance(cell, str) and len(cell) > LONG_CELL else ""
         cells.append(f'<{tag} class="{_css(column)}{long}"{sort}>{words}</{"th" if is_head else "td"}>')
     return f"<tr>{''.join(cells)}</tr>"
 
@@ -193,45 +187,40 @@ def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
 # --- groups of failures
 
 
-def _cluster(model: str, cluster: Cluster) -> str:
-    kind = f"{label_of(cluster.failure['class'])}: {cluster.failure['kind']}"
-    size = len(cluster.members)
-    data = {"model": model, "task": cluster.task, "kind": kind, "size": str(size)}
+def _failure_group(model: str, group: FailureGroup) -> str:
+    kind = f"{label_of(group.failure['class'])}: {group.failure['kind']}"
+    size = len(group.members)
+    data = {"model": model, "task": group.task, "kind": kind, "size": str(size)}
     attributes = "".join(f' data-{name}="{_text(value)}"' for name, value in data.items())
-    check = cluster.failure["check"]
-    why = f"{check_label(check)}: {cluster.why}" if check else cluster.why
+    check = group.failure["check"]
+    why = shortened(f"{check_label(check)}: {group.why}" if check else group.why, MAX_TEXT, str)
     return (
-        f'<details class="cluster"{attributes}><summary><b>{size:,}</b><span>{_text(model)}, '
-        f'{_text(cluster.task)}, {_text(kind)}<br><span class="why">{_text(_cut(why, WORDS))}</span></span>'
-        f'</summary><div class="inside">{_inside(cluster)}</div></details>\n'
+        f'<details class="group"{attributes}><summary><b>{size:,}</b><span>{_text(model)}, '
+        f'{_text(group.task)}, {_text(kind)}<br><span class="why">{_text(why)}</span></span>'
+        f'</summary><div class="inside">{_inside(group)}</div></details>\n'
     )
 
 
-def _inside(cluster: Cluster) -> str:
-    prompts = f"Prompt{'s' * (len(cluster.prompts) > 1)} {', '.join(map(str, cluster.prompts))}"
-    world = _text(str(cluster.reason["world"]))
-    name = _text(name_of(cluster.representative))
-    where = "" if cluster.has_no_program else f", world \u201c{world}\u201d"
+def _inside(group: FailureGroup) -> str:
+    prompts = f"Prompt{'s' * (len(group.prompts) > 1)} {', '.join(map(str, group.prompts))}"
+    world = _text(str(group.reason["world"]))
+    name = _text(name_of(group.representative))
+    where = "" if group.has_no_program else f", world \u201c{world}\u201d"
     head = f"<p>{prompts}. Example: {name}{where}.</p>"
-    if cluster.program is None:
+    if group.program is None:
         return f"{head}<p>The judged program was changed or removed.</p>"
-    program = f"<pre>{_text(_cut(cluster.program, CHARACTERS))}</pre>"
-    fix = cluster.fix
+    program = f"<pre>{_text(shortened(group.program, MAX_PROGRAM_CHARACTERS, str))}</pre>"
+    fix = group.fix
     if fix is None:
-        nothing = "" if cluster.has_no_program else "<p>No program passes this task.</p>"
+        nothing = "" if group.has_no_program else "<p>No program passes this task.</p>"
         return f"{head}{program}{nothing}"
-    lines = "".join(_changed(sign, line) for sign, line in fix.changes[:LINES])
-    more = f"... {len(fix.changes) - LINES} more lines" if len(fix.changes) > LINES else ""
+    lines = "".join(_changed(sign, line) for sign, line in fix.changes[:MAX_DIFF_LINES])
+    more = f"... {len(fix.changes) - MAX_DIFF_LINES} more lines" if len(fix.changes) > MAX_DIFF_LINES else ""
     count = f"{fix.changed} line{'s' * (fix.changed != 1)}"
     return f"{head}{program}<p>{_text(fix.name)} passes and differs in {count}:</p><pre>{lines}{more}</pre>"
 
 
 def _changed(sign: str, line: str) -> str:
     tag = {"-": "del", "+": "ins"}.get(sign, "span")
-    words = f"{sign} {_text(_cut(line, WORDS))}"
+    words = f"{sign} {_text(shortened(line, MAX_TEXT, str))}"
     return f"<{tag}>{words}</{tag}>" if tag != "span" else f"{words}\n"
-
-
-def _cut(text: str, most: int) -> str:
-    left = len(text) - most
-    return text if left <= 0 else f"{text[:most]}... {left:,} more characters"

@@ -12,7 +12,7 @@ from roboeval.analysis.summary import Causes
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Sheet, note, sheet
 
-SUITE = "paper"
+PAPER_SUITE = "paper"
 
 
 @cache
@@ -24,7 +24,7 @@ def published() -> dict[str, Any]:
 
 def model_of(run: JudgedRun) -> str | None:
     """The model of the paper that a run used, by its recorded name or its folder; None if unsure."""
-    if run.results.head.get("suite") != SUITE or run.is_mixed:
+    if run.results.manifest.get("suite") != PAPER_SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
     known = published()["names"] | ({} if colon else published()["short_names"])

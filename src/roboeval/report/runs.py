@@ -20,7 +20,7 @@ from roboeval.evaluation.runs.scope import Coverage
 from roboeval.report.drawing import short_name
 from roboeval.suites.load import Suite
 
-LONGEST_NAME = 100
+MAX_RUN_NAME = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +104,8 @@ class JudgedRun:
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
     """The tasks with completions in any run, in the order of the suite."""
-    there = {score.task for run in runs for score in run.scores}
-    return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(there)]) if task in there]
+    judged = {score.task for run in runs for score in run.scores}
+    return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(judged)]) if task in judged]
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
@@ -131,19 +131,15 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
         if len(found) != 1:
             which = "more than one run has that name" if found else "no such run is in the report"
             raise UserError(f'--label names "{run}", but {which}; name one of {", ".join(map(str, paths))}')
-        if found[0] in labels:
-            raise UserError(f'--label names "{run}" twice; give one label')
-        if label.strip() in labels.values():
-            raise UserError(f'two runs have the label "{label.strip()}"; give each its own')
         labels[found[0]] = label.strip()
     return labels
 
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
     """Name each run by its label or its model; make names unique with the folder or a number."""
-    given = {at: short_name(label, LONGEST_NAME) for at, label in labels.items()}
+    given = {at: short_name(label, MAX_RUN_NAME) for at, label in labels.items()}
     plain = [
-        given.get(at) or short_name(run.model or run.folder, LONGEST_NAME) for at, run in enumerate(runs)
+        given.get(at) or short_name(run.model or run.folder, MAX_RUN_NAME) for at, run in enumerate(runs)
     ]
     names = _extend_duplicates(
         plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]

@@ -6,7 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.compare import MOST_PAIRS, compare_scores, other_differences, pairs_to_compare, verdict
+from roboeval.analysis.compare import (
+    MAX_PAIRS,
+    compare_scores,
+    comparison_sentence,
+    other_differences,
+    pairs_to_compare,
+)
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
@@ -16,8 +22,9 @@ from roboeval.analysis.metrics import (
     share_at_least,
     threshold_curve,
 )
-from roboeval.analysis.statistics import FEW, by_bootstrap
+from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
+from roboeval.report.curves import draw_thresholds
 from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
@@ -25,8 +32,8 @@ from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, no
 def results(runs: Sequence[JudgedRun]) -> Section:
     """pass@1 of each run and task."""
     coverage = coverage_of(runs)
-    by_run = ReportFigure("overall", lambda: figures.overall_scores(runs), coverage)
-    by_task = ReportFigure("tasks", lambda: figures.bars(runs), coverage)
+    by_run = ReportFigure("overall", lambda: figures.draw_overall(runs), coverage)
+    by_task = ReportFigure("tasks", lambda: figures.draw_task_scores(runs), coverage)
     return section("results", by_run, overall_sheet(runs), by_task, task_sheet(runs))
 
 
@@ -54,11 +61,11 @@ def _unknown(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
-    few = [run.name for run in runs if len(run.scores) < FEW]
+    few = [run.name for run in runs if len(run.scores) < MIN_CLUSTERS]
     if not few:
         return []
     of_which = "" if len(few) == len(runs) else f" of {', '.join(few)}"
-    few_tasks = f"The bootstrap interval{of_which} is too narrow with fewer than {FEW} tasks"
+    few_tasks = f"The bootstrap interval{of_which} is too narrow with fewer than {MIN_CLUSTERS} tasks"
     return [f"{few_tasks}; quote the interval over tasks."]
 
 
@@ -82,8 +89,8 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     ]
     without = [run.name for run in runs if run.ablated is None]
     which = "any run" if len(without) == len(runs) else ", ".join(without)
-    note = f"Common-sense results are missing for {which}; judge with `roboeval evaluate --ablation`."
-    return sheet("tasks", rows, notes=[note] if without else [])
+    missing = f"Common-sense results are missing for {which}; judge with `roboeval evaluate --ablation`."
+    return sheet("tasks", rows, notes=[missing] if without else [])
 
 
 def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
@@ -95,9 +102,7 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
     """The share of prompts that reach each pass@1 (paper, section V.A)."""
-    return section(
-        "thresholds", ReportFigure("thresholds", lambda: figures.thresholds(runs)), curve_sheet(runs)
-    )
+    return section("thresholds", ReportFigure("thresholds", lambda: draw_thresholds(runs)), curve_sheet(runs))
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -118,8 +123,8 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
             found = compare_scores(first.by_prompt, second.by_prompt)
         except UserError:  # no prompt in common
             continue
-        if len(sentences) < MOST_PAIRS:
-            sentences.append(verdict(found, (first.name, second.name)))
+        if len(sentences) < MAX_PAIRS:
+            sentences.append(comparison_sentence(found, (first.name, second.name)))
             pair, over_prompts = f"{first.name} and {second.name}", found.over_prompts
             if not over_prompts.is_known:
                 notes.append(f"{pair}: the interval over prompts is {over_prompts.ends()}.")
@@ -142,7 +147,9 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
     try:
-        return [verdict(compare_scores(second.by_prompt, best.by_prompt), (second.name, best.name))]
+        return [
+            comparison_sentence(compare_scores(second.by_prompt, best.by_prompt), (second.name, best.name))
+        ]
     except UserError:  # no prompt in common
         return []
 

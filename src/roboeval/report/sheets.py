@@ -13,13 +13,13 @@ import yaml
 from matplotlib.figure import Figure
 
 from codebotler.core.yaml_files import Loader
-from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.compare import MIN_SHOWN_P
+from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.analysis.metrics import Estimate
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.table import storable, write_table
 
-Kind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number", "p"]
-SMALLEST_P = 0.001
+ColumnKind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number", "p"]
 Cell: TypeAlias = str | int | float | None
 
 
@@ -44,7 +44,7 @@ class Column(NamedTuple):
     """A column of a table."""
 
     head: str
-    kind: Kind = "text"  # "class": of failures; "share": from 0 to 1
+    kind: ColumnKind = "text"  # "class": of failures; "share": from 0 to 1
 
 
 class Sheet(NamedTuple):
@@ -88,7 +88,7 @@ class Code(NamedTuple):
 class Groups(NamedTuple):
     """Groups of similar failures, each with the name of its run."""
 
-    shown: Sequence[tuple[str, Cluster]]
+    shown: Sequence[tuple[str, FailureGroup]]
 
 
 class Card(NamedTuple):
@@ -152,7 +152,7 @@ def _heads(columns: Sequence[Column]) -> list[str]:
     return heads
 
 
-def format_cell(cell: Cell, kind: Kind) -> str:
+def format_cell(cell: Cell, kind: ColumnKind) -> str:
     """Format a cell for people."""
     if cell is None or isinstance(cell, str):
         return "-" if cell is None else label_of(cell) if kind == "class" else cell
@@ -164,5 +164,5 @@ def format_cell(cell: Cell, kind: Kind) -> str:
         case "count":
             return f"{cell:,}"
         case "p":
-            return "< 0.001" if cell < SMALLEST_P else f"{cell:.3f}"
+            return f"< {MIN_SHOWN_P}" if cell < MIN_SHOWN_P else f"{cell:.3f}"
     return f"{cell:,.4g}"

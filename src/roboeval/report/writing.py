@@ -32,10 +32,10 @@ from roboeval.report.sheets import (
     write_csv,
 )
 
-FORMATS = ("png", "pdf")
-PAGE = "index.html"
+FIGURE_FORMATS = ("png", "pdf")
+PAGE_FILE = "index.html"
 UNFINISHED = ("This report is not finished. Run its command again.",)
-HEAD = 4_000  # characters; the start of a page contains its generator
+GENERATOR_WITHIN = 4_000  # bytes; the start of a page contains its generator
 
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
@@ -68,8 +68,8 @@ def sections(
         failures.other_suite(runs),
         house.house(runs),
         scores.thresholds(runs),
-        failures.why(runs, with_published=with_published),
-        failures.similar_failures(runs),
+        failures.causes_section(runs, with_published=with_published),
+        failures.failures_section(runs),
         breakdown.abilities(runs),
         breakdown.phrasings(runs),
         cost.rejection_sampling(runs),
@@ -89,7 +89,7 @@ def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
             coverage=run.coverage_sentence,
             failure=failures.most_frequent(run),
             cost=cost.cost_sentence(run, prices),
-            warnings=failures.warnings(run),
+            warnings=failures.cut_off_warnings(run),
         )
         for run in runs
     ]
@@ -110,7 +110,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """How each run was generated and judged."""
     rows: list[list[Cell]] = []
     for run in runs:
-        about, head = run.results.about, run.results.head
+        about, head = run.results.about, run.results.manifest
         settings = about.get("settings")
         shown = None
         if isinstance(settings, dict):
@@ -127,7 +127,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
     """Sentences about the suite and its rules."""
-    head = runs[0].results.head
+    head = runs[0].results.manifest
     version, digest = head.get("version"), head.get("digest")
     return (
         f'Judged with the suite "{runs[0].suite.name}", version {version}, hash {digest}.',
@@ -143,17 +143,17 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
     """Write a report into a folder and yield the name of each piece; the page comes last."""
     parts = [part for section in sections for part in section.parts]
     (out / "tables").mkdir(parents=True, exist_ok=True)
-    if not (out / PAGE).exists():
-        write_whole(out / PAGE, page(title, UNFINISHED, [], {}).encode())
-    drawn: dict[str, DrawnFigure] = {}
+    if not (out / PAGE_FILE).exists():
+        write_whole(out / PAGE_FILE, page(title, UNFINISHED, [], {}).encode())
+    drawings: dict[str, DrawnFigure] = {}
     for part in parts:
         if isinstance(part, Sheet):
             write_csv(part, out / "tables")
             yield part.name
         elif isinstance(part, ReportFigure):
-            drawn[part.name] = _draw(part, out / "figures")
+            drawings[part.name] = _draw(part, out / "figures")
             yield part.name
-    write_whole(out / PAGE, page(title, lead, sections, drawn).encode())
+    write_whole(out / PAGE_FILE, page(title, lead, sections, drawings).encode())
     _remove_others(out, {part.name for part in parts if isinstance(part, Sheet | ReportFigure)})
     yield "page"
 
@@ -163,23 +163,18 @@ def expect_no_others(out: Path) -> None:
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
-    if others and not _is_report(out / PAGE):
+    page_file = out / PAGE_FILE
+    start = page_file.read_bytes()[:GENERATOR_WITHIN] if page_file.is_file() else b""
+    if others and GENERATOR.encode() not in start:
         raise UserError(
             f'is not a report but contains other files such as "{others[0]}"; name a new folder', file=out
         )
 
 
-def _is_report(page_file: Path) -> bool:
-    if not page_file.is_file():
-        return False
-    with page_file.open(errors="replace") as file:
-        return GENERATOR in file.read(HEAD)
-
-
 def _remove_others(out: Path, names: AbstractSet[str]) -> None:
     """Remove files of an earlier report that this one lacks, such as rejection sampling."""
     for name in {*page_words()["figures"], *page_words()["tables"]} - names:
-        for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
+        for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FIGURE_FORMATS)):
             (out / file).unlink(missing_ok=True)
 
 
@@ -189,9 +184,8 @@ def pieces(sections: Sequence[Section]) -> int:
 
 
 def _draw(figure: ReportFigure, folder: Path) -> DrawnFigure:
-    """Draw a figure, write its files, and return it for the page."""
     with use_style():
         files = render(figure.draw())
-    for kind in FORMATS:
+    for kind in FIGURE_FORMATS:
         write_whole(folder / f"{figure.name}.{kind}", files[kind])
     return files["svg"], darken(files["svg"])

@@ -13,7 +13,7 @@ from typing import Any
 
 from codebotler.core.program import parse_expression
 
-MOST = 10_000  # characters, digits or entries of a value
+MAX_VALUE_SIZE = 10_000  # characters, digits or entries of a value
 Names = Mapping[str, Any]  # strings, numbers, lists, and namespaces for people and things
 
 
@@ -75,9 +75,9 @@ def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, nu
 
 def _checked_value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - as `evaluate`
     found = _compute(node, names)
-    if _size(found) > MOST:
+    if _size(found) > MAX_VALUE_SIZE:
         raise ExpressionError(
-            f'"{ast.unparse(node)}" exceeds {MOST:,} characters, digits or entries; simplify it'
+            f'"{ast.unparse(node)}" exceeds {MAX_VALUE_SIZE:,} characters, digits or entries; simplify it'
         )
     return found
 
@@ -91,7 +91,7 @@ def _size(found: object) -> int:
     size = 0
     for one in found:
         size += 1 + _size(one)
-        if size > MOST:
+        if size > MAX_VALUE_SIZE:
             break
     return size
 
@@ -127,7 +127,7 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
         case ast.IfExp(test, body, orelse):
             return _checked_value(body if _checked_value(test, names) else orelse, names)
         case ast.ListComp(element, [loop]) | ast.GeneratorExp(element, [loop]):
-            return [_checked_value(element, each) for each in each_of(loop, names)]
+            return [_checked_value(element, each) for each in iterate_loop(loop, names)]
         case ast.Call(ast.Name(name), [argument], []) if name in _FUNCTIONS:
             return _FUNCTIONS[name](_checked_value(argument, names))
     known = ""
@@ -142,7 +142,7 @@ def _attribute(whole: Any, name: str) -> Any:  # noqa: ANN401 - as `evaluate`
     raise ExpressionError(f'".{name}" is not an attribute; people and things have a name and a room')
 
 
-def each_of(loop: ast.comprehension, names: Names) -> Iterator[Names]:
+def iterate_loop(loop: ast.comprehension, names: Names) -> Iterator[Names]:
     """Yield the names for each iteration of a loop such as `for person in people if person.room`."""
     if not isinstance(loop.target, ast.Name) or loop.is_async:
         raise ExpressionError(f'"{ast.unparse(loop.target)}" is not a single name; write for NAME in ...')

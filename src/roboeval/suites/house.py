@@ -31,16 +31,13 @@ class HouseRules:
                 )
 
     @classmethod
-    def of_suite(cls, path: Path, skills: SkillTable, rooms: Sequence[str]) -> HouseRules:
-        """Read the rules of a suite with these rooms."""
-        return cls("", read_rules(path, skills, rooms), hashlib.sha256(path.read_bytes()).hexdigest())
-
-    @classmethod
-    def read(cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = ()) -> HouseRules:
+    def read(
+        cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
+    ) -> HouseRules:
         """Read a file of rules, for these rooms if they are known; raises UserError if it is not valid."""
         rules = read_rules(path, skills, rooms)
-        if not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
+        if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(
                 "is not a valid file name for rules; use lower-case letters, digits and dashes", file=path
             )
-        return cls(path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())
+        return cls("" if of_suite else path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())

@@ -10,7 +10,6 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.families.suite import family_tasks_named
 from roboeval.suites.installed import installed_suites
-from roboeval.suites.schema import AcceptedFinding, TaskFact
 from roboeval.suites.suite import (
     ABLATED,
     SUITES,
@@ -27,13 +26,11 @@ from roboeval.suites.taskfile import read_task
 __all__ = [
     "ABLATED",
     "SUITES",
-    "AcceptedFinding",
     "Requirement",
     "Scenario",
     "Suite",
     "Task",
     "TaskCheck",
-    "TaskFact",
     "has_suite",
     "load_suite",
     "read_task",

@@ -33,7 +33,6 @@ def new_task(folder: Path, name: str) -> Path:
 
 
 def _suite_name(folder: Path) -> str:
-    """Turn the name of a folder into a valid name of a suite."""
     plain = re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower())
     name = plain.lstrip("-0123456789").removesuffix(ABLATED)
     return f"my-{name}" if name in shipped_suites() else name or "mine"

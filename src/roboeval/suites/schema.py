@@ -11,7 +11,7 @@ from codebotler.core.labels import check_regex
 from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
 from codebotler.simulator.settings import WORDS_FOR_PEOPLE, Limits, SimulationSettings
 
-MOST_WORLDS = 10_000  # per task; a suite then takes a gigabyte of memory, and minutes to sample
+MAX_WORLDS = 10_000  # per task; a suite then takes a gigabyte of memory, and minutes to sample
 
 Category = Literal[
     "SayAtLocation",
@@ -36,7 +36,9 @@ Ability = Literal[
 ]
 
 
-class _Form(BaseModel):
+class StrictForm(BaseModel):
+    """Content of a file, without unknown keys."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
@@ -44,7 +46,7 @@ def _default_to_say(means: object) -> object:
     return {"say": means} if isinstance(means, str) else means
 
 
-class CheckFile(_Form):
+class CheckFile(StrictForm):
     """A check in a task file.
 
     Args:
@@ -57,7 +59,7 @@ class CheckFile(_Form):
     means: Annotated[dict[str, Name], BeforeValidator(_default_to_say)] = {}
 
 
-class TaskFact(_Form):
+class TaskFact(StrictForm):
     """A fact that the requirements of a task depend on.
 
     Args:
@@ -69,7 +71,7 @@ class TaskFact(_Form):
     commonsense: bool = False  # whether the model must know it although no prompt mentions it
 
 
-class RequirementFile(_Form):
+class RequirementFile(StrictForm):
     """A requirement in a task file: a string, or a mapping if only some prompts ask for it.
 
     Args:
@@ -88,7 +90,7 @@ class RequirementFile(_Form):
 Require = Annotated[list[RequirementFile], Field(min_length=1)]
 
 
-class AcceptedFinding(_Form):
+class AcceptedFinding(StrictForm):
     """A finding of the linter that is intended, and the reason."""
 
     finding: YamlText
@@ -105,12 +107,12 @@ class ScenarioFile(WorldFile):
 
 
 Levels = Annotated[list[YamlText], Field(min_length=1)] | YamlText
-NOWHERE = "nowhere"
+IN_NO_ROOM = "nowhere"
 Answers = AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]
 Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
 
-class SampledPersonFile(_Form):
+class SampledPersonFile(StrictForm):
     """A person who may be in sampled worlds; each list is sampled for each world."""
 
     name: NamePattern | None = None
@@ -121,21 +123,21 @@ class SampledPersonFile(_Form):
     leaves: Annotated[bool, Field(strict=True)] = False
 
 
-class SampledThingFile(_Form):
+class SampledThingFile(StrictForm):
     """A thing that may be in sampled worlds."""
 
     label: NamePattern | None = None
     where: Levels = Field(alias="in")
 
 
-class CornerFile(_Form):
+class CornerFile(StrictForm):
     """A world with values set by hand; the others default to the first entry of their list."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
 
 
-class SampledWorldsFile(_Form):
+class SampledWorldsFile(StrictForm):
     """The description from which the worlds of a task are sampled."""
 
     robot: Levels
@@ -146,7 +148,7 @@ class SampledWorldsFile(_Form):
     corners: list[CornerFile] = []
 
 
-class _AnyTaskFile(_Form):
+class _AnyTaskFile(StrictForm):
     name: Name
     summary: Name
     abilities: tuple[Ability, ...] = ()
@@ -172,7 +174,7 @@ class SampledTaskFile(_AnyTaskFile):
     require: Require
 
 
-class LimitsFile(_Form):
+class LimitsFile(StrictForm):
     """The limits in a suite file."""
 
     seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0
@@ -188,7 +190,7 @@ def _moment(value: object) -> object:
     )
 
 
-class SimulationFile(_Form):
+class SimulationFile(StrictForm):
     """The simulation settings in a suite file."""
 
     literals: Literal["lowercase", "as-written"] = "lowercase"
@@ -209,20 +211,20 @@ class SimulationFile(_Form):
             return {"words_for_people": WORDS_FOR_PEOPLE, **data}
         return data
 
-    def rules(self) -> SimulationSettings:
+    def settings(self) -> SimulationSettings:
         """Convert to simulation settings."""
         values = {name: value for name, value in self if name != "skill_seconds"}
         return SimulationSettings(**values | {"limits": Limits(**dict(self.limits))})
 
 
-class SuiteFile(_Form):
+class SuiteFile(StrictForm):
     """The content of suite.yaml."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
     version: Annotated[int, Field(strict=True, ge=0)]
     about: YamlText = ""
     instructions: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")] | None = None
-    worlds: Annotated[int, Field(strict=True, ge=1, le=MOST_WORLDS)] = 30
+    worlds: Annotated[int, Field(strict=True, ge=1, le=MAX_WORLDS)] = 30
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     rules: SimulationFile = SimulationFile()
     house_rules: Name | None = None  # a file of the suite with rules that stop programs

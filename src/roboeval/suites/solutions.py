@@ -5,30 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
-
 from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.recorded import RECORDED_NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task
+from roboeval.suites.schema import StrictForm
 
-LENDER = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
+LENDING_SUITE = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
 
 
-class EquivalentMutantFile(BaseModel):
+class EquivalentMutantFile(StrictForm):
     """A mutant that behaves differently but is still right."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     operator: Name
     diff: YamlText  # printed by `roboeval mutate`
     because: Name
 
 
-class SolutionsFile(BaseModel):
+class SolutionsFile(StrictForm):
     """A file of solutions."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     recorded: tuple[InstructionSolutions, ...] = ()  # replies of the recorded models
     programs: tuple[Solution, ...] = ()
@@ -37,7 +32,7 @@ class SolutionsFile(BaseModel):
 
 def solutions(task: Task) -> tuple[Solution, ...]:
     """The distinct solutions of a task, including those of the suite whose instruction it borrows."""
-    folders = [task.path.parents[1], *([LENDER] if task.borrows else [])]
+    folders = [task.path.parents[1], *([LENDING_SUITE] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
         recorded = (
@@ -51,7 +46,7 @@ def solutions(task: Task) -> tuple[Solution, ...]:
     return tuple(distinct.values())
 
 
-def place_of(task: Task, solution: Solution) -> tuple[Path, int | None]:
+def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
     """The file and line of a solution; the task file if another suite has it."""
     path = task.path.parents[1] / "solutions" / task.path.name
     programs = _read(task.path.parents[1], task).programs

@@ -20,7 +20,7 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.house import HouseRules
 from roboeval.suites.installed import installed_folder, installed_suites
-from roboeval.suites.schema import MOST_WORLDS, SuiteFile
+from roboeval.suites.schema import MAX_WORLDS, SuiteFile
 from roboeval.suites.task import Task
 from roboeval.suites.taskfile import read_task
 
@@ -44,7 +44,7 @@ class Suite:
     name: str  # the name in evaluations
     version: int  # increases when a verdict may change
     about: str  # a description in a sentence
-    rules: SimulationSettings  # how worlds are simulated
+    settings: SimulationSettings  # how worlds are simulated
     tasks: Mapping[str, Task]  # the tasks by name, sorted
     digest: str  # a hash of everything that verdicts and prompts depend on
     folder: Path | None = None  # the folder of its files
@@ -85,8 +85,8 @@ class Suite:
         if self.worlds is None or self.folder is None:
             why = "are written by hand" if self.families is None else "follow from its name"
             raise UserError(f'the worlds of the suite "{self.name}" {why}; omit --worlds and --seed')
-        if count is not None and not 1 <= count <= MOST_WORLDS:
-            raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MOST_WORLDS:,}")
+        if count is not None and not 1 <= count <= MAX_WORLDS:
+            raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MAX_WORLDS:,}")
         return read_suite(self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed)
 
     def with_own_worlds(self) -> Suite:
@@ -165,13 +165,13 @@ def _build_suite(
     ]
     house = None
     if head.house_rules is not None:
-        house = HouseRules.of_suite(folder / head.house_rules, skills, rooms_in(tasks))
+        house = HouseRules.read(folder / head.house_rules, skills, rooms_in(tasks), of_suite=True)
     is_sampled = any(task.is_sampled for task in tasks)
     return Suite(
         name=head.name,
         version=head.version,
         about=head.about,
-        rules=head.rules.rules(),
+        settings=head.rules.settings(),
         tasks={task.name: task for task in tasks},
         digest=_digest(
             [file, *documents, *(lender for lender in lenders if lender is not None)], tasks, house, own
@@ -213,7 +213,6 @@ def _without_meanings(data: object) -> object:
 def _digest(
     files: list[YamlFile], tasks: list[Task], house: HouseRules | None, skills: Sequence[Path]
 ) -> str:
-    """Hash the content of the files and the sampled worlds."""
     content: list[object] = [_without_meanings(file.data) for file in files]
     content += [hashlib.sha256(path.read_bytes()).hexdigest() for path in skills]
     if house is not None:

@@ -22,8 +22,8 @@ from roboeval.suites.schema import RequirementFile, SampledTaskFile, ScenarioFil
 from roboeval.suites.task import Requirement, Scenario, Task, TaskCheck
 from roboeval.suites.worlds import WorldSampler
 
-BORROWED = ("summary", "abilities", "prompts")
-PEOPLE = "people"  # in checks for sampled worlds: any name of a person or word for people
+BORROWED_FIELDS = ("summary", "abilities", "prompts")
+PEOPLE_PLACEHOLDER = "people"  # in checks for sampled worlds: any name of a person or word for people
 START = "start"  # in checks: the room in which the robot starts
 
 _PARAMETER = r" *[^\W\d]\w* *"
@@ -92,7 +92,7 @@ def _with_borrowed(file: YamlFile, lender: YamlFile | None) -> object:
     """Add the instruction and facts of the lender to the content of a task file."""
     if lender is None or not isinstance(file.data, dict) or not isinstance(lender.data, dict):
         return file.data
-    borrowed = {name: lender.data[name] for name in BORROWED if name in lender.data}
+    borrowed = {name: lender.data[name] for name in BORROWED_FIELDS if name in lender.data}
     facts = [*lender.data.get("facts", []), *file.data.get("facts", [])]
     return {**borrowed, **file.data, "facts": facts}
 
@@ -123,14 +123,10 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
 def _phrases(form: SampledTaskFile, file: YamlFile, words: Sequence[str]) -> dict[str, str]:
     """Regexes that checks may use by name: for people, and the phrases of the task."""
     names = [person.name or key for key, person in form.worlds.people.items()]
-    phrases = {PEOPLE: rf"(?:{'|'.join(map(scope_flags, [*words, *names]))})s?"}
+    phrases = {PEOPLE_PLACEHOLDER: rf"(?:{'|'.join(map(scope_flags, [*words, *names]))})s?"}
     for name, regexes in form.phrases.items():
-        if not name.isidentifier() or name in {PEOPLE, START}:
+        if not name.isidentifier() or name in {PEOPLE_PLACEHOLDER, START}:
             raise file.wrong(f'"{name}" is not a valid name for phrases; rename it', "phrases", name)
-        if not any(f"{{{name}}}" in check.rtl for check in form.checks.values()):
-            raise file.wrong(f'no check uses the phrases "{name}"; use {{{name}}} in one', "phrases", name)
-        if quoted := next((regex for regex in regexes if '"' in regex), None):
-            raise file.wrong(f"the phrase {quoted} contains a quotation mark; remove it", "phrases", name)
         phrases[name] = f"(?:{'|'.join(map(scope_flags, regexes))})"
     return phrases
 
@@ -165,8 +161,6 @@ class _Reader:
         parameters = tuple(p.strip() for p in match[2].split(",")) if match[2] else ()
         if START in parameters:
             raise wrong(f'"{START}" is reserved for the starting room of the robot; rename the parameter')
-        if again := next((p for n, p in enumerate(parameters) if p in parameters[:n]), None):
-            raise wrong(f'the check "{name}" has two parameters "{again}"; rename one')
         for used in _USED.findall(body.rtl):
             if used not in parameters and used not in self.phrases and used != START:
                 known = f"its parameters are: {', '.join(parameters)}" if parameters else "it has none"
@@ -179,7 +173,6 @@ class _Reader:
         return TaskCheck(name, parameters, body.category, body.rtl, body.commonsense, line, means)
 
     def _means(self, head: str, parameters: Sequence[str]) -> dict[str, str]:
-        """The descriptions of a check's texts, by kind of event."""
         body = self.form.checks[head]
         for kind, meaning in body.means.items():
             if kind not in self.skills.recordings and kind != ANSWERED:
@@ -189,25 +182,30 @@ class _Reader:
             if unknown := {*_USED.findall(meaning)} - {*parameters, START}:
                 sentence = f'"{min(unknown)}" is not a parameter of the check; replace it by words'
                 raise self.file.wrong(sentence, "checks", head, "means", kind)
-        return {**({"check": "a person"} if f"{{{PEOPLE}}}" in body.rtl else {}), **body.means}
+        return {**({"check": "a person"} if f"{{{PEOPLE_PLACEHOLDER}}}" in body.rtl else {}), **body.means}
 
     # --- worlds
 
     def read_worlds(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
-        for number, world in enumerate(worlds):
-            at = ("worlds", number)
-            require = self._requirements(world.require, world.robot, (*at, "require"))
-            yield Scenario(world.world(self.file, at, self.skills), require)
+        for number, form in enumerate(worlds):
+            yield self._scenario(form, form.require, ("worlds", number), "require")
 
     def read_ablation(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
         if any(world.ablation is None for world in worlds):
             raise self.file.wrong("some worlds lack an ablation; add it to all or to none", "worlds")
         for number, form in enumerate(worlds):
-            at = ("worlds", number)
             people = form.people if form.ablation_people is None else form.ablation_people
-            world = form.model_copy(update={"people": people}).world(self.file, at, self.skills)
-            require = self._requirements(form.ablation or [], world.robot, (*at, "ablation"))
-            yield Scenario(world, require)
+            changed = form.model_copy(update={"people": people})
+            yield self._scenario(changed, form.ablation or [], ("worlds", number), "ablation")
+
+    def _scenario(
+        self, form: ScenarioFile, forms: Sequence[RequirementFile], at: YamlPath, key: str
+    ) -> Scenario:
+        require = tuple(
+            self._requirement(one.check, one.prompts, form.robot, (*at, key, index))
+            for index, one in enumerate(forms)
+        )
+        return Scenario(form.world(self.file, at, self.skills), require)
 
     def sample(self, sampler: WorldSampler, count: int, seed: int) -> Iterator[Scenario]:
         known: dict[tuple[str, int, str], Requirement] = {}
@@ -222,14 +220,6 @@ class _Reader:
             yield Scenario(sampler.world(setting), tuple(known[one] for one in require))
 
     # --- requirements
-
-    def _requirements(
-        self, forms: Sequence[RequirementFile], start: str, at: YamlPath
-    ) -> tuple[Requirement, ...]:
-        return tuple(
-            self._requirement(form.check, form.prompts, start, (*at, index))
-            for index, form in enumerate(forms)
-        )
 
     def _requirement(
         self, text: str, prompts: Mapping[int, str] | None, start: str, at: YamlPath

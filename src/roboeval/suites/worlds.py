@@ -19,13 +19,13 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.regex_words import first_choice
-from roboeval.suites.expression import ExpressionError, Names, each_of, evaluate, parse_cached
+from roboeval.suites.expression import ExpressionError, Names, evaluate, iterate_loop, parse_cached
 from roboeval.suites.pairwise import Combination, sample_combinations
-from roboeval.suites.schema import NOWHERE, CornerFile, SampledTaskFile, SampledWorldsFile
+from roboeval.suites.schema import IN_NO_ROOM, CornerFile, SampledTaskFile, SampledWorldsFile
 
-Level: TypeAlias = str | int  # a room, an answer, an index of an option, or a number of looks
+FactorLevel: TypeAlias = str | int  # a room, an answer, an index of an option, or a number of looks
 
-ROBOT = "robot"  # the factor for the starting room
+ROBOT_FACTOR = "robot"  # the factor for the starting room
 _TRIES = 50  # attempts to sample a new world
 
 
@@ -34,25 +34,25 @@ class Setting:
     """The levels of all factors of one world."""
 
     about: str
-    chosen: Mapping[str, Level]
+    chosen: Mapping[str, FactorLevel]
     rooms: tuple[str, ...]  # in the order of the robot's list
 
     def room(self, name: str) -> str:
         """The room of a person or thing; empty if nowhere."""
         room = str(self.chosen[f"{name}.in"])
-        return "" if room == NOWHERE else room
+        return "" if room == IN_NO_ROOM else room
 
     @property
     def start(self) -> str:
         """The room in which the robot starts."""
-        return str(self.chosen[ROBOT])
+        return str(self.chosen[ROBOT_FACTOR])
 
     @property
     def identity(self) -> tuple[object, ...]:
         """The part that makes a world distinct; answers of absent people do not count."""
-        absent = {_owner(factor) for factor, level in self.chosen.items() if level == NOWHERE}
+        absent = {_owner(factor) for factor, level in self.chosen.items() if level == IN_NO_ROOM}
         chosen = self.chosen.items()
-        return self.rooms, *(one for one in chosen if one[1] == NOWHERE or _owner(one[0]) not in absent)
+        return self.rooms, *(one for one in chosen if one[1] == IN_NO_ROOM or _owner(one[0]) not in absent)
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,9 @@ class WorldSampler:
         return self.form.worlds
 
     @cached_property
-    def factors(self) -> dict[str, tuple[Level, ...]]:
+    def factors(self) -> dict[str, tuple[FactorLevel, ...]]:
         """The levels of each factor, such as `alice.in` and `alice.answer 1`."""
-        found = {ROBOT: self._rooms(self.described.robot, ROBOT)}
+        found = {ROBOT_FACTOR: self._rooms(self.described.robot, ROBOT_FACTOR)}
         for name, person in self.described.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
             for number, answers in enumerate(person.answers, 1):
@@ -86,8 +86,8 @@ class WorldSampler:
     def _free(self) -> dict[str, int]:
         return {factor: len(levels) for factor, levels in self.factors.items() if len(levels) > 1}
 
-    def _rooms(self, where: str | list[str], *place: str) -> tuple[Level, ...]:
-        known = self.described.rooms if place == (ROBOT,) else [*self.described.rooms, NOWHERE]
+    def _rooms(self, where: str | list[str], *place: str) -> tuple[FactorLevel, ...]:
+        known = self.described.rooms if place == (ROBOT_FACTOR,) else [*self.described.rooms, IN_NO_ROOM]
         for room in _levels(where):
             if room not in known:
                 sentence = f'there is no room "{room}"; use {listed(known)}'
@@ -125,8 +125,8 @@ class WorldSampler:
         for pattern, wanted in corner.set.items():
             level = wanted.option if isinstance(wanted, OptionFile) else wanted
             named = fnmatch.filter(self.factors, pattern)
-            anywhere = level in (*self.described.rooms, NOWHERE)
-            may_be_anywhere = anywhere and (len(named) == 1 or level == NOWHERE)
+            anywhere = level in (*self.described.rooms, IN_NO_ROOM)
+            may_be_anywhere = anywhere and (len(named) == 1 or level == IN_NO_ROOM)
             fitting = [
                 f for f in named if level in self.factors[f] or (may_be_anywhere and f.endswith(".in"))
             ]
@@ -137,20 +137,20 @@ class WorldSampler:
             chosen.update(dict.fromkeys(fitting, level))
         return Setting(corner.about, chosen, tuple(self.described.rooms))
 
-    def _about(self, chosen: Mapping[str, Level]) -> str:
+    def _about(self, chosen: Mapping[str, FactorLevel]) -> str:
         parts = []
         for name in (*self.described.people, *self.described.things):
             levels, room = self.factors[f"{name}.in"], chosen[f"{name}.in"]
-            if room == NOWHERE:
+            if room == IN_NO_ROOM:
                 parts.append(f"{name} out")
                 continue
-            details = [f"in {room}"] if sum(level != NOWHERE for level in levels) > 1 else []
+            details = [f"in {room}"] if sum(level != IN_NO_ROOM for level in levels) > 1 else []
             free = [factor for factor in self._free if factor.startswith(f"{name}.")]
             details += [_detail(factor, chosen[factor]) for factor in free if factor != f"{name}.in"]
             if details or len(levels) > 1:
                 parts.append(f"{name} {', '.join(details) or 'in'}")
-        if ROBOT in self._free:
-            parts.append(f"robot in {chosen[ROBOT]}")
+        if ROBOT_FACTOR in self._free:
+            parts.append(f"robot in {chosen[ROBOT_FACTOR]}")
         return "; ".join(parts) or "different order of rooms"
 
     # --- worlds and requirements
@@ -207,11 +207,11 @@ class WorldSampler:
             raise self.file.wrong(str(error), *place) from None
 
 
-Form: TypeAlias = str | int | OptionFile
+LevelForm: TypeAlias = str | int | OptionFile
 
 
-def _levels(form: Form | Sequence[Form]) -> tuple[Level, ...]:
-    items: Sequence[Form] = [form] if isinstance(form, str | int | OptionFile) else form
+def _levels(form: LevelForm | Sequence[LevelForm]) -> tuple[FactorLevel, ...]:
+    items: Sequence[LevelForm] = [form] if isinstance(form, str | int | OptionFile) else form
     return tuple(item.option if isinstance(item, OptionFile) else item for item in items)
 
 
@@ -219,7 +219,7 @@ def _owner(factor: str) -> str:
     return factor.partition(".")[0]
 
 
-def _detail(factor: str, level: Level) -> str:
+def _detail(factor: str, level: FactorLevel) -> str:
     if ".topic " in factor:
         return f"{first_choice(factor.partition(' ')[2])} {first_choice(str(level))}"
     return f"after looks {level}" if "looks" in factor else first_choice(str(level))
@@ -232,7 +232,7 @@ def _expand(text: str, names: Names) -> Iterator[str]:
             if evaluate(test, names):
                 yield _format_call(body, names)
         case ast.GeneratorExp(body, [loop]):
-            for each in each_of(loop, names):
+            for each in iterate_loop(loop, names):
                 yield _format_call(body, each)
         case _:
             yield _format_call(_entry(text), names)

@@ -11,8 +11,8 @@ from codebotler.prompts.rendering import prompt_for
 from roboeval.suites.families.suite import first_seed
 from roboeval.suites.families.tasks import family_file, family_names, trained_prompts, trained_task
 
-Form: TypeAlias = Literal["chat", "text"]
-Completion: TypeAlias = str | Sequence[Mapping[str, Any]]
+PromptForm: TypeAlias = Literal["chat", "text"]
+PolicyReply: TypeAlias = str | Sequence[Mapping[str, Any]]
 """The output of a policy: a string, or the messages of a conversation."""
 
 
@@ -22,7 +22,7 @@ def load_prompts(
     count: int = 1_000,
     seed: int = 0,
     only: Sequence[str] = (),
-    form: Form = "chat",
+    form: PromptForm = "chat",
     progress: Callable[[int], object] | None = None,
 ) -> list[dict[str, Any]]:
     """Generate any number of prompts for programs; the result is reproducible.
@@ -57,7 +57,7 @@ def load_prompts(
     return rows
 
 
-def _row(families: Sequence[str], seed: int, form: Form) -> dict[str, Any]:
+def _row(families: Sequence[str], seed: int, form: PromptForm) -> dict[str, Any]:
     """The row of a seed; families and their prompts take turns."""
     turn, number = divmod(seed, len(families))
     family = families[number]
@@ -74,7 +74,7 @@ def _row(families: Sequence[str], seed: int, form: Form) -> dict[str, Any]:
     }
 
 
-def program_in(completion: Completion, opening: str = "") -> str:
+def program_in(completion: PolicyReply, opening: str = "") -> str:
     """Extract the program from a policy's completion.
 
     Args:

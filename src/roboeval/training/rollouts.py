@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
 from statistics import fmean
-from typing import TypeAlias
 
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import AHEAD, shared_pool
+from codebotler.simulator.pool import shared_pool
 from roboeval.evaluation.judge import are_met, may_satisfy, robot_in
-from roboeval.evaluation.rewards import Remembered, Share, asked_in, total
-from roboeval.suites.families.tasks import WORLDS, trained_task
+from roboeval.evaluation.rewards import RewardCache, Share, requirements_of, total
+from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.suites.task import Scenario
 
-TOGETHER = 16  # programs per batch, all for the same task
+ROLLOUTS_PER_BATCH = 16  # programs per batch, all for the same task
 
 
 @dataclass(frozen=True)
@@ -59,7 +55,7 @@ class Components:
 def judge(
     rollouts: Sequence[Rollout],
     *,
-    worlds: int = WORLDS,
+    worlds: int = TRAINING_WORLDS,
     house: HouseRules | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> list[Components]:
@@ -81,7 +77,17 @@ def judge(
     for one, name in names.items():
         if name not in known:
             groups.setdefault((one.family, one.seed, one.prompt_index), []).append(one)
-    for batch, found in _judge_ahead(_batches(groups.values()), partial(_judge_batch, worlds, house)):
+    batches = [
+        group[start : start + ROLLOUTS_PER_BATCH]
+        for group in groups.values()
+        for start in range(0, len(group), ROLLOUTS_PER_BATCH)
+    ]
+    judged = shared_pool().map_distinct(
+        lambda some: [_judge_batch(worlds, house, batch) for batch in some],
+        batches,
+        name=lambda batch: names[batch[0]],
+    )
+    for batch, found in zip(batches, judged, strict=True):
         known.update(zip((names[one] for one in batch), found, strict=True))
         if progress is not None:
             progress(len(known))
@@ -89,62 +95,30 @@ def judge(
     return [known[names[one]] for one in rollouts]
 
 
-COMPONENT_CACHE: Remembered[Components] = Remembered()
+COMPONENT_CACHE: RewardCache[Components] = RewardCache()
 
 
 def _key(one: Rollout, worlds: int, house: HouseRules | None) -> bytes:
-    """The key of a rollout in the cache."""
     rules = "" if house is None else house.digest
     return digest(one.family, f"{one.seed} {one.prompt_index} {worlds}", rules, one.program)
 
 
-Batch: TypeAlias = Sequence[Rollout]
-
-
-def _batches(groups: Iterable[Batch]) -> Iterator[Batch]:
-    for group in groups:
-        for start in range(0, len(group), TOGETHER):
-            yield group[start : start + TOGETHER]
-
-
-def _judge_ahead(
-    batches: Iterator[Batch], judged: Callable[[Batch], list[Components]]
-) -> Iterator[tuple[Batch, list[Components]]]:
-    """Yield each batch with its results, in order; a limited number of batches keeps all workers busy."""
-    pool = shared_pool()
-    waiting: deque[tuple[Batch, Future[list[Components]]]] = deque()
-    try:
-        while True:
-            for batch in islice(batches, AHEAD * pool.workers - len(waiting)):
-                waiting.append((batch, pool.submit(judged, batch)))
-            if not waiting:
-                return
-            batch, future = waiting.popleft()
-            yield batch, future.result()
-    finally:  # after an interrupt, the results are not needed
-        for _, future in waiting:
-            future.cancel()
-
-
-def _judge_batch(worlds: int, house: HouseRules | None, batch: Batch) -> list[Components]:
+def _judge_batch(worlds: int, house: HouseRules | None, batch: Sequence[Rollout]) -> list[Components]:
     """Judge programs for the same prompt; runs in a thread with a worker."""
     first = batch[0]
     task = trained_task(first.family, first.seed, worlds=worlds)
     task.expect_prompt(first.prompt_index)
     suite = task.suite.with_house_rules(house)
-    asked = asked_in(task.suite, task.name, first.prompt_index)
+    asked = requirements_of(task.suite, task.name, first.prompt_index)
     robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     worker = shared_pool().here()
     ran = worker.run_all([(one.program, robots) for one in batch])
-    return [
-        _components(outcomes, asked, parses=_has_run(outcomes) or worker.compiles(one.program, robots[0]()))
-        for one, outcomes in zip(batch, ran, strict=True)
-    ]
-
-
-def _has_run(outcomes: Sequence[Outcome]) -> bool:
-    """Whether an outcome proves that the program was executed, and therefore is valid Python."""
-    return any(outcome.trace or outcome.error is None for outcome in outcomes)
+    components = []
+    for one, outcomes in zip(batch, ran, strict=True):
+        has_run = any(outcome.trace or outcome.error is None for outcome in outcomes)
+        parses = has_run or worker.compiles(one.program, robots[0]())
+        components.append(_components(outcomes, asked, parses=parses))
+    return components
 
 
 def _components(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated, TypeAlias
 
 from fastapi import APIRouter, Depends, HTTPException, Query
@@ -17,7 +16,7 @@ from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import RunList, completion_details, entry_data, run_details
 from roboeval.web.snapshot import CompletionFilter
 
-MOST = 1_000
+MAX_PAGE_SIZE = 1_000
 """Completions per response."""
 
 REPORT_POLICY = (
@@ -25,10 +24,10 @@ REPORT_POLICY = (
     "script-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-TABLE = re.compile(r"[\w-]{1,100}")  # a name of a table cannot lead to another folder
+TABLE_NAME = re.compile(r"[\w-]{1,100}")  # a name of a table cannot lead to another folder
 
-Chosen: TypeAlias = Annotated[CompletionFilter, Depends()]
-Evaluation: TypeAlias = Annotated[
+FilterQuery: TypeAlias = Annotated[CompletionFilter, Depends()]
+EvaluationQuery: TypeAlias = Annotated[
     str | None,
     Query(max_length=200, description="The evaluation; by default, the first that is not an ablation."),
 ]
@@ -36,59 +35,57 @@ Evaluation: TypeAlias = Annotated[
 
 def router(store: RunStore, all_runs: RunList) -> APIRouter:
     """Create the routes of the API."""
-    api = APIRouter(prefix="/api/runs", tags=["runs"], default_response_class=Response)
+    api = APIRouter(
+        prefix="/api/runs",
+        tags=["runs"],
+        default_response_class=Response,
+        dependencies=[Depends(_raise_http_errors)],
+    )
 
     @api.get("")
     def list_runs() -> Response:
         """List all runs with their models, progress and pass rates."""
-        with as_http_errors():
-            return _json(all_runs.data())
+        return _json(all_runs.data())
 
     @api.get("/{run}")
-    def show_run(run: str, evaluation: Evaluation = None) -> Response:
+    def show_run(run: str, evaluation: EvaluationQuery = None) -> Response:
         """Show one run with every prompt and every kind of failure."""
-        with as_http_errors():
-            return _json(run_details(store.open(run, evaluation)))
+        return _json(run_details(store.open(run, evaluation)))
 
     _add_report(api, store)
 
     @api.get("/{run}/completions")
     def list_completions(
         run: str,
-        chosen: Chosen,
-        evaluation: Evaluation = None,
+        chosen: FilterQuery,
+        evaluation: EvaluationQuery = None,
         offset: Annotated[int, Query(ge=0, description="Completions to skip.")] = 0,
-        limit: Annotated[int, Query(ge=1, le=MOST, description="Completions to return.")] = 100,
+        limit: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="Completions to return.")] = 100,
     ) -> Response:
         """List completions of a run page by page, optionally of a prompt or with a kind of failure."""
-        with as_http_errors():
-            found = store.open(run, evaluation).select(chosen)
+        found = store.open(run, evaluation).select(chosen)
         part = [entry_data(row) for row in found[offset : offset + limit].iter_rows(named=True)]
         return _json({"total": found.height, "offset": offset, "completions": part})
 
     @api.get("/{run}/completions/{task:path}/{prompt}/{index}")
     def show_completion(
-        run: str, task: str, prompt: int, index: int, evaluation: Evaluation = None
+        run: str, task: str, prompt: int, index: int, evaluation: EvaluationQuery = None
     ) -> Response:
         """Show one completion: its program, and for each world the robot's actions and failed checks."""
-        with as_http_errors():
-            snapshot = store.open(run, evaluation)
-            row = snapshot.row(name_of((task, prompt, index)))
-            if row is None:
-                raise HTTPException(404, "this run has no such completion")
-            return _json(completion_details(snapshot, row))
+        snapshot = store.open(run, evaluation)
+        row = snapshot.row(name_of((task, prompt, index)))
+        if row is None:
+            raise HTTPException(404, "this run has no such completion")
+        return _json(completion_details(snapshot, row))
 
     return api
 
 
 def _add_report(api: APIRouter, store: RunStore) -> None:
-    """Add the routes of a run's report and its tables."""
-
     @api.get("/{run}/report")
     def show_report(run: str) -> Response:
         """Show the report in the folder of a run, from `roboeval run` or `roboeval report`."""
-        with as_http_errors():
-            text = store.report(run)
+        text = store.report(run)
         if text is None:
             raise HTTPException(404, "this run has no report")
         # The folder may contain any page instead of a report, so scripts are forbidden.
@@ -98,8 +95,7 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
     @api.get("/{run}/tables/{table}.csv")
     def show_table(run: str, table: str) -> Response:
         """Show a table of a run's report, as CSV."""
-        with as_http_errors():
-            text = store.report(run, f"tables/{table}.csv") if TABLE.fullmatch(table) else None
+        text = store.report(run, f"tables/{table}.csv") if TABLE_NAME.fullmatch(table) else None
         if text is None:
             raise HTTPException(404, "this run has no such table")
         return Response(text, media_type="text/csv")
@@ -110,8 +106,7 @@ def _json(data: object) -> Response:
     return Response(json.dumps(data), media_type="application/json", headers={"cache-control": "no-store"})
 
 
-@contextmanager
-def as_http_errors() -> Iterator[None]:
+def _raise_http_errors() -> Iterator[None]:
     """Turn errors for users into HTTP errors."""
     try:
         yield

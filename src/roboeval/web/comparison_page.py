@@ -11,15 +11,14 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.web.difference import PAIR, Difference, differences_of, draw_differences
-from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
+from roboeval.web.difference import RUNS_IN_PAIR, Difference, differences_of, draw_differences
+from roboeval.web.heat_map import MAX_NAME, TaskCells, failure_rows, models_of, run_address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
-from roboeval.web.widgets import EVERY, HeatMap, completions_text, score_text, show_state
+from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, completions_text, score_text, show_state
 
-MOST = 12  # runs on the page
-MOST_NAME = 60
+MAX_COMPARED_RUNS = 12  # runs on the page
 DIFFERENT_SUITES = (
     "These runs were judged with different suites or versions of a suite. Compare them with care."
 )
@@ -32,11 +31,11 @@ async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
         PlainText("p", "Select runs in the list, then click \u201cShow side by side\u201d.", "quiet")
         html.a("All runs", href=outside("/runs"))
         return
-    if len(names) > MOST:
-        PlainText("p", f"Only the first {MOST} of {len(names):,} runs are shown.", "quiet")
-    comparison = _Comparison(store, names[:MOST])
+    if len(names) > MAX_COMPARED_RUNS:
+        PlainText("p", f"Only the first {MAX_COMPARED_RUNS} of {len(names):,} runs are shown.", "quiet")
+    comparison = _Comparison(store, names[:MAX_COMPARED_RUNS])
     await comparison.refresh()
-    ui.timer(EVERY, comparison.refresh, immediate=False)
+    ui.timer(REFRESH_SECONDS, comparison.refresh, immediate=False)
 
 
 class _Comparison:
@@ -65,7 +64,7 @@ class _Comparison:
         if versions != self._versions:
             self._versions = versions
             judged = [run for run in runs if run.judged]
-            found = await asyncio.to_thread(differences_of, judged) if len(judged) >= PAIR else []
+            found = await asyncio.to_thread(differences_of, judged) if len(judged) >= RUNS_IN_PAIR else []
             self._show(runs, errors, found)
 
     def _read(self) -> tuple[list[Snapshot], list[str]]:
@@ -75,7 +74,7 @@ class _Comparison:
                 runs.append(self._store.open(name))
             except UserError as error:
                 errors.append(error.sentence)
-        heads = [run.results.head for run in runs if run.judged]
+        heads = [run.results.manifest for run in runs if run.judged]
         judged_by = {tuple(str(head.get(part)) for part in ("suite", "digest", "ablation")) for head in heads}
         return runs, [*errors, *[DIFFERENT_SUITES] * (len(judged_by) > 1)]
 
@@ -89,10 +88,15 @@ class _Comparison:
             for run in runs:
                 _draw_run(run)
         cells = [TaskCells(run, CompletionFilter()) for run in runs]
-        groups = [{**_column(run), "columns": of.columns} for run, of in zip(runs, cells, strict=True)]
-        tasks = dict.fromkeys(task for of in cells for task in of.tasks)
+        groups = [
+            {**_column(run), "columns": run_cells.columns} for run, run_cells in zip(runs, cells, strict=True)
+        ]
+        tasks = dict.fromkeys(task for run_cells in cells for task in run_cells.tasks)
         rows = [
-            {"name": shortened(task, MOST_NAME), "cells": [cell for of in cells for cell in of.row(task)]}
+            {
+                "name": shortened(task, MAX_NAME),
+                "cells": [cell for run_cells in cells for cell in run_cells.row(task)],
+            }
             for task in tasks
         ]
         self._tasks.show(groups=groups, rows=rows)
@@ -108,13 +112,13 @@ class _Comparison:
 
 
 def _column(run: Snapshot) -> dict[str, Any]:
-    return {"name": shortened(run.name, MOST_NAME), "title": models_of(run), "href": address(run.name)}
+    return {"name": shortened(run.name, MAX_NAME), "title": models_of(run), "href": run_address(run.name)}
 
 
 def _draw_run(run: Snapshot) -> None:
     data = run_data(run)
     with ui.element("li"):
-        html.a(shortened(run.name, MOST_NAME), href=outside(address(run.name))).props("dir=auto")
+        html.a(shortened(run.name, MAX_NAME), href=outside(run_address(run.name))).props("dir=auto")
         show_state(data, PlainText("small"))
         PlainText("b", score_text(data))
         PlainText("span", f"{completions_text(data)}, {models_of(run)}", "quiet")

@@ -17,28 +17,30 @@ from codebotler.core.world import World
 from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText, outside
 from codebotler.web.storyboard import draw_scene, scenes
-from roboeval.analysis.cluster import Fix, nearest_fix
+from roboeval.analysis.failure_groups import Fix, nearest_fix
 from roboeval.evaluation.explanation import (
-    LOWERED,
+    LOWERCASED_NOTE,
     cut_sentence,
     error_sentence,
     failing_first,
     instruction_shown,
 )
 from roboeval.evaluation.failures import label_of, no_program_sentence
-from roboeval.evaluation.runs.completions import Key, by_hand, name_of
+from roboeval.evaluation.runs.completions import CompletionKey, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_person, world_title
-from roboeval.web.heat_map import address
+from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import ProgramView
 
-MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION, MOST_REPLY = 80, 2_000, 5_000, 50_000
-RED = "Red marks the step at which a check failed."
-NEIGHBOURS = ("Previous completion", "Next completion")
-CHANGED = "The program was changed or removed after it was judged. The verdicts refer to the earlier version."
+MAX_SENTENCE, MAX_INSTRUCTION, MAX_REPLY = 2_000, 5_000, 50_000
+FAILED_STEP_NOTE = "Red marks the step at which a check failed."
+NEIGHBOUR_LINKS = ("Previous completion", "Next completion")
+PROGRAM_CHANGED = (
+    "The program was changed or removed after it was judged. The verdicts refer to the earlier version."
+)
 
 
 async def draw_completion(
@@ -61,9 +63,9 @@ def _read(
     snapshot = store.open(run, evaluation)
     row = snapshot.row(name)
     if row is None:
-        raise MissingError(f'this run has no completion "{shortened(name, MOST_NAME)}"')
+        raise MissingError(f'this run has no completion "{shortened(name, MAX_NAME)}"')
     data = completion_details(snapshot, row)
-    key: Key = data["task"], data["prompt"], data["index"]
+    key: CompletionKey = data["task"], data["prompt"], data["index"]
     has_failed = data["passed"] is False and _no_program_sentence(data) is None
     fix = nearest_fix(snapshot.results, key) if has_failed else None
     return snapshot, data, fix
@@ -80,17 +82,17 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
 def _draw_head(
     run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: CompletionFilter, query: str
 ) -> None:
-    key: Key = data["task"], data["prompt"], data["index"]
+    key: CompletionKey = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
-        html.a(shortened(run.name, MOST_NAME), href=outside(f"{address(run.name)}{query}#completions")).props(
-            "dir=auto"
-        )
-        for text, other in zip(NEIGHBOURS, run.neighbours(key, chosen), strict=True):
+        html.a(
+            shortened(run.name, MAX_NAME), href=outside(f"{run_address(run.name)}{query}#completions")
+        ).props("dir=auto")
+        for text, other in zip(NEIGHBOUR_LINKS, run.neighbours(key, chosen), strict=True):
             if other is not None:
                 task, prompt, index = other
-                href = f"{address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
+                href = f"{run_address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
                 html.a(text, href=outside(href)).classes("beside")
-    PlainText("h1", shortened(name_of(key), MOST_NAME))
+    PlainText("h1", shortened(name_of(key), MAX_NAME))
     with ui.element("p").classes("facts"):
         why, state = data["failure"], {None: "waits", True: "done", False: "failed"}[data["passed"]]
         verdict = "not judged yet" if data["passed"] is None else "passed"
@@ -98,17 +100,17 @@ def _draw_head(
             verdict = shortened(f"{label_of(why['class'])}: {why['kind']}")
         PlainText("small", verdict, f"state state-{state}")
         if data["model"] is not None:
-            PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
+            PlainText("span", f"written by {shortened(data['model'], 200)}{recorded_suffix([data['model']])}")
         if fix is not None:
             text = f"Most similar program that passes: {counted(fix.changed, 'line')} changed"
-            html.a(text, href=outside(f"{address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
+            html.a(text, href=outside(f"{run_address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
     if data["stale"]:
-        PlainText("p", CHANGED, "trouble")
+        PlainText("p", PROGRAM_CHANGED, "trouble")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
     if origin is not None:
         PlainText("p", origin[0].upper() + origin[1:], "quiet")
     if instruction is not None:
-        PlainText("p", shortened(instruction, MOST_INSTRUCTION), "instruction")
+        PlainText("p", shortened(instruction, MAX_INSTRUCTION), "instruction")
 
 
 def _draw_program(data: Mapping[str, Any]) -> None:
@@ -144,7 +146,7 @@ def _draw_reply(reply: Mapping[str, Any] | None) -> None:
 
 
 def _draw_text(text: str, name: str) -> None:
-    pre = PlainText("pre", shortened(text, MOST_REPLY, visible_lines), "source").props("tabindex=0")
+    pre = PlainText("pre", shortened(text, MAX_REPLY, visible_lines), "source").props("tabindex=0")
     pre.props["aria-label"] = name
 
 
@@ -155,7 +157,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
             PlainText("p", sentence, "trouble")
             return
         if completion["lowered"] and judged:
-            PlainText("p", LOWERED, "quiet")
+            PlainText("p", LOWERCASED_NOTE, "quiet")
         if not judged:
             PlainText("p", "This completion has not been judged yet.", "quiet")
         for number, data in failing_first(judged):
@@ -178,7 +180,6 @@ def _draw_world_head(data: Mapping[str, Any], number: int, of: int) -> None:
 
 
 def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
-    """Draw the error that ended a run, its failed checks, and remarks."""
     if data["error"] is not None:
         allowed = ". This world allows a program to wait forever." * data["satisfied"]
         sentence = f"{shortened(data['error']['kind'])}: {shortened(error_sentence(data))}{allowed}"
@@ -187,7 +188,7 @@ def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
         for check in data["failed_checks"]:
             _draw_check(check, anchor)
     for remark in data["remarks"]:
-        PlainText("p", shortened(remark, MOST_SENTENCE), "quiet")
+        PlainText("p", shortened(remark, MAX_SENTENCE), "quiet")
 
 
 def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
@@ -202,7 +203,7 @@ def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> No
             for scene in scenes(steps, steps[0]["place"], wrong):
                 draw_scene(scene, wrong, anchor=anchor)
         if wrong:
-            PlainText("p", RED, "quiet")
+            PlainText("p", FAILED_STEP_NOTE, "quiet")
     if cut is not None:
         PlainText("p", f"{cut_sentence(cut)}.", "quiet")
     if steps:
@@ -217,7 +218,7 @@ def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
     with ui.element("li").classes("failed-check"):
         PlainText("code", shortened(check_label(check["check"])))
         if check["explanation"] is not None:
-            PlainText("span", shortened(check["explanation"], MOST_SENTENCE))
+            PlainText("span", shortened(check["explanation"], MAX_SENTENCE))
         if check["step"] is not None:
             html.a(f"step {check['step']}", href=f"#{anchor}{check['step']}")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from urllib.parse import urlencode
 
@@ -12,18 +12,18 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.analysis.compare import compare_scores, pairs_to_compare, verdict
+from roboeval.analysis.compare import compare_scores, comparison_sentence, pairs_to_compare
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
-from roboeval.evaluation.runs.completions import KEY, Key, name_of
-from roboeval.web.heat_map import address
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
+from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
 from roboeval.web.widgets import interval_text
 
-MOST_NAME, MOST_TASKS, MOST_KEYS = 60, 100, 30
-PAIR = 2
-HEADS = ("95% confidence interval", "Different verdicts")
-ABOUT = "The interval for all tasks is over tasks, that for a task over its prompts."
-UNKNOWN = " It is unknown for a single prompt or without variation."
+MAX_PAIR_TASKS, MAX_DIFFERING = 100, 30
+RUNS_IN_PAIR = 2
+DIFFERENCE_HEADS = ("95% confidence interval", "Different verdicts")
+INTERVAL_NOTE = "The interval for all tasks is over tasks, that for a task over its prompts."
+UNKNOWN_NOTE = " It is unknown for a single prompt or without variation."
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class TaskRow:
     task: str
     shares: tuple[float, float]  # mean pass@1 over common prompts
     difference: Estimate  # second minus first; the interval is over prompts, for all tasks over tasks
-    differing: tuple[tuple[Key, bool], ...]  # passed in one run only; True: in the second run
+    differing: tuple[tuple[CompletionKey, bool], ...]  # passed in one run only; True: in the second run
 
 
 def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
@@ -56,10 +56,10 @@ def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
     return sorted(rows, key=lambda row: (-abs(row.difference.mean), row.task))
 
 
-def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[Key, bool]]]:
+def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[CompletionKey, bool]]]:
     judged = [run.completions.drop_nulls("passed").select(*KEY, "passed") for run in (first, second)]
     both = judged[0].join(judged[1], on=KEY, how="inner", suffix="_second", maintain_order="left")
-    found: dict[str, list[tuple[Key, bool]]] = {}
+    found: dict[str, list[tuple[CompletionKey, bool]]] = {}
     for task, prompt, index, _, passed in both.filter(
         pl.col("passed") != pl.col("passed_second")
     ).iter_rows():
@@ -80,20 +80,20 @@ class Difference:
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
     """Compare judged runs pair by pair, and two runs also by task; may take seconds for large runs."""
     pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
-    return [_difference(*pair, by_task=len(runs) == PAIR) for pair in pairs]
+    return [_difference(*pair, by_task=len(runs) == RUNS_IN_PAIR) for pair in pairs]
 
 
 def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Difference:
-    names = shortened(first.name, MOST_NAME), shortened(second.name, MOST_NAME)
+    names = shortened(first.name, MAX_NAME), shortened(second.name, MAX_NAME)
     try:
         found = compare_scores(pass_at_1(first.scores), pass_at_1(second.scores))
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
-    sentence = verdict(found, names)
+    sentence = comparison_sentence(found, names)
     if not by_task:
         return Difference((first, second), sentence)
     overall = TaskRow("All tasks", (found.first, found.second), found.over_tasks, ())
-    return Difference((first, second), sentence, overall, tuple(task_rows(first, second)[:MOST_TASKS]))
+    return Difference((first, second), sentence, overall, tuple(task_rows(first, second)[:MAX_PAIR_TASKS]))
 
 
 def draw_differences(found: Sequence[Difference]) -> None:
@@ -111,26 +111,26 @@ def draw_differences(found: Sequence[Difference]) -> None:
 
 def _draw_difference(difference: Difference) -> None:
     runs, rows, overall = difference.runs, difference.rows, difference.overall
-    names = [shortened(run.name, MOST_NAME) for run in runs]
+    names = [shortened(run.name, MAX_NAME) for run in runs]
     PlainText("p", difference.sentence)
     if overall is None:
         return
     region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
     with region, html.table().classes("differences"):
         with html.thead(), html.tr():
-            for head in ("Task", *names, f"{names[1]} \N{MINUS SIGN} {names[0]}", *HEADS):
+            for head in ("Task", *names, f"{names[1]} \N{MINUS SIGN} {names[0]}", *DIFFERENCE_HEADS):
                 PlainText("th", head).props("scope=col")
         with html.tbody():
             for row in (overall, *rows):
                 _draw_row(row, runs)
     is_unknown = any(not row.difference.is_known for row in rows)
-    PlainText("p", ABOUT + UNKNOWN * is_unknown, "quiet")
+    PlainText("p", INTERVAL_NOTE + UNKNOWN_NOTE * is_unknown, "quiet")
 
 
 def _draw_row(row: TaskRow, runs: Sequence[Snapshot]) -> None:
     estimate = row.difference
     with html.tr():
-        PlainText("th", shortened(row.task, MOST_NAME)).props("scope=row")
+        PlainText("th", shortened(row.task, MAX_NAME)).props("scope=row")
         for share in row.shares:
             PlainText("td", f"{share:.2f}", "number")
         PlainText("td", f"{estimate.mean:+.2f}", "number strong")
@@ -144,15 +144,12 @@ def _draw_differing(row: TaskRow, runs: Sequence[Snapshot]) -> None:
     with html.details():
         PlainText("summary", f"{len(row.differing):,}")
         with ui.element("ul"):
-            for key, is_second in row.differing[:MOST_KEYS]:
+            for key, is_second in row.differing[:MAX_DIFFERING]:
                 with ui.element("li"):
                     PlainText("span", f"{name_of(key)}: ")
-                    for run, text in zip(runs, _verdicts(is_second), strict=True):
-                        link = html.a(f"{shortened(run.name, MOST_NAME)} {text}")
-                        link.props["href"] = outside(f"{address(run.name)}/{name_of(key)}")
-            if (left := len(row.differing) - MOST_KEYS) > 0:
+                    verdicts = ("failed", "passed") if is_second else ("passed", "failed")
+                    for run, text in zip(runs, verdicts, strict=True):
+                        link = html.a(f"{shortened(run.name, MAX_NAME)} {text}")
+                        link.props["href"] = outside(f"{run_address(run.name)}/{name_of(key)}")
+            if (left := len(row.differing) - MAX_DIFFERING) > 0:
                 PlainText("li", f"and {left:,} more")
-
-
-def _verdicts(is_second: bool) -> Iterator[str]:  # noqa: FBT001 - a private function
-    yield from ("failed", "passed") if is_second else ("passed", "failed")

@@ -11,10 +11,10 @@ from fastapi.responses import RedirectResponse
 from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
-from codebotler.web.frame import PATIENCE, Pages, Site
+from codebotler.web.frame import PAGE_BUILD_SECONDS, Pages, Site
 from codebotler.web.proxy import prefix_of
 from roboeval.suites.load import Suite
-from roboeval.web.api import Chosen, Evaluation, router
+from roboeval.web.api import EvaluationQuery, FilterQuery, router
 from roboeval.web.comparison_page import draw_comparison
 from roboeval.web.completion_page import draw_completion
 from roboeval.web.run_page import draw_run
@@ -22,8 +22,6 @@ from roboeval.web.run_store import RunStore
 from roboeval.web.runs_page import draw_runs
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import page_of
-
-STATIC = Path(__file__).with_name("static")
 
 
 def pages(suites: Sequence[Suite] = ()) -> Pages:
@@ -33,26 +31,28 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
         store = RunStore(site.runs, suites)
         all_runs = RunList(store)
         site.app.include_router(router(store, all_runs))
-        site.app.mount("/static/benchmark", StaticFiles(directory=STATIC))
+        site.app.mount("/static/benchmark", StaticFiles(directory=Path(__file__).with_name("static")))
         if not site.frame.has_robot:
             site.app.get("/", include_in_schema=False)(_redirect_to_runs)
 
-        @ui.page("/runs", response_timeout=PATIENCE)
+        @ui.page("/runs", response_timeout=PAGE_BUILD_SECONDS)
         async def show_runs() -> None:
             with page_of(site.frame, "Runs"):
                 await draw_runs(store.folder, all_runs)
 
-        @ui.page("/runs/{run}", response_timeout=PATIENCE)
-        async def show_run(run: str, chosen: Chosen, evaluation: Evaluation = None) -> None:
+        @ui.page("/runs/{run}", response_timeout=PAGE_BUILD_SECONDS)
+        async def show_run(run: str, chosen: FilterQuery, evaluation: EvaluationQuery = None) -> None:
             with page_of(site.frame, run):
                 await draw_run(store, run, chosen, evaluation)
 
-        @ui.page("/runs/{run}/{name:path}", response_timeout=PATIENCE)
-        async def show_completion(run: str, name: str, chosen: Chosen, evaluation: Evaluation = None) -> None:
+        @ui.page("/runs/{run}/{name:path}", response_timeout=PAGE_BUILD_SECONDS)
+        async def show_completion(
+            run: str, name: str, chosen: FilterQuery, evaluation: EvaluationQuery = None
+        ) -> None:
             with page_of(site.frame, name):
                 await draw_completion(store, run, name, chosen, evaluation)
 
-        @ui.page("/side-by-side", response_timeout=PATIENCE)
+        @ui.page("/side-by-side", response_timeout=PAGE_BUILD_SECONDS)
         async def compare_runs(run: Annotated[list[str] | None, Query()] = None) -> None:
             with page_of(site.frame, "Side by side"):
                 await draw_comparison(store, list(dict.fromkeys(run or ())))

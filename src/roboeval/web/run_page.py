@@ -11,13 +11,14 @@ from nicegui import html, ui
 
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
+from roboeval.analysis.metrics import percent
 from roboeval.evaluation.failures import plural_of
-from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models_of, percent
+from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, failure_text, models_of, run_address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import (
-    EVERY,
+    REFRESH_SECONDS,
     CompletionList,
     HeatMap,
     completions_text,
@@ -27,15 +28,14 @@ from roboeval.web.widgets import (
     tasks_text,
 )
 
-MOST_NAME = 80
-SCROLL = "document.getElementById('completions').scrollIntoView()"
-GONE = "This run was deleted or renamed. The page shows its last known state."
+SCROLL_TO_COMPLETIONS = "document.getElementById('completions').scrollIntoView()"
+RUN_DELETED = "This run was deleted or renamed. The page shows its last known state."
 
 
 async def draw_run(store: RunStore, name: str, chosen: CompletionFilter, evaluation: str | None) -> None:
     """Draw a run; its list of completions starts with a filter."""
     page = _RunPage(store, await asyncio.to_thread(store.open, name, evaluation), chosen, evaluation)
-    page.timer = ui.timer(EVERY, page.refresh, immediate=False)
+    page.timer = ui.timer(REFRESH_SECONDS, page.refresh, immediate=False)
 
 
 class _RunPage:
@@ -49,7 +49,7 @@ class _RunPage:
         self._store, self._run, self._chosen, self._evaluation = store, run, chosen, evaluation
         self._changes = 0
         self._kinds: dict[CompletionFilter, _Kind] = {}
-        PlainText("h1", shortened(run.name, MOST_NAME))
+        PlainText("h1", shortened(run.name, MAX_NAME))
         self._error = PlainText("p", "", "trouble").props("role=alert")
         self._error.say("")
         self._head = ui.element("div").classes("run-head")
@@ -74,7 +74,7 @@ class _RunPage:
         try:
             run = await asyncio.to_thread(self._store.open, self._run.name, self._evaluation)
         except MissingError:
-            self._error.say(GONE)
+            self._error.say(RUN_DELETED)
             self.timer.deactivate()
             return
         if run.version != self._run.version:
@@ -84,14 +84,14 @@ class _RunPage:
 
     def _choose_cell(self, task: str, prompt: int | None) -> None:
         self._choose(replace(self._chosen, task=task, prompt=prompt))
-        ui.run_javascript(SCROLL)
+        ui.run_javascript(SCROLL_TO_COMPLETIONS)
 
     def _choose_kind(self, kind: CompletionFilter) -> None:
         self._choose(replace(kind, task=self._chosen.task, prompt=self._chosen.prompt))
 
     def _choose(self, chosen: CompletionFilter) -> None:
         self._chosen = chosen
-        ui.navigate.history.replace(outside(address(self._run.name)) + chosen.query(self._evaluation))
+        ui.navigate.history.replace(outside(run_address(self._run.name)) + chosen.query(self._evaluation))
         self._show_chosen()
 
     def _show(self) -> None:
@@ -103,14 +103,14 @@ class _RunPage:
     def _show_chosen(self) -> None:
         run, chosen = self._run, self._chosen
         cells = TaskCells(run, chosen, self._evaluation)
-        rows = [{"name": shortened(task, MOST_NAME), "cells": cells.row(task)} for task in cells.tasks]
+        rows = [{"name": shortened(task, MAX_NAME), "cells": cells.row(task)} for task in cells.tasks]
         self._heat.show(groups=[{"name": "", "columns": cells.columns}], rows=rows)
         self._title.say(f"Share that {_verb(chosen)}")
         self._which.say(_heading(chosen))
         self._all.set_visibility(chosen != CompletionFilter())
         source = f"/api/runs/{quote(run.name, safe='')}/completions{chosen.query(run.results.key) or '?'}"
         query = chosen.query(self._evaluation)
-        base = outside(address(run.name))
+        base = outside(run_address(run.name))
         self._list.show(source=outside(source), base=base, query=query, version=self._changes)
         self._show_kinds()
 
@@ -120,10 +120,13 @@ class _RunPage:
             CompletionFilter(): ("all judged", run.judged),
             CompletionFilter(passed=True): ("passed", run.passed),
         }
-        for of in run.failures:
-            counts[CompletionFilter(failure_class=of.name)] = plural_of(of.name), of.count
-            for one in of.kinds:
-                counts[CompletionFilter(failure_class=of.name, failure_kind=one.name)] = one.name, one.count
+        for cause in run.failures:
+            counts[CompletionFilter(failure_class=cause.name)] = plural_of(cause.name), cause.count
+            for one in cause.kinds:
+                counts[CompletionFilter(failure_class=cause.name, failure_kind=one.name)] = (
+                    one.name,
+                    one.count,
+                )
         if list(self._kinds) != list(counts):
             self._ends.clear()
             with self._ends:
@@ -141,23 +144,23 @@ class _Kind:
         look = "kind" + " of-class" * (kind.failure_kind is not None)
         look += " bad-kind" * (kind.failure_class is not None)
         with Button("", lambda: choose(kind), look) as self._button:
-            PlainText("span", shortened(name, MOST_NAME))
+            PlainText("span", shortened(name, MAX_NAME))
             self._count = PlainText("b")
             self._share = PlainText("small", "", "quiet")
 
-    def show(self, count: int, of: int, *, is_here: bool) -> None:
+    def show(self, count: int, total: int, *, is_here: bool) -> None:
         """Show the count, its share, and whether the outcome is selected."""
         self._button.props(f"aria-pressed={'true' if is_here else 'false'}")
-        self._button.style(f"--share: {count / of if of else 0:.3f}")
+        self._button.style(f"--share: {count / total if total else 0:.3f}")
         self._count.say(f"{count:,}")
-        self._share.say(f"{percent(count / of)}%" if of else NONE)
+        self._share.say(f"{percent(count / total)}%" if total else MISSING)
 
 
 def _draw_head(run: Snapshot, *, has_report: bool) -> None:
     data, key = run_data(run), run.results.key
     with ui.element("p").classes("facts"):
         state = PlainText("small")
-        PlainText("span", models_of(run) + (f", judged by {shortened(key, MOST_NAME)}" if key else ""))
+        PlainText("span", models_of(run) + (f", judged by {shortened(key, MAX_NAME)}" if key else ""))
         PlainText("b", score_text(data))
         PlainText("span", f"{completions_text(data)}, {tasks_text(data)} tasks")
         if data["date"] is not None:
@@ -174,7 +177,8 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
             html.a("Report of this run", href=outside(f"/api/runs/{quote(run.name, safe='')}/report"))
         for other in run.evaluations if len(run.evaluations) > 1 else ():
             link = html.a(
-                shortened(other, MOST_NAME), href=outside(address(run.name) + CompletionFilter().query(other))
+                shortened(other, MAX_NAME),
+                href=outside(run_address(run.name) + CompletionFilter().query(other)),
             )
             if other == key:
                 link.props('aria-current="true"')
@@ -187,10 +191,9 @@ def _verb(chosen: CompletionFilter) -> str:
 
 
 def _heading(chosen: CompletionFilter) -> str:
-    """The heading of the list of completions."""
     parts = []
     if chosen.task is not None:
-        parts.append(f"of {shortened(chosen.task, MOST_NAME)}")
+        parts.append(f"of {shortened(chosen.task, MAX_NAME)}")
     if chosen.prompt is not None:
         parts.append(f"prompt {chosen.prompt}")
     if chosen.verdict != CompletionFilter():

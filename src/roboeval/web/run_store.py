@@ -13,17 +13,20 @@ from typing import TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.suites.load import ABLATED, Suite, has_suite, load_suite
 from roboeval.web.snapshot import Snapshot
 
-MOST_HELD = 16  # evaluations in memory
-REPORT, MOST_REPORT = "index.html", 20_000_000  # the page of a report, and its largest size in bytes
-REST = 10  # wait this many times the duration of a read before reading a run again
-OUTSIDE = "leads outside the folder of runs; move it into the folder"
+MAX_SNAPSHOTS = 16  # evaluations in memory
+REPORT_PAGE, MAX_REPORT_BYTES = (
+    "index.html",
+    20_000_000,
+)  # the page of a report, and its largest size in bytes
+REST_FACTOR = 10  # wait this many times the duration of a read before reading a run again
+OUTSIDE_FOLDER = "leads outside the folder of runs; move it into the folder"
 
-Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
+FileStamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
 
 class MissingError(UserError):
@@ -36,7 +39,7 @@ class RunStore:
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
         self._suites: dict[str, Suite | None] = {suite.name: suite for suite in suites}
-        self._reader_of = lru_cache(maxsize=MOST_HELD)(partial(_Reader, self))
+        self._reader_of = lru_cache(maxsize=MAX_SNAPSHOTS)(partial(_Reader, self))
 
     def names(self) -> list[str]:
         """The sorted names of the runs."""
@@ -50,14 +53,14 @@ class RunStore:
         """The version of a run, found without reading it."""
         return self._reader(name, None).version()
 
-    def report(self, name: str, part: str = REPORT) -> bytes | None:
+    def report(self, name: str, part: str = REPORT_PAGE) -> bytes | None:
         """Read the page of a run's report, or another part of it; None if it cannot be read."""
         path = self._reader(name, None).folder / "report" / part
         if _stamp(path, self.folder.resolve()) is None:
             return None
         try:
             size = path.stat().st_size
-            if size > MOST_REPORT:
+            if size > MAX_REPORT_BYTES:
                 raise UserError(f"is too large to show ({size:,} bytes); open the file", file=path.name)
             return path.read_bytes()
         except OSError:
@@ -82,7 +85,7 @@ class RunStore:
 
     def _folders(self) -> dict[str, Path]:
         """The folder if it is a run itself, otherwise its entries, by name."""
-        if Run(self.folder).completions.is_file():
+        if RunFolder(self.folder).completions.is_file():
             return {self.folder.resolve().name: self.folder.resolve()}
         try:
             return {path.name: path for path in self.folder.iterdir()}
@@ -96,8 +99,8 @@ class RunStore:
         if path is None or not _is_run(path):
             raise MissingError(f'this folder has no run "{shortened(name)}"; it may have been deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):
-            raise UserError(f'"{shortened(name)}" {OUTSIDE}')
-        run = Run(path)
+            raise UserError(f'"{shortened(name)}" {OUTSIDE_FOLDER}')
+        run = RunFolder(path)
         keys = (path.stem for path in run.rows("").parent.glob("*.jsonl"))
         known = tuple(sorted(keys, key=lambda one: (one.endswith(ABLATED), one)))
         if key is not None and key not in known:
@@ -110,12 +113,12 @@ class RunStore:
 class _Reader:
     """Reads one evaluation of a run, again when one of its files changes."""
 
-    def __init__(self, store: RunStore, run: Run, key: str | None) -> None:
+    def __init__(self, store: RunStore, run: RunFolder, key: str | None) -> None:
         self._store, self._run, self._key = store, run, key
         self.evaluations: tuple[str, ...] = ()
         self._lock = threading.Lock()
         self._results: Results | None = None
-        self._stamps: Stamps = ()
+        self._stamps: FileStamps = ()
         self._rests_until = 0.0
         self._snapshot: Snapshot | None = None
 
@@ -134,7 +137,7 @@ class _Reader:
                 ended = time.monotonic()
                 # Faults may come from files that changed during the read, so read them again soon.
                 mixed = bool(self._results.faults) and self._stamps_now() != stamps
-                self._rests_until = ended + (0 if mixed else REST * (ended - began))
+                self._rests_until = ended + (0 if mixed else REST_FACTOR * (ended - began))
             version = self._version(self._stamps)
             if self._snapshot is None or self._snapshot.version != version:
                 self._snapshot = Snapshot(
@@ -145,24 +148,24 @@ class _Reader:
     def version(self) -> Hashable:
         return self._version(self._stamps_now())
 
-    def _version(self, stamps: Stamps) -> Hashable:
+    def _version(self, stamps: FileStamps) -> Hashable:
         return self._key, self.evaluations, self._run.is_being_written, stamps
 
-    def _stamps_now(self) -> Stamps:
+    def _stamps_now(self) -> FileStamps:
         """The stamps of all files, which change with their content."""
         run, key = self._run, self._key or ""
         checks = run.checks(key.removesuffix(ABLATED))
         within = self._store.folder.resolve()
-        paths = (run.completions, run.about, run.rows(key), run.head(key), checks)
+        paths = (run.completions, run.about, run.rows(key), run.manifest(key), checks)
         return tuple(_stamp(path, within) for path in paths)
 
     def _read_files(self) -> Results:
         faults: list[UserError] = []
         results = read_results(self._run, self._key, keep_failed=False, faults=faults)
-        there = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
-        name = results.head.get("suite") or results.about.get("suite")
+        existing = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
+        name = results.manifest.get("suite") or results.about.get("suite")
         suite = self._store.suite(name if isinstance(name, str) else "paper")
-        return replace(results, suite=suite, faults=there)
+        return replace(results, suite=suite, faults=existing)
 
 
 def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
@@ -173,7 +176,7 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
     except OSError:
         return None
     if not found.is_relative_to(within):
-        raise UserError(OUTSIDE, file=path.name)
+        raise UserError(OUTSIDE_FOLDER, file=path.name)
     if not stat.S_ISREG(status.st_mode):
         raise UserError("is not a regular file", file=path.name)
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
@@ -181,6 +184,6 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
 
 def _is_run(path: Path) -> bool:
     """Whether a folder looks like a run, even before its first completion."""
-    run = Run(path)
+    run = RunFolder(path)
     is_named = path.name.isprintable() and not path.name.startswith(".")
     return is_named and (run.completions.exists() or run.about.exists())

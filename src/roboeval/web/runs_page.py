@@ -14,24 +14,23 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import Estimate
-from roboeval.web.heat_map import NONE, address
+from roboeval.web.heat_map import MAX_NAME, MISSING, run_address
 from roboeval.web.serializers import RunList
-from roboeval.web.widgets import EVERY, count_text, date_text, interval_text, show_state, tasks_text
+from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, interval_text, show_state, tasks_text
 
-READ_FOR = 0.5  # seconds; then the page shows runs that are not read yet
+MAX_READ_SECONDS = 0.5  # seconds; then the page shows runs that are not read yet
 
 SortKey: TypeAlias = Callable[[Mapping[str, Any]], tuple[float, str]]
-ORDERS: Mapping[str, tuple[str, SortKey]] = {
+SORT_ORDERS: Mapping[str, tuple[str, SortKey]] = {
     "Run": ("ascending", lambda run: (0, run["run"].lower())),
     "pass@1": ("descending", lambda run: (-(run.get("pass@1") or {"mean": -1})["mean"], run["run"])),
     "Started": ("descending", lambda run: (-_moment(run.get("date")), run["run"])),
     "Completions": ("descending", lambda run: (-run.get("completions", 0), run["run"])),
 }
-COLUMNS = ("Run", "Suite", "Tasks", "State", "Completions", "pass@1", "Started")
-ABOUT = "pass@1 with its 95% confidence interval over tasks; times are in UTC."
-NOTHING = "There are no runs yet. This command creates one without an API key or a network:"
-FIRST = "run --model recorded:hasty --num-completions 3"
-MOST_NAME = 80
+TABLE_HEADS = ("Run", "Suite", "Tasks", "State", "Completions", "pass@1", "Started")
+TABLE_NOTE = "pass@1 with its 95% confidence interval over tasks; times are in UTC."
+NO_RUNS_SENTENCE = "There are no runs yet. This command creates one without an API key or a network:"
+EXAMPLE_COMMAND = "run --model recorded:hasty --num-completions 3"
 
 
 def _moment(date: str | None) -> float:
@@ -47,7 +46,7 @@ async def draw_runs(folder: Path, runs: RunList) -> None:
     PlainText("p", f"In {shortened(str(await asyncio.to_thread(folder.resolve)), 200)}", "quiet")
     table = _Table(runs)
     await table.refresh()
-    ui.timer(EVERY, table.refresh, immediate=False)
+    ui.timer(REFRESH_SECONDS, table.refresh, immediate=False)
 
 
 class _Table:
@@ -62,8 +61,8 @@ class _Table:
         self._error = PlainText("p", "", "trouble").props("role=alert")
         self._empty = ui.element("div").classes("first-run")
         with self._empty:
-            PlainText("p", NOTHING, "quiet")
-            PlainText("pre", f"roboeval {FIRST}", "source").props("tabindex=0")
+            PlainText("p", NO_RUNS_SENTENCE, "quiet")
+            PlainText("pre", f"roboeval {EXAMPLE_COMMAND}", "source").props("tabindex=0")
         self._form = ui.element("form").props(f"action={outside('/side-by-side')} method=get")
         with self._form:
             region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Runs"')
@@ -71,15 +70,15 @@ class _Table:
                 with html.thead(), html.tr():
                     with html.th().props("scope=col").classes("tick"):
                         PlainText("span", "Side by side", "unseen")
-                    for name in COLUMNS:
+                    for name in TABLE_HEADS:
                         self._draw_head(name)
                 self._body = html.tbody()
-            PlainText("p", ABOUT, "quiet")
+            PlainText("p", TABLE_NOTE, "quiet")
             html.button("Show side by side", type="submit").classes("plain")
 
     def _draw_head(self, name: str) -> None:
         with html.th().props("scope=col") as head:
-            if name in ORDERS:
+            if name in SORT_ORDERS:
                 Button(name, lambda: self._show(self._data, name), "sort")
                 self._heads[name] = head
             else:
@@ -88,7 +87,7 @@ class _Table:
     async def refresh(self) -> None:
         """Show the current state of the runs."""
         try:
-            data = await asyncio.to_thread(self._runs.data, READ_FOR)
+            data = await asyncio.to_thread(self._runs.data, MAX_READ_SECONDS)
         except UserError as error:
             self._error.say(str(error))
         else:
@@ -96,9 +95,9 @@ class _Table:
             self._show(data, self._order)
 
     def _show(self, data: list[dict[str, Any]], order: str) -> None:
-        self._data, self._order = sorted(data, key=ORDERS[order][1]), order
+        self._data, self._order = sorted(data, key=SORT_ORDERS[order][1]), order
         for name, head in self._heads.items():
-            head.props(f"aria-sort={ORDERS[name][0] if name == order else 'none'}")
+            head.props(f"aria-sort={SORT_ORDERS[name][0] if name == order else 'none'}")
         self._empty.set_visibility(not data)
         self._form.set_visibility(bool(data))
         if [row.name for row in self._rows] != [run["run"] for run in self._data]:
@@ -118,10 +117,10 @@ class _RunRow:
             with html.td().classes("tick"):
                 box = ui.element("input").props("type=checkbox name=run")
                 box.props["value"] = name
-                box.props["aria-label"] = f"Compare {shortened(name, MOST_NAME)} with others"
+                box.props["aria-label"] = f"Compare {shortened(name, MAX_NAME)} with others"
             with html.th().props("scope=row"):
-                with html.a(href=outside(address(name))):
-                    PlainText("b", shortened(name, MOST_NAME))
+                with html.a(href=outside(run_address(name))):
+                    PlainText("b", shortened(name, MAX_NAME))
                 self._models = PlainText("span", "", "quiet")
                 self._settings = PlainText("span", "", "quiet note")
                 self._notes = PlainText("span", "", "bad note")
@@ -149,11 +148,11 @@ class _RunRow:
         self._tasks.say(tasks_text(run))
         self._date.say(date_text(run))
         self._notes.say(" ".join(run["notes"][:1]))
-        self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or NONE), MOST_NAME))
+        self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or MISSING), MAX_NAME))
         show_state(run, self._state, self._bar)
         self._count.say(count_text(run))
         mean = run.get("pass@1")
-        self._score.say(NONE if mean is None else f"{mean['mean']:.3f}")
+        self._score.say(MISSING if mean is None else f"{mean['mean']:.3f}")
         self._interval.say("" if mean is None else interval_text(Estimate(**mean)))
         self._meter.set_visibility(mean is not None)
         self._meter.style(f"--share: {0 if mean is None else mean['mean']:.3f}")

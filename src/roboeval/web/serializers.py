@@ -14,15 +14,15 @@ from typing import Any
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
-from roboeval.evaluation.explanation import GONE, completion_data, suite_instruction
+from roboeval.evaluation.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.requests import batches
-from roboeval.evaluation.runs.completions import KEY, Key, by_hand, how_many, name_of
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
-MOST_FAULTS, MOST_NAME, MOST_REASON = 5, 120, 300
+MAX_FAULTS_SHOWN, MAX_SUITE_NAME, MAX_FAILURE_REASON = 5, 120, 300
 
 
 class RunState(StrEnum):
@@ -61,8 +61,8 @@ def run_data(run: Snapshot) -> dict[str, Any]:
     return {
         "run": run.name,
         "models": run.models,
-        "by_hand": bool(by_hand(run.models)),
-        "suite": (results.head if results.key else results.about).get("suite"),
+        "by_hand": bool(recorded_suffix(run.models)),
+        "suite": (results.manifest if results.key else results.about).get("suite"),
         "evaluation": results.key,
         "evaluations": list(run.evaluations),
         "state": state_of(run),
@@ -87,12 +87,10 @@ def settings_text(about: Mapping[str, Any]) -> str:
     settings = about.get("settings")
     named = settings.items() if isinstance(settings, dict) else ()
     return ", ".join(
-        f"{name.replace('_', '-')} {_format(value)}" for name, value in named if value is not None
+        f"{name.replace('_', '-')} {value if isinstance(value, str) else json.dumps(value)}"
+        for name, value in named
+        if value is not None
     )
-
-
-def _format(value: object) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def date_of(about: Mapping[str, Any]) -> str | None:
@@ -105,9 +103,9 @@ def notes(run: Snapshot) -> list[str]:
     """Describe problems of a run in sentences."""
     results, stale = run.results, len(run.results.stale)
     faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
-    found = [str(fault) for fault in faults[:MOST_FAULTS]]
-    if len(faults) > MOST_FAULTS:
-        found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
+    found = [str(fault) for fault in faults[:MAX_FAULTS_SHOWN]]
+    if len(faults) > MAX_FAULTS_SHOWN:
+        found.append(f"{len(faults) - MAX_FAULTS_SHOWN:,} more lines are damaged.")
     if faults:
         found.append("All other rows are shown.")
     if (warning := run.cut_off.warning) is not None:
@@ -115,12 +113,12 @@ def notes(run: Snapshot) -> list[str]:
     if stale:
         found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
-        name = shortened(str(results.head.get("suite")), MOST_NAME)
+        name = shortened(str(results.manifest.get("suite")), MAX_SUITE_NAME)
         found.append(
             f'The suite "{name}" was not found, so failed checks are not explained; '
             "use `roboeval serve --suite FOLDER`."
         )
-    elif run.judged and run.suite is not None and results.head.get("digest") != run.suite.digest:
+    elif run.judged and run.suite is not None and results.manifest.get("digest") != run.suite.digest:
         found.append("The suite has changed since this run was judged; explanations may be missing.")
     return found
 
@@ -157,11 +155,11 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
         tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
-    kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
+    kinds = [(cause.name, kind) for cause in run.failures for kind in cause.kinds]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
         **run_data(run),
-        "tasks": [{"task": task, "pass@1": means.get(task), "prompts": of} for task, of in tasks.items()],
+        "tasks": [{"task": task, "pass@1": means.get(task), "prompts": rows} for task, rows in tasks.items()],
         "failures": [
             {"class": name, "kind": kind.name, "count": kind.count, "share": kind.share}
             for name, kind in kinds
@@ -188,7 +186,7 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         **{name: row[name] for name in (*KEY, "passed")},
         "failure": None if row["failure_class"] is None else failure,
-        "why": shortened(row["why"], MOST_REASON),
+        "why": shortened(row["why"], MAX_FAILURE_REASON),
         "worlds": row["worlds"],
         "stale": row["stale"],
     }
@@ -197,9 +195,9 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
 def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     """A completion with its program, and the steps, failed checks and explanations of each world."""
     results = run.results
-    key: Key = row["task"], row["prompt"], row["index"]
+    key: CompletionKey = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)
-    more = {"evaluation": results.key, "stale": row["stale"], "note": GONE if row["stale"] else None}
+    more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}
     if row["passed"] is None:
         known: dict[str, Any] = {
             name: getattr(completion, name, None) for name in ("model", "instruction", "program")
@@ -211,7 +209,7 @@ def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     try:
         data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
-        what = f"the row of {shortened(name_of(key), MOST_NAME)} is damaged; --redo judges it again"
+        what = f"the row of {shortened(name_of(key), MAX_SUITE_NAME)} is damaged; --redo judges it again"
         raise UserError(what, file=results.run.rows(results.key or "").name) from None
     if run.suite is None:
         for world in data["worlds"]:

@@ -16,17 +16,17 @@ from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
 from roboeval.analysis.summary import Failures, cut_off_replies, failures
 from roboeval.analysis.tasks import prompt_counts
-from roboeval.evaluation.failures import NO_PROGRAM
-from roboeval.evaluation.runs.completions import KEY, Key
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS
+from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
 
-HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM)
+HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM_CLASS)
 # The result of a program in a world: + satisfied, - not satisfied, ! error.
-SIGN = (
+WORLD_SIGN = (
     pl.when("satisfied")
     .then(pl.lit("+"))
     .when((pl.col("status") == "finished") | pl.col("error_kind").is_null())
@@ -34,17 +34,17 @@ SIGN = (
     .otherwise(pl.lit("!"))
 )
 # The cause of a failure: the failed check, the limit that stopped the program, or its error.
-ERROR = pl.col("error_message")
-WHY = (
+ERROR_MESSAGE = pl.col("error_message")
+FAILURE_CAUSE = (
     pl.when(HAS_NO_PROGRAM)
     .then(pl.col("failure_kind").replace(dict(NO_PROGRAM_SENTENCES)))
     .when(pl.col("failure_check").is_not_null())
     .then(pl.col("failure_check").map_elements(check_label, return_dtype=pl.String))
-    .when((pl.col("status") == "timeout") & ERROR.str.contains(r"^\d"))
-    .then(pl.format("stopped after {} (limit)", ERROR))
-    .otherwise(ERROR)
+    .when((pl.col("status") == "timeout") & ERROR_MESSAGE.str.contains(r"^\d"))
+    .then(pl.format("stopped after {} (limit)", ERROR_MESSAGE))
+    .otherwise(ERROR_MESSAGE)
 )
-MOST = 2**63
+INT64_LIMIT = 2**63
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class CompletionFilter:
     """Selects completions by the values of columns; also the query of pages and of the API."""
 
     task: Annotated[str | None, Query(description="Only this task.")] = None
-    prompt: Annotated[int | None, Query(ge=0, lt=MOST, description="Only this prompt, counted from 0.")] = (
-        None
-    )
+    prompt: Annotated[
+        int | None, Query(ge=0, lt=INT64_LIMIT, description="Only this prompt, counted from 0.")
+    ] = None
     passed: Annotated[bool | None, Query(description="Only those that passed, or that failed.")] = None
     failure_class: Annotated[str | None, Query(description="Only this class of failure.")] = None
     failure_kind: Annotated[str | None, Query(description="Only this kind of failure.")] = None
@@ -112,8 +112,11 @@ class Snapshot:
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
-            pl.when(HAS_NO_PROGRAM.first()).then(pl.lit("")).otherwise(SIGN.str.join("")).alias("worlds"),
-            WHY.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
+            pl.when(HAS_NO_PROGRAM.first())
+            .then(pl.lit(""))
+            .otherwise(WORLD_SIGN.str.join(""))
+            .alias("worlds"),
+            FAILURE_CAUSE.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
         )
         keys = [(storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
         schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64, "written": pl.Boolean}
@@ -134,7 +137,9 @@ class Snapshot:
         """Select completions, in order."""
         return self.completions.filter(chosen.condition)
 
-    def neighbours(self, key: Key, chosen: CompletionFilter) -> tuple[Key | None, Key | None]:
+    def neighbours(
+        self, key: CompletionKey, chosen: CompletionFilter
+    ) -> tuple[CompletionKey | None, CompletionKey | None]:
         """The completions before and after one in the filtered list; None at an end."""
         keys = [None, *self.select(chosen).select(KEY).iter_rows(), None]
         at = keys.index(key) if key in keys else None
@@ -182,11 +187,13 @@ class Snapshot:
     @cached_property
     def failures(self) -> list[Failures]:
         """The classes of failures that occur, each with its kinds, the most frequent first."""
-        classes = failures(tally_of(self.results.table)) if self.judged else ()
+        if not self.judged:
+            return []
         return [
             replace(
-                of, kinds=tuple(sorted((k for k in of.kinds if k.count), key=lambda k: (-k.count, k.name)))
+                cause,
+                kinds=tuple(sorted((k for k in cause.kinds if k.count), key=lambda k: (-k.count, k.name))),
             )
-            for of in classes
-            if of.count
+            for cause in failures(tally_of(self.results.table))
+            if cause.count
         ]

@@ -16,22 +16,22 @@ from codebotler.core.skills.declaration import all_names
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame, PlainText, outside
 from roboeval.analysis.metrics import Estimate
-from roboeval.evaluation.explanation import shown_lines
+from roboeval.evaluation.explanation import first_lines
 from roboeval.evaluation.runs.scope import Coverage
-from roboeval.web.heat_map import NONE
+from roboeval.web.heat_map import MISSING
 from roboeval.web.run_store import MissingError
 from roboeval.web.serializers import RunState
 
-STYLE = '<link rel="stylesheet" href="{prefix}/static/benchmark/benchmark.css">'
-EVERY = 1.0  # seconds between refreshes of a page
-MOST_TITLE = 80
+STYLESHEET_LINK = '<link rel="stylesheet" href="{prefix}/static/benchmark/benchmark.css">'
+REFRESH_SECONDS = 1.0  # seconds between refreshes of a page
+MAX_PAGE_TITLE = 80
 
 
 @contextmanager
 def page_of(frame: Frame, title: str) -> Iterator[None]:
     """Draw a page of the benchmark; show the sentence of an error for users."""
-    frame(shortened(title, MOST_TITLE), "/runs")
-    ui.add_head_html(STYLE.format(prefix=outside("")))
+    frame(shortened(title, MAX_PAGE_TITLE), "/runs")
+    ui.add_head_html(STYLESHEET_LINK.format(prefix=outside("")))
     with ui.element("div").classes("benchmark"):
         try:
             yield
@@ -80,7 +80,7 @@ class ProgramView(Element, component="static/code.js"):
 
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()
-        shown, self.left_out = shown_lines(program)
+        shown, self.left_out = first_lines(program)
         self._props.update(program=shown, marked=sorted(set(marked)), keywords=kwlist, skills=all_names())
 
 
@@ -94,15 +94,15 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
     if bar is not None:
         names = ("completions", "requested") if state == RunState.GENERATING else ("judged", "to_judge")
-        done, of = (data.get(name) or 0 for name in names)
+        done, total = (data.get(name) or 0 for name in names)
         bar.set_visibility(state in {RunState.GENERATING, RunState.JUDGING})
-        bar.props(f"value={done / of if of else 0:.3f}").props["aria-label"] = f"{done:,} of {of:,}"
+        bar.props(f"value={done / total if total else 0:.3f}").props["aria-label"] = f"{done:,} of {total:,}"
 
 
 def count_text(data: Mapping[str, Any]) -> str:
     """Format the coverage of a run, in short."""
     if "completions" not in data:
-        return NONE
+        return MISSING
     coverage = _coverage(data)
     done, what = (coverage.judged, "judged") if coverage.judged else (coverage.there, "written")
     return f"{done:,} of {coverage.total:,} {what}"
@@ -110,7 +110,7 @@ def count_text(data: Mapping[str, Any]) -> str:
 
 def completions_text(data: Mapping[str, Any]) -> str:
     """Format the coverage of a run."""
-    return str(_coverage(data)) if "completions" in data else NONE
+    return str(_coverage(data)) if "completions" in data else MISSING
 
 
 def _coverage(data: Mapping[str, Any]) -> Coverage:
@@ -120,14 +120,14 @@ def _coverage(data: Mapping[str, Any]) -> Coverage:
 def tasks_text(data: Mapping[str, Any]) -> str:
     """Format the number of tasks with completions, and of tasks in the suite."""
     if "tasks_there" not in data:
-        return NONE
-    of = data["tasks_of_suite"]
-    return f"{data['tasks_there']:,}" + ("" if of is None else f" of {of:,}")
+        return MISSING
+    total = data["tasks_of_suite"]
+    return f"{data['tasks_there']:,}" + ("" if total is None else f" of {total:,}")
 
 
 def date_text(data: Mapping[str, Any]) -> str:
     """Format the start of a run, in UTC."""
-    return (data.get("date") or NONE)[:16].replace("T", " ")
+    return (data.get("date") or MISSING)[:16].replace("T", " ")
 
 
 def interval_text(estimate: Estimate, form: str = ".2f") -> str:

@@ -28,7 +28,7 @@ from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.settings import PAPER
+from codebotler.simulator.settings import PAPER_SETTINGS
 
 HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"
 EVERY = (
@@ -98,7 +98,7 @@ def closed(pool: WorkerPool) -> object:
 
 def ran(pool: WorkerPool, skills: SkillTable, lines: Sequence[str], road: str) -> Outcome:
     program = ROADS[road] + "def task_program():\n" + "".join(f"    {line}\n" for line in lines)
-    robot = partial(SimulatedRobot, WORLD, PAPER, skills)
+    robot = partial(SimulatedRobot, WORLD, PAPER_SETTINGS, skills)
     ((outcome,),) = pool.here().run_all([(program, [robot])])
     return outcome
 
@@ -447,10 +447,10 @@ def test_a_skill_may_ask_with_options_of_any_type(tmp_path: Path) -> None:
     table = skills_from(tmp_path / "lab.py")
     guard = RuleGuard([Rule("a", "A.", parse('not tr.Exists(ask("cake", "no"))'))])
     world = World((Room("hall", (), (Person("ann", ("yes",)),)),), "hall")
-    robot = SimulatedRobot(world, PAPER, table, guard=guard)
+    robot = SimulatedRobot(world, PAPER_SETTINGS, table, guard=guard)
     with pytest.raises(RuleViolationError, match="no text"):
         robot.perform("vote", ["ann"])
-    free = SimulatedRobot(world, PAPER, table)
+    free = SimulatedRobot(world, PAPER_SETTINGS, table)
     free.perform("vote", ["ann"])
     assert trace_data(free.trace, table) == [
         ["ask", "Tea?", ["yes", {"no text": "2"}], "yes"],

@@ -19,11 +19,11 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event
 from codebotler.core.world import Point, Room, World, laid_out, rooms_along
 from codebotler.core.world_file import read_world
-from codebotler.missions.log import EVENTS, Line, State
+from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
 from codebotler.missions.mission import Mission
-from codebotler.missions.preflight import expect_poses, preflight
+from codebotler.missions.preflight import ask_rooms, expect_poses
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import Order
+from codebotler.missions.view import MissionOrder
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.face import Face, RobotWithFace
@@ -57,15 +57,15 @@ def rule(formula: str, *, name: str = "house") -> Rule:
 NEVER = rule('not tr.Exists(inside("printer room 2"))', name="never")
 
 
-def ran(folder: Path, robot: Robot, program: str, *rules: Rule) -> tuple[Mission, list[Line]]:
+def ran(folder: Path, robot: Robot, program: str, *rules: Rule) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
     mission.draft(program)
     mission.check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
-        room_map, place = preflight(robot, mission.note, WORLD)
+        room_map, place = ask_rooms(robot, mission.note, WORLD)
         mission.run(reserved, place, rules=rules, room_map=room_map)
-    return mission, [json.loads(line) for line in (mission.folder / EVENTS).read_text().splitlines()]
+    return mission, [json.loads(line) for line in (mission.folder / EVENTS_FILE).read_text().splitlines()]
 
 
 # --- the way
@@ -200,7 +200,7 @@ def test_a_robot_is_stopped_where_its_pose_enters_a_forbidden_room(
         robot = RobotWithFace(robot, Face()) if wrapped == "face" else SpellingRobot(robot)
     assert robot.has_pose
     mission, lines = ran(tmp_path, robot, THROUGH, NEVER)
-    assert (mission.state, mission.summary.line) == (State.STOPPED, 3)
+    assert (mission.state, mission.summary.line) == (MissionState.STOPPED, 3)
     (told,) = [line for line in lines if line["event"] == "rule"]
     assert (told["rule"], told["what"], told["prevented"]) == ("never", ["inside", "printer room 2"], False)
     assert [line["arguments"] for line in lines if line["event"] == "skill"][-1] == {
@@ -212,18 +212,18 @@ def test_a_robot_is_stopped_where_its_pose_enters_a_forbidden_room(
 def test_the_first_drive_is_judged_from_where_the_robot_stands(tmp_path: Path) -> None:
     program = "def task_program():\n    go_to('printer room 3')\n"
     mission, _ = ran(tmp_path, Simulated(WORLD, speed=None), program, NEVER)
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
 
 
 def test_a_robot_that_goes_around_is_not_stopped(tmp_path: Path) -> None:
     mission, _ = ran(tmp_path, Simulated(WORLD, speed=None), AROUND, NEVER)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
 
 
 def test_the_robot_stands_still_before_the_rule_is_logged(tmp_path: Path) -> None:
     class Noting(Simulated):
         def cancel(self) -> None:
-            logged.append((next(tmp_path.glob("missions/*")) / EVENTS).read_text())
+            logged.append((next(tmp_path.glob("missions/*")) / EVENTS_FILE).read_text())
             super().cancel()
 
     logged: list[str] = []
@@ -262,7 +262,7 @@ def test_a_rule_that_cannot_be_enforced_is_refused_before_anything_moves(
     session = MissionSession(
         robot,
         tmp_path,
-        Order(program="def task_program():\n    go_to('hall')\n"),
+        MissionOrder(program="def task_program():\n    go_to('hall')\n"),
         open_model=open_recorded,
         check=checker(SKILLS),
         rules=(VAULT,),
@@ -290,13 +290,13 @@ def test_a_robot_without_a_list_of_rooms_has_no_footprints() -> None:
 
 def test_only_the_robot_that_drives_straight_is_checked_along_straight_ways() -> None:
     remarks: list[str] = []
-    straight, _ = preflight(Simulated(WORLD, speed=None), remarks.append, WORLD)
-    other, _ = preflight(knowing(has_pose=True, rooms=tuple(MAP.rooms)), remarks.append, WORLD)
+    straight, _ = ask_rooms(Simulated(WORLD, speed=None), remarks.append, WORLD)
+    other, _ = ask_rooms(knowing(has_pose=True, rooms=tuple(MAP.rooms)), remarks.append, WORLD)
     assert straight is not None
     assert other is not None
     assert check(THROUGH, room_map=straight, house_rules=[NEVER]).problems
     assert not check(THROUGH, room_map=other, house_rules=[NEVER]).problems
-    in_grid, _ = preflight(
+    in_grid, _ = ask_rooms(
         Simulated(World((Room("hall"),), "hall")), remarks.append, World((Room("hall"),), "hall")
     )
     assert in_grid is not None
@@ -336,7 +336,7 @@ def test_a_pose_is_judged_also_while_no_skill_is_performed(
     tmp_path: Path, around: Callable[[Robot], Robot]
 ) -> None:
     mission, lines = ran(tmp_path, around(Followed((2.0, 3.0), (7.0, 3.0))), SLEEPS, NEVER)
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
 
 
@@ -351,20 +351,20 @@ def test_a_broken_rule_is_logged_where_the_mission_ends_before_its_stop_returns(
     monkeypatch.setattr(Worker, "stop", stop_late)
     monkeypatch.setattr(Mission, "__exit__", lambda *_: ended.set())
     mission, lines = ran(tmp_path, Followed((2.0, 3.0), (7.0, 3.0)), SLEEPS, NEVER)
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
 
 
 def test_robot_that_moves_without_telling_where_is_stopped_and_lost(tmp_path: Path) -> None:
     mission, lines = ran(tmp_path, Followed((2.0, 3.0), None), SLEEPS, NEVER)
-    assert mission.state is State.FAILED
+    assert mission.state is MissionState.FAILED
     assert not [line for line in lines if line["event"] == "rule"]
 
 
 def test_poses_are_not_asked_for_where_no_rule_is_about_them(tmp_path: Path) -> None:
     short = "def task_program():\n    say('hello')\n"
     mission, _ = ran(tmp_path, Followed((2.0, 3.0), None), short, rule('not tr.Exists(goto("vault"))'))
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
 
 
 # --- for Nav2

@@ -19,7 +19,7 @@ from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CancelledError, RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
-from codebotler.simulator.settings import PAPER
+from codebotler.simulator.settings import PAPER_SETTINGS
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from roboeval.suites.load import Suite
@@ -55,17 +55,17 @@ def worker() -> Iterator[Worker]:
 
 @pytest.mark.slow
 def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
-    as_written = replace(PAPER, literals="as-written")
+    as_written = replace(PAPER_SETTINGS, literals="as-written")
     model = open_recorded("recorded:careful")
     pairs = [
         (model.solution(task.prompts[0], 0).program, task.scenarios[0].world) for task in paper.tasks.values()
     ]
     assert len(pairs) == 16
-    expected = list(run(pairs, workers=1, rules=as_written))
+    expected = list(run(pairs, workers=1, settings=as_written))
     for (program, world), outcome in zip(pairs, expected, strict=True):
         robot = Simulated(world, speed=None, metres_per_second=math.inf)
         robot.connect()
-        adapted = LiveRobot(robot, Notes(), place=world.robot, clock_starts=PAPER.clock_starts)
+        adapted = LiveRobot(robot, Notes(), place=world.robot, clock_starts=PAPER_SETTINGS.clock_starts)
         found = worker.run_live(program, adapted)
         assert (found.status, found.error) == (outcome.status, outcome.error)
         assert found.trace == outcome.trace
@@ -102,7 +102,7 @@ def test_errors_reach_the_program_as_in_the_simulator(
     if caught:
         body = f"    go_to('{where}')\n    try: {call}\n    except Exception as e: say(str(e))\n"
     program = f"def task_program():\n{body}"
-    (expected,) = run([(program, WORLD)], workers=1, rules=replace(PAPER, literals="as-written"))
+    (expected,) = run([(program, WORLD)], workers=1, settings=replace(PAPER_SETTINGS, literals="as-written"))
     robot = Simulated(WORLD, speed=None)
     robot.connect()
     found = worker.run_live(program, LiveRobot(robot, Notes()))

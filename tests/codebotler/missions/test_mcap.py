@@ -16,8 +16,8 @@ import pytest
 from mcap.reader import make_reader
 
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import Line, Summary, events_of
-from codebotler.missions.mcap import Clock, export, write_mcap
+from codebotler.missions.log import LogLine, MissionSummary, read_events
+from codebotler.missions.mcap import TimeSource, export_mcap, write_mcap
 from codebotler.missions.mission import Mission
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
@@ -50,7 +50,7 @@ LEVELS = {"INFO": 2, "WARNING": 3, "ERROR": 4}
 
 
 @pytest.fixture(scope="module")
-def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[Summary, list[Line]]:
+def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[MissionSummary, list[LogLine]]:
     home = tmp_path_factory.mktemp("home")
     with Reservation(Simulated(WORLD, speed=None), home) as reserved:
         with Mission(home, "simulated", "bring tea") as mission:
@@ -60,7 +60,7 @@ def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[Summary, list[Lin
             mission.note("a word")
             mission.approve()
             mission.run(reserved)
-        return mission.summary, events_of(mission.folder)
+        return mission.summary, read_events(mission.folder)
 
 
 def read(data: bytes) -> list[tuple[str, dict[str, Any], dict[str, Any], int]]:
@@ -73,7 +73,7 @@ def read(data: bytes) -> list[tuple[str, dict[str, Any], dict[str, Any], int]]:
     return found
 
 
-def written(mission: tuple[Summary, list[Line]], clock: Clock = "wall") -> bytes:
+def written(mission: tuple[MissionSummary, list[LogLine]], clock: TimeSource = "wall") -> bytes:
     file = io.BytesIO()
     write_mcap(file, *mission, clock=clock)
     return file.getvalue()
@@ -95,7 +95,9 @@ def fits(value: object, schema: dict[str, Any]) -> bool:
     return isinstance(value, PLAIN[schema["type"]])
 
 
-def test_every_event_of_a_skill_is_a_message_of_its_topic(mission: tuple[Summary, list[Line]]) -> None:
+def test_every_event_of_a_skill_is_a_message_of_its_topic(
+    mission: tuple[MissionSummary, list[LogLine]],
+) -> None:
     messages = [(topic, m) for topic, _, m, _ in read(written(mission)) if topic.startswith("/skill/")]
     events = [line for line in mission[1] if "skill" in line]
     assert [(topic, m["event"], m["number"]) for topic, m in messages] == [
@@ -106,7 +108,7 @@ def test_every_event_of_a_skill_is_a_message_of_its_topic(mission: tuple[Summary
     assert [m.get("result") for m in asked] == [None, "Yes"]
 
 
-def test_every_message_is_as_its_schema_says(mission: tuple[Summary, list[Line]]) -> None:
+def test_every_message_is_as_its_schema_says(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     topics = {}
     for topic, schema, message, _ in read(written(mission)):
         assert fits(message, schema), (topic, message)
@@ -117,7 +119,9 @@ def test_every_message_is_as_its_schema_says(mission: tuple[Summary, list[Line]]
     assert "result" not in topics["/skill/go_to"]
 
 
-def test_log_lines_have_a_level_and_the_line_of_the_program(mission: tuple[Summary, list[Line]]) -> None:
+def test_log_lines_have_a_level_and_the_line_of_the_program(
+    mission: tuple[MissionSummary, list[LogLine]],
+) -> None:
     found = [
         (m["level"], m["file"], m["line"], m["message"])
         for m in messages_on("/mission/log", written(mission))
@@ -127,7 +131,7 @@ def test_log_lines_have_a_level_and_the_line_of_the_program(mission: tuple[Summa
     assert (LEVELS["ERROR"], "", 0, 'GoToInvalidLocation: there is no room "cellar"') in found
 
 
-def test_pose_and_frame_follow_the_robot_on_its_map(mission: tuple[Summary, list[Line]]) -> None:
+def test_pose_and_frame_follow_the_robot_on_its_map(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     data = written(mission)
     poses = messages_on("/robot/pose", data)
     places = [(p["pose"]["position"]["x"], p["pose"]["position"]["y"]) for p in poses]
@@ -139,8 +143,10 @@ def test_pose_and_frame_follow_the_robot_on_its_map(mission: tuple[Summary, list
     assert {(f["parent_frame_id"], f["child_frame_id"]) for f in frames} == {("map", "robot")}
 
 
-def test_robot_without_a_map_has_the_poses_that_it_reports(mission: tuple[Summary, list[Line]]) -> None:
-    lines: list[Line] = [
+def test_robot_without_a_map_has_the_poses_that_it_reports(
+    mission: tuple[MissionSummary, list[LogLine]],
+) -> None:
+    lines: list[LogLine] = [
         {
             "time": 1.0,
             "clock": 0.0,
@@ -159,7 +165,7 @@ def test_robot_without_a_map_has_the_poses_that_it_reports(mission: tuple[Summar
     assert messages_on("/rooms", data) == []
 
 
-def test_rooms_are_outlines_with_names(mission: tuple[Summary, list[Line]]) -> None:
+def test_rooms_are_outlines_with_names(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     (update,) = messages_on("/rooms", written(mission))
     entities = {entity["id"]: entity for entity in update["entities"]}
     assert {(entity["frame_id"], entity["texts"][0]["text"]) for entity in entities.values()} == {
@@ -170,7 +176,7 @@ def test_rooms_are_outlines_with_names(mission: tuple[Summary, list[Line]]) -> N
     assert tuple((point["x"], point["y"]) for point in outline["points"]) == KITCHEN.footprint
 
 
-def test_foxglove_knows_every_field_of_its_messages(mission: tuple[Summary, list[Line]]) -> None:
+def test_foxglove_knows_every_field_of_its_messages(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     json_format = pytest.importorskip("google.protobuf.json_format", reason="of a package for tests")
     seen = set()
     for schema, _, message in make_reader(io.BytesIO(written(mission))).iter_messages():
@@ -196,7 +202,7 @@ def with_protobuf_times(value: object) -> object:
     return {name: with_protobuf_times(one) for name, one in value.items()}
 
 
-def test_messages_are_timed_by_either_clock(mission: tuple[Summary, list[Line]]) -> None:
+def test_messages_are_timed_by_either_clock(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     summary, events = mission
     began = round(summary.created * 1e9)
     wall = [time for topic, *_, time in read(written(mission, "wall")) if topic.startswith("/skill/")]
@@ -209,7 +215,7 @@ def test_messages_are_timed_by_either_clock(mission: tuple[Summary, list[Line]])
     assert robot[-1] > 10e9 > wall[-1] - wall[0]
 
 
-def test_program_and_instruction_are_in_the_file(mission: tuple[Summary, list[Line]]) -> None:
+def test_program_and_instruction_are_in_the_file(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     reader = make_reader(io.BytesIO(written(mission)))
     (program,) = reader.iter_attachments()
     assert (program.name, program.media_type, program.data.decode()) == (
@@ -222,17 +228,17 @@ def test_program_and_instruction_are_in_the_file(mission: tuple[Summary, list[Li
     assert about.metadata["state"] == "done"
 
 
-def events_of_skill(skill: str, *calls: tuple[dict[str, object], object]) -> list[Line]:
+def events_of_skill(skill: str, *calls: tuple[dict[str, object], object]) -> list[LogLine]:
     """The events of calls of a skill, each with its arguments and its result."""
-    lines: list[Line] = []
+    lines: list[LogLine] = []
     for number, (arguments, result) in enumerate(calls, 1):
-        which: Line = {"time": float(number), "clock": 0.0, "number": number, "skill": skill}
+        which: LogLine = {"time": float(number), "clock": 0.0, "number": number, "skill": skill}
         lines.append({**which, "event": "skill", "arguments": arguments})
         lines.append({**which, "event": "result", "result": result})
     return lines
 
 
-def test_own_skills_keep_names_arguments_and_results(mission: tuple[Summary, list[Line]]) -> None:
+def test_own_skills_keep_names_arguments_and_results(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     given = {"event": "party", "coats": 2, "colours": ["red", "blue"], "is_wet": True, "text": "hi"}
     data = written((mission[0], events_of_skill("paint", (given, [0.5, 1]))))
     called, ended = messages_on("/skill/paint", data)
@@ -249,7 +255,7 @@ def test_own_skills_keep_names_arguments_and_results(mission: tuple[Summary, lis
     }
 
 
-def test_values_without_a_common_type_are_texts(mission: tuple[Summary, list[Line]]) -> None:
+def test_values_without_a_common_type_are_texts(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     calls: list[tuple[dict[str, object], object]]
     calls = [({"to": "door", "at": 1}, math.inf), ({"to": 3, "at": 0.5}, 2.5), ({"to": [], "at": 2}, None)]
     data = written((mission[0], events_of_skill("turn", *calls)))
@@ -265,9 +271,9 @@ def test_values_without_a_common_type_are_texts(mission: tuple[Summary, list[Lin
     assert b"Infinity" not in data
 
 
-def test_any_text_and_any_time_can_be_written(mission: tuple[Summary, list[Line]]) -> None:
+def test_any_text_and_any_time_can_be_written(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     odd = replace(mission[0], instruction="go \udcff there", reason="\ud800", program="say('\ud800')")
-    line: Line = {"time": 1.0, "clock": 1e300, "event": "log", "text": "\ud800"}
+    line: LogLine = {"time": 1.0, "clock": 1e300, "event": "log", "text": "\ud800"}
     ((topic, _, message, time),) = read(written((odd, [line]), "robot"))
     assert (topic, message["message"]) == ("/mission/log", "\\ud800")
     assert time < 2**63
@@ -275,35 +281,39 @@ def test_any_text_and_any_time_can_be_written(mission: tuple[Summary, list[Line]
     assert about.metadata["instruction"] == "go \\udcff there"
 
 
-def test_link_and_pipe_stay_what_they_are(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
+def test_link_and_pipe_stay_what_they_are(
+    mission: tuple[MissionSummary, list[LogLine]], tmp_path: Path
+) -> None:
     link, pipe = tmp_path / "link.mcap", tmp_path / "pipe"
     link.symlink_to("mission.mcap")
-    export(link, *mission, "wall")
+    export_mcap(link, *mission, "wall")
     assert link.is_symlink()
     assert (tmp_path / "mission.mcap").read_bytes() == written(mission)
     os.mkfifo(pipe)
     with ThreadPoolExecutor(1) as reader:
         got = reader.submit(pipe.read_bytes)
-        export(pipe, *mission, "wall")
+        export_mcap(pipe, *mission, "wall")
         assert got.result(30) == written(mission)
     assert pipe.is_fifo()
 
 
-def test_file_is_written_whole_or_not_at_all(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
+def test_file_is_written_whole_or_not_at_all(
+    mission: tuple[MissionSummary, list[LogLine]], tmp_path: Path
+) -> None:
     path = tmp_path / "mission.mcap"
-    export(path, *mission, "wall")
+    export_mcap(path, *mission, "wall")
     assert path.read_bytes() == written(mission)
     before = path.read_bytes()
     with pytest.raises(KeyError):
-        export(path, mission[0], [{"event": "state"}], "wall")
+        export_mcap(path, mission[0], [{"event": "state"}], "wall")
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["mission.mcap"]
 
 
-def test_no_other_file_is_touched(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
+def test_no_other_file_is_touched(mission: tuple[MissionSummary, list[LogLine]], tmp_path: Path) -> None:
     path, other = tmp_path / f"{'m' * 245}.mcap", tmp_path / f"{'m' * 245}.mcap.new"
     other.write_text("of the user")
-    export(path, *mission, "wall")
+    export_mcap(path, *mission, "wall")
     assert other.read_text() == "of the user"
     assert sorted(tmp_path.iterdir()) == [path, other]
     assert path.stat().st_mode == other.stat().st_mode

@@ -18,14 +18,22 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Room, World
 from codebotler.missions import mission as module
-from codebotler.missions.log import EVENTS, SUMMARY, TRANSITIONS, Line, State, Summary, events_of
-from codebotler.missions.mission import UNCONFIRMED, Mission, MissionError
-from codebotler.missions.store import find, missions, recover
+from codebotler.missions.log import (
+    EVENTS_FILE,
+    NEXT_STATES,
+    SUMMARY_FILE,
+    LogLine,
+    MissionState,
+    MissionSummary,
+    read_events,
+)
+from codebotler.missions.mission import UNCONFIRMED_STOP, Mission, MissionError
+from codebotler.missions.store import find_mission, read_missions, recover_missions
 from codebotler.robots.base import NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator import ledger
-from codebotler.simulator.pool import SHARED
+from codebotler.simulator.pool import SHARED_POOL
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from processes import are_gone, children_of
@@ -49,7 +57,7 @@ def home(tmp_path: Path) -> Path:
     return tmp_path / "home"
 
 
-def ready(home: Path, program: str = HELLO, told: Callable[[Line], None] = lambda _: None) -> Mission:
+def ready(home: Path, program: str = HELLO, told: Callable[[LogLine], None] = lambda _: None) -> Mission:
     """A mission that is approved."""
     mission = Mission(home, "answering", on_event=told)
     mission.draft(program)
@@ -68,7 +76,7 @@ def done(home: Path, robot: Robot, program: str = HELLO) -> Mission:
 def kinds(mission: Mission) -> list[str]:
     """What its events tell, in order: a state by its name."""
     return [
-        line["state"] if line["event"] == "state" else line["event"] for line in events_of(mission.folder)
+        line["state"] if line["event"] == "state" else line["event"] for line in read_events(mission.folder)
     ]
 
 
@@ -82,7 +90,7 @@ def test_mission_goes_through_its_states_and_writes_all_that_happens(home: Path)
     said = ["skill", "feedback", "result"]
     assert kinds(mission) == [*before, *said, *said, "done"]
     assert (robot.done, robot.connections) == (["hello", "bye"], 0)
-    (summary,) = missions(home)
+    (summary,) = read_missions(home)
     assert (summary.state, summary.program, summary.robot) == ("done", HELLO, "answering")
     assert summary.ended is not None
     assert summary.ended >= summary.created
@@ -92,8 +100,8 @@ def test_mission_goes_through_its_states_and_writes_all_that_happens(home: Path)
 def test_each_event_is_on_the_disk_before_it_is_told(home: Path) -> None:
     told: list[int] = []
 
-    def count(line: Line) -> None:
-        assert events_of(home / "missions" / mission.id)[-1] == json.loads(json.dumps(line))
+    def count(line: LogLine) -> None:
+        assert read_events(home / "missions" / mission.id)[-1] == json.loads(json.dumps(line))
         told.append(1)
 
     with Reservation(Answering(), home) as reserved, ready(home) as mission:
@@ -129,12 +137,12 @@ def test_illegal_steps_are_refused_with_a_sentence(home: Path, before: list[str]
     with Reservation(Answering(), home) as reserved, Mission(home, "answering") as mission:
         for step in before:
             STEP[step](mission, reserved)
-        state, events = mission.state, events_of(mission.folder)
+        state, events = mission.state, read_events(mission.folder)
         for step in refused:
             with pytest.raises(MissionError) as error:
                 STEP[step](mission, reserved)
             assert error.value.sentence.startswith(f"mission {mission.id} ")
-        assert (mission.state, events_of(mission.folder)) == (state, events)
+        assert (mission.state, read_events(mission.folder)) == (state, events)
 
 
 def test_running_mission_can_only_be_stopped(home: Path) -> None:
@@ -147,7 +155,7 @@ def test_running_mission_can_only_be_stopped(home: Path) -> None:
             with pytest.raises(MissionError, match="is running"):
                 STEP[step](mission, reserved)
         mission.stop()
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
 
 
 def test_program_with_problems_needs_a_word_about_them(home: Path) -> None:
@@ -157,8 +165,8 @@ def test_program_with_problems_needs_a_word_about_them(home: Path) -> None:
         with pytest.raises(MissionError, match="has problems"):
             mission.approve()
         mission.approve(despite_problems=True)
-        assert mission.state is State.APPROVED
-    assert Summary.read(mission.folder).problems == ("line 2: there is nobody",)
+        assert mission.state is MissionState.APPROVED
+    assert MissionSummary.read(mission.folder).problems == ("line 2: there is nobody",)
 
 
 @pytest.mark.parametrize(
@@ -177,15 +185,15 @@ def test_mission_that_is_left_has_ended(
         mission.draft(HELLO)
         if error:
             raise error
-    summary = Summary.read(mission.folder)
+    summary = MissionSummary.read(mission.folder)
     assert summary.state == state
     assert re.fullmatch(reason, summary.reason)
 
 
 def test_every_state_but_the_ends_has_a_way_out() -> None:
-    ends = set(State) - set(TRANSITIONS)
-    assert ends == {State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED}
-    assert all(TRANSITIONS.values())
+    ends = set(MissionState) - set(NEXT_STATES)
+    assert ends == {MissionState.DONE, MissionState.FAILED, MissionState.STOPPED, MissionState.INTERRUPTED}
+    assert all(NEXT_STATES.values())
 
 
 # --- ends
@@ -208,7 +216,7 @@ def test_mission_that_fails_says_why(
 ) -> None:
     robot = Answering(answer)
     mission = done(home, robot, program)
-    summary = Summary.read(mission.folder)
+    summary = MissionSummary.read(mission.folder)
     assert (summary.state, summary.line) == ("failed", line)
     assert re.match(reason, summary.reason)
     assert len(robot.done) < 2
@@ -225,7 +233,7 @@ def test_program_can_catch_what_the_robot_cannot_do(home: Path) -> None:
     program = "def task_program():\n    try: go_to('moon')\n    except Exception as e: say(str(e))\n"
     robot = Simulated(WORLD, speed=None)
     mission = done(home, robot, program)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     said, error = (event.text for event in mission.trace)
     assert said == "moon"
     assert '"moon"' in error
@@ -240,7 +248,7 @@ def running(mission: Mission, reserved: Reservation, until: str) -> Iterator[Non
     happened = threading.Event()
     thread = threading.Thread(target=mission.run, args=(reserved,))
 
-    def told(line: Line) -> None:
+    def told(line: LogLine) -> None:
         if line["event"] == until:
             happened.set()
 
@@ -271,7 +279,7 @@ def test_stop_ends_whatever_goes_on(home: Path, program: str, until: str) -> Non
     happened = kinds(mission)
     assert happened[-1] == "stopped"
     assert "skill" not in happened[happened.index("stop") :]
-    assert "by the test" in Summary.read(mission.folder).reason
+    assert "by the test" in MissionSummary.read(mission.folder).reason
     assert are_gone(children_of(os.getpid()) - before)
 
 
@@ -285,7 +293,7 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
             super().cancel()
             order.append("robot")
 
-    def told(line: Line) -> None:
+    def told(line: LogLine) -> None:
         if line["event"] == "skill":
             blocked.set()
             assert may_go_on.wait(30)
@@ -303,7 +311,7 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
         assert not stopping.done()
         may_go_on.set()
         stopping.result(30)
-        assert running.result(30) is State.STOPPED
+        assert running.result(30) is MissionState.STOPPED
     assert order[0] == "robot"
     assert "written" in order
     assert robot.done == []
@@ -324,7 +332,7 @@ def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Pat
         assert told.wait(30)
         return None
 
-    def hear(line: Line) -> None:
+    def hear(line: LogLine) -> None:
         if line.get("state") == "stopped":
             has_ended.set()
 
@@ -337,9 +345,9 @@ def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Pat
         running = threads.submit(mission.run, reserved)
         assert asked.wait(30)
         mission.stop("the test")
-        assert running.result(30) is State.STOPPED
+        assert running.result(30) is MissionState.STOPPED
     assert kinds(mission)[-4:] == ["late", "stop", "stopping", "stopped"]
-    (stop,) = [line for line in events_of(mission.folder) if line["event"] == "stop"]
+    (stop,) = [line for line in read_events(mission.folder) if line["event"] == "stop"]
     assert stop["by"] == "the test"
     assert 0 <= stop["seconds_to_cancel"] < 60
 
@@ -371,7 +379,7 @@ def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result:
 
 
 def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "GRACE", 0.3)
+    monkeypatch.setattr(module, "STOP_GRACE_SECONDS", 0.3)
     asked, may_answer = threading.Event(), threading.Event()
 
     def never(_skill: str, _first: str) -> RobotResult:
@@ -384,17 +392,17 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
         with running(mission, reserved, "skill"):
             assert asked.wait(30)
             mission.stop()
-        summary = Summary.read(mission.folder)
-        assert (summary.state, summary.reason) == ("failed", UNCONFIRMED)
-    before = events_of(mission.folder)
-    told: list[Line] = []
+        summary = MissionSummary.read(mission.folder)
+        assert (summary.state, summary.reason) == ("failed", UNCONFIRMED_STOP)
+    before = read_events(mission.folder)
+    told: list[LogLine] = []
     mission.on_event = told.append
     may_answer.set()
     threads = [thread for thread in threading.enumerate() if thread.name == mission.id]
     for thread in threads:
         thread.join(30)
     assert threads
-    assert events_of(mission.folder) == before, "what comes after the end is not written"
+    assert read_events(mission.folder) == before, "what comes after the end is not written"
     assert told == [], "nor told"
     assert robot.done == ["hello"]
 
@@ -402,7 +410,7 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
 def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "GRACE", 0.3)
+    monkeypatch.setattr(module, "STOP_GRACE_SECONDS", 0.3)
     may_go_on = threading.Event()
 
     class Blocked(Answering):
@@ -420,7 +428,7 @@ def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
     ):
         with running(mission, reserved, "skill"):
             stopping = threads.submit(mission.stop)
-        assert (mission.summary.state, mission.summary.reason) == ("failed", UNCONFIRMED)
+        assert (mission.summary.state, mission.summary.reason) == ("failed", UNCONFIRMED_STOP)
         may_go_on.set()
         assert isinstance(stopping.exception(30), MissionError)
 
@@ -487,12 +495,12 @@ def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.
         may_answer.wait(60)
         return None
 
-    monkeypatch.setattr(module, "GRACE", 0.3)
+    monkeypatch.setattr(module, "STOP_GRACE_SECONDS", 0.3)
     may_answer = threading.Event()
     with Reservation(Breaks(never), home) as reserved, ready(home) as mission:
         with running(mission, reserved, "skill"), pytest.raises(TypeError, match="no such motor"):
             mission.stop()
-        assert mission.summary.reason == UNCONFIRMED
+        assert mission.summary.reason == UNCONFIRMED_STOP
 
 
 def test_stop_before_it_runs_ends_it(home: Path) -> None:
@@ -519,7 +527,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
 
     monkeypatch.setattr(module, "Worker", Slow)
     with Reservation(Answering(), home) as reserved, ready(home) as mission:
-        assert mission.run(reserved) is State.STOPPED
+        assert mission.run(reserved) is MissionState.STOPPED
     assert begun == []
     assert "by the test" in mission.summary.reason
 
@@ -529,13 +537,13 @@ def test_stop_at_any_moment_ends_as_stopped(home: Path) -> None:
     for number in range(8):
         with Reservation(Answering(), home) as reserved, ready(home, STUBBORN) as mission:
             threading.Timer(0.25 * number, mission.stop).start()
-            state = State.STOPPED
-            while mission.state is State.APPROVED:
+            state = MissionState.STOPPED
+            while mission.state is MissionState.APPROVED:
                 try:
                     state = mission.run(reserved)
                 except MissionError:
                     break
-            assert state is State.STOPPED
+            assert state is MissionState.STOPPED
         assert kinds(mission)[-1] == "stopped"
 
 
@@ -553,7 +561,7 @@ def test_interrupted_run_stops_the_robot(home: Path, monkeypatch: pytest.MonkeyP
         monkeypatch.setattr(mission.stop_button, "ended", Interrupted())
         with pytest.raises(KeyboardInterrupt):
             mission.run(reserved)
-        assert mission.state is State.STOPPED
+        assert mission.state is MissionState.STOPPED
 
 
 # --- the disk
@@ -572,16 +580,16 @@ def test_events_that_cannot_be_written_stop_the_robot(home: Path, monkeypatch: p
         monkeypatch.setattr("codebotler.core.files.os.write", full)
         with pytest.raises(OSError, match="No space left") as error:
             mission.run(reserved)
-        assert error.value.filename == str(mission.folder / EVENTS)
+        assert error.value.filename == str(mission.folder / EVENTS_FILE)
         assert robot.done == ["hello"]
         assert robot.cancels
         monkeypatch.undo()
-    (left,) = recover(home)
+    (left,) = recover_missions(home)
     assert left.state == "interrupted"
 
 
 def test_what_watches_may_break_and_the_robot_stops(home: Path) -> None:
-    def told(line: Line) -> None:
+    def told(line: LogLine) -> None:
         if line["event"] == "result":
             raise BrokenPipeError
 
@@ -589,7 +597,7 @@ def test_what_watches_may_break_and_the_robot_stops(home: Path) -> None:
     with Reservation(robot, home) as reserved, ready(home) as mission:
         mission.on_event = told
         mission.run(reserved)
-    assert mission.state is State.FAILED
+    assert mission.state is MissionState.FAILED
     assert robot.done == ["hello"]
 
 
@@ -597,25 +605,25 @@ def test_missions_of_one_second_have_names_of_their_own(home: Path) -> None:
     with Mission(home, "a") as one, Mission(home, "b") as two, Mission(home, "c") as three:
         ids = [one.id, two.id, three.id]
     assert len(set(ids)) == 3
-    assert [summary.id for summary in missions(home)] == ids
-    assert find(home, ids[1]) == two.folder
-    assert find(home, "last") == three.folder
+    assert [summary.id for summary in read_missions(home)] == ids
+    assert find_mission(home, ids[1]) == two.folder
+    assert find_mission(home, "last") == three.folder
 
 
 @pytest.mark.parametrize("name", ["", "..", "../..", "20260101-000000", "/", "last"])
 def test_mission_that_is_not_there_is_said_so(home: Path, name: str) -> None:
     with pytest.raises(UserError, match=f'"{name}"' if name else "no mission"):
-        find(home, name)
+        find_mission(home, name)
 
 
 def test_summary_is_written_whole_or_not(home: Path) -> None:
     with Mission(home, "a") as mission:
-        before = (mission.folder / SUMMARY).read_text()
-        (mission.folder / f"{SUMMARY}.new").mkdir()
+        before = (mission.folder / SUMMARY_FILE).read_text()
+        (mission.folder / f"{SUMMARY_FILE}.new").mkdir()
         with pytest.raises(IsADirectoryError):
             mission.draft(HELLO)
-        assert (mission.folder / SUMMARY).read_text() == before
-        (mission.folder / f"{SUMMARY}.new").rmdir()
+        assert (mission.folder / SUMMARY_FILE).read_text() == before
+        (mission.folder / f"{SUMMARY_FILE}.new").rmdir()
 
 
 # --- two at a time
@@ -628,9 +636,9 @@ def test_robot_is_on_one_mission_at_a_time(home: Path) -> None:
         ready(home) as two,
         running(one, reserved, until="skill"),
     ):
-        with pytest.raises(NotReadyError, match="another mission"):
+        with pytest.raises(NotReadyError, match="already run a mission"):
             two.run(reserved)
-        assert two.state is State.APPROVED
+        assert two.state is MissionState.APPROVED
         with pytest.raises(NotReadyError, match=f"process {os.getpid()}, since") as error:
             Reservation(Simulated(WORLD), home).__enter__()
         assert "another tool" in error.value.sentence
@@ -669,7 +677,7 @@ def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
 @pytest.fixture(autouse=True)
 def no_threads_are_left() -> Iterator[None]:
     yield
-    checking = () if SHARED.pool is None else SHARED.pool._threads._threads
+    checking = () if SHARED_POOL.pool is None else SHARED_POOL.pool._threads._threads
     for thread in threading.enumerate():
         if (
             thread is not threading.main_thread()

@@ -13,10 +13,10 @@ from mcap.reader import make_reader
 
 from codebotler.missions import pictures as module
 from codebotler.missions.live import LiveRobot
-from codebotler.missions.log import Line, State, events_of
+from codebotler.missions.log import LogLine, MissionState, read_events
 from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import Mission
-from codebotler.missions.pictures import Pictures, picture_of
+from codebotler.missions.pictures import PictureStore, read_picture
 from codebotler.missions.wording import event_text
 from codebotler.robots.base import CameraPicture, Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.reservation import Reservation
@@ -41,13 +41,13 @@ class Showing(Answering):
         return super().perform(skill, arguments, told)
 
 
-def mission_with(home: Path, *pictures: bytes) -> tuple[Mission, list[Line]]:
+def mission_with(home: Path, *pictures: bytes) -> tuple[Mission, list[LogLine]]:
     with Reservation(Showing(*pictures), home) as reserved, Mission(home, "showing") as mission:
         mission.draft(PROGRAM)
         mission.check([])
         mission.approve()
         mission.run(reserved)
-    return mission, [line for line in events_of(mission.folder) if line["event"] == "picture"]
+    return mission, [line for line in read_events(mission.folder) if line["event"] == "picture"]
 
 
 def test_pictures_are_kept_as_they_came_and_named(tmp_path: Path) -> None:
@@ -61,10 +61,10 @@ def test_pictures_are_kept_as_they_came_and_named(tmp_path: Path) -> None:
 
 
 def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_BYTES", 20)
-    monkeypatch.setattr(module, "MOST_IN_ALL", 2 * len(JPEG))
+    monkeypatch.setattr(module, "MAX_STORED_PICTURE_BYTES", 20)
+    monkeypatch.setattr(module, "MAX_MISSION_PICTURE_BYTES", 2 * len(JPEG))
     mission, lines = mission_with(tmp_path, b"<svg onload=alert(1)>", b"", JPEG + b"!" * 20, JPEG, JPEG, JPEG)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     kept = [line.get("file") or line["text"] for line in lines]
     assert kept[3:5] == ["pictures/1.jpg", "pictures/2.jpg"]
     for text, named in zip(
@@ -72,19 +72,19 @@ def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         [["21 bytes", "JPEG nor PNG"], ["0 bytes", "JPEG nor PNG"], ["32 bytes", "20"], ["24 bytes"]],
         strict=True,
     ):
-        assert all(name in text for name in ["picture", "not kept", *named]), text
+        assert all(name in text for name in ["picture", "not stored", *named]), text
     assert event_text(lines[0]) == lines[0]["text"]
 
 
 def test_picture_that_cannot_be_written_stops_the_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(_self: Pictures, _data: bytes) -> dict[str, str]:
+    def full(_self: PictureStore, _data: bytes) -> dict[str, str]:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Pictures, "keep", full)
+    monkeypatch.setattr(PictureStore, "keep", full)
     mission, _ = mission_with(tmp_path, JPEG)
-    assert (mission.state, "No space left on device" in mission.summary.reason) == (State.FAILED, True)
+    assert (mission.state, "No space left on device" in mission.summary.reason) == (MissionState.FAILED, True)
 
 
 def test_picture_goes_to_whoever_takes_notes() -> None:
@@ -105,16 +105,16 @@ def test_picture_goes_to_whoever_takes_notes() -> None:
 def test_name_that_leads_elsewhere_is_no_picture(tmp_path: Path, name: object) -> None:
     mission, (line,) = mission_with(tmp_path, JPEG)
     (tmp_path / "secret.jpg").write_bytes(JPEG)
-    assert picture_of(mission.folder, line) == ("jpg", JPEG)
-    assert picture_of(mission.folder, {**line, "file": name}) is None
-    assert picture_of(mission.folder, {**line, "event": "log"}) is None
+    assert read_picture(mission.folder, line) == ("jpg", JPEG)
+    assert read_picture(mission.folder, {**line, "file": name}) is None
+    assert read_picture(mission.folder, {**line, "event": "log"}) is None
 
 
 def test_pictures_are_images_for_foxglove(tmp_path: Path) -> None:
     mission, lines = mission_with(tmp_path, JPEG, b"none", PNG)
     assert len(lines) == 3
     file = io.BytesIO()
-    write_mcap(file, mission.summary, events_of(mission.folder), folder=mission.folder)
+    write_mcap(file, mission.summary, read_events(mission.folder), folder=mission.folder)
     reader = make_reader(io.BytesIO(file.getvalue()))
     found = list(reader.iter_messages(["/skill/is_in_room/picture"]))
     for (schema, channel, message), line, data, kind in zip(

@@ -19,10 +19,10 @@ from codebotler.cli.run import Request
 from codebotler.cli.run import run as run_mission
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Room, World
-from codebotler.missions.log import State, events_of
+from codebotler.missions.log import MissionState, read_events
 from codebotler.missions.mission import Mission
-from codebotler.missions.preflight import preflight, rooms_to_check, unknown_rooms
-from codebotler.missions.store import missions
+from codebotler.missions.preflight import ask_rooms, limit_rooms, unknown_rooms
+from codebotler.missions.store import read_missions
 from codebotler.models.base import Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
@@ -51,7 +51,7 @@ def knowing(rooms: object, here: object = "") -> Callable[[str, str], RobotResul
 )
 def test_answer_that_is_none_is_said_before_the_robot_moves(rooms: object, here: object, named: str) -> None:
     with pytest.raises(NotReadyError, match=named):
-        preflight(Answering(knowing(rooms, here)), print)
+        ask_rooms(Answering(knowing(rooms, here)), print)
 
 
 def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
@@ -62,7 +62,7 @@ def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
             raise RobotError("GetCurrentLocationFailed", "not localised")
         return ["hall", "lab"]
 
-    plan, place = preflight(Answering(answers), print)
+    plan, place = ask_rooms(Answering(answers), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab"), "hall", "")
     assert re.fullmatch(r"[^\n]*where it is\b[^\n]*: not localised\n", capsys.readouterr().out)
@@ -70,7 +70,7 @@ def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
 
 def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
     with pytest.raises(NotReadyError, match=r"rooms .*stopped"):
-        preflight(Answering(raising(CancelledError())), print)
+        ask_rooms(Answering(raising(CancelledError())), print)
 
 
 @pytest.mark.parametrize("fault", [None, ImportError("a library failed to import")])
@@ -130,7 +130,7 @@ def nobody(_name: str) -> Writing:
 
 
 def test_a_check_sees_the_robots_own_words() -> None:
-    plan, place = preflight(Answering(knowing(["hall", LAB], LAB)), print)
+    plan, place = ask_rooms(Answering(knowing(["hall", LAB], LAB)), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", LAB), LAB, LAB)
     assert check(TO_THE_LAB, room_map=plan).problems == ()
@@ -177,15 +177,15 @@ def test_a_rule_with_a_misspelt_room_lets_no_mission_begin(tmp_path: Path, *, an
     else:
         with pytest.raises(UserError, match=r"bobs office.*bob's office"):
             run_mission(robot, request, tmp_path, nobody)
-        (mission,) = missions(tmp_path)
-        assert (mission.state, robot.connections) == (State.FAILED, 0)
+        (mission,) = read_missions(tmp_path)
+        assert (mission.state, robot.connections) == (MissionState.FAILED, 0)
         assert robot.done == ["get_all_rooms", "get_current_location"], "it has not moved"
 
 
 def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
     robot = Simulated(World((Room("hall"), Room("kitchen|cafe")), "hall"), speed=None)
     robot.connect()
-    plan, _ = preflight(robot, print)
+    plan, _ = ask_rooms(robot, print)
     assert plan is not None
     assert plan.room("the cafe") == "kitchen|cafe"
 
@@ -193,7 +193,7 @@ def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
 def test_robot_is_where_it_says_even_if_it_does_not_list_that_room(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    plan, place = preflight(Answering(knowing(["hall", "lab"], "dock")), print)
+    plan, place = ask_rooms(Answering(knowing(["hall", "lab"], "dock")), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab", "dock"), "dock", "dock")
     assert '"dock"' in capsys.readouterr().out
@@ -208,12 +208,12 @@ def test_what_is_odd_about_a_robot_is_told_to_who_runs_it(
     robot = Answering(knowing(["hall", "lab"], "dock"))
     assert run_mission(robot, Request(str(tmp_path / "go.py"), yes=True), tmp_path, nobody) == 0
     assert '"dock"' in capsys.readouterr().err
-    (mission,) = missions(tmp_path)
-    assert any('"dock"' in line.get("text", "") for line in events_of(tmp_path / "missions" / mission.id))
+    (mission,) = read_missions(tmp_path)
+    assert any('"dock"' in line.get("text", "") for line in read_events(tmp_path / "missions" / mission.id))
 
 
 def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
-    plan, place = preflight(Answering(knowing(["hall", "lab"])), print)
+    plan, place = ask_rooms(Answering(knowing(["hall", "lab"])), print)
     assert plan is not None
     assert (plan.start, place) == ("hall", "")
 
@@ -221,14 +221,14 @@ def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
 def test_more_rooms_than_a_check_takes_are_said(capsys: pytest.CaptureFixture[str]) -> None:
     rooms = [f"room {number} (of many)" for number in range(100_000)]
     began = time.monotonic()
-    plan, place = preflight(Answering(knowing(rooms, rooms[7])), print)
+    plan, place = ask_rooms(Answering(knowing(rooms, rooms[7])), print)
     assert place == rooms[7]
-    assert rooms_to_check(plan, print) is None
+    assert limit_rooms(plan, print) is None
     assert time.monotonic() - began < 2, "that is no more than a look at each"
     assert re.search(r"\b100,000 rooms\b.*\b1,000\b", capsys.readouterr().out)
-    plan, _ = preflight(Answering(knowing(rooms[:1_000], rooms[7])), print)
+    plan, _ = ask_rooms(Answering(knowing(rooms[:1_000], rooms[7])), print)
     assert plan is not None
-    assert rooms_to_check(plan, print) is plan
+    assert limit_rooms(plan, print) is plan
 
 
 def test_place_of_a_mission_is_in_the_robots_own_words(
@@ -236,7 +236,7 @@ def test_place_of_a_mission_is_in_the_robots_own_words(
 ) -> None:
     places: list[str] = []
 
-    def run(mission: Mission, reserved: Reservation, place: str = "", **rules: Any) -> State:  # noqa: ANN401 - passed on
+    def run(mission: Mission, reserved: Reservation, place: str = "", **rules: Any) -> MissionState:  # noqa: ANN401 - passed on
         places.append(place)
         return real(mission, reserved, place, **rules)
 

@@ -13,17 +13,17 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.missions.log import EVENTS, Line, State
+from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import Order
+from codebotler.missions.view import MissionOrder
 from codebotler.missions.wording import event_text
 from codebotler.models.recorded import open_recorded as recorded
 from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import NO_GOAL, NO_ROOM, Rule
+from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
 from codebotler.simulator.sampled_robot import RoomMap
 from doubles import Answering
 
@@ -61,21 +61,21 @@ def ran(
     rooms: RoomMap = ROOMS,
     *,
     place: str = "hall",
-) -> tuple[Mission, list[Line]]:
+) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
     mission.draft(program)
     mission.check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
         mission.run(reserved, place, rules=rules, room_map=rooms)
-    lines = (mission.folder / EVENTS).read_text().splitlines()
+    lines = (mission.folder / EVENTS_FILE).read_text().splitlines()
     return mission, [json.loads(line) for line in lines]
 
 
 def test_the_robot_is_not_told_what_a_rule_forbids_and_the_mission_stops(tmp_path: Path) -> None:
     robot = answering()
     mission, lines = ran(tmp_path, robot, STUBBORN, [VAULT])
-    assert (mission.state, mission.summary.reason) == (State.STOPPED, "stopped by rule vault")
+    assert (mission.state, mission.summary.reason) == (MissionState.STOPPED, "stopped by rule vault")
     assert robot.done == ["kitchen"]
     assert robot.cancels
     (told,) = [line for line in lines if line["event"] == "rule"]
@@ -113,7 +113,7 @@ def test_a_refusal_is_logged_and_the_program_may_go_on(tmp_path: Path) -> None:
     )
     robot = answering()
     mission, lines = ran(tmp_path, robot, program, [refusing])
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     assert robot.done == ["RuleViolation", "kitchen"]
     assert [line["prevented"] for line in lines if line["event"] == "rule"] == [True]
 
@@ -123,7 +123,7 @@ def test_what_an_answer_breaks_stops_the_mission_right_after_it(tmp_path: Path) 
     robot = answering(lambda skill, _: False if skill == "is_in_room" else None)
     program = "def task_program():\n    is_in_room('person')\n    say('hello?')\n"
     mission, lines = ran(tmp_path, robot, program, [rule])
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert robot.done == ["person"]
     assert [line["prevented"] for line in lines if line["event"] == "rule"] == [False]
 
@@ -132,7 +132,7 @@ def test_what_an_answer_breaks_stops_the_mission_right_after_it(tmp_path: Path) 
 def test_a_rule_of_the_end_is_reported_and_changes_nothing(tmp_path: Path, said: str) -> None:
     program = f"def task_program():\n    say('{said}')\n"
     mission, lines = ran(tmp_path, answering(), program, [REPORT])
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     unkept = 'the rule "report" is not kept at the end: Say that it is done'
     assert mission.summary.reason == ("" if said == "done" else unkept)
     assert [line["rule"] for line in lines if line["event"] == "rule"] == ["report"] * (said != "done")
@@ -145,7 +145,7 @@ def test_every_room_that_a_request_may_mean_counts(tmp_path: Path, request_: str
     rule = Rule("vault", VAULT.says, parse('not tr.Exists(goto("^the vault$"))'))
     rooms = [rule] if "the vault" in request_.lower() else [VAULT]
     mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", rooms)
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert robot.done == []
 
 
@@ -154,7 +154,7 @@ def test_a_room_is_the_one_where_a_request_leads(tmp_path: Path) -> None:
     rooms = RoomMap(("hall", "room 1", "room 10"), "hall", plain=True)
     silent = Rule("ten", "Say nothing in room 10.", parse('not tr.Exists(at("room 10", say(".*")))'))
     program = "def task_program():\n    go_to('{}')\n    say('hello')\n"
-    for room, state in (("room 10", State.STOPPED), ("room 1", State.DONE)):
+    for room, state in (("room 10", MissionState.STOPPED), ("room 1", MissionState.DONE)):
         mission, _ = ran(tmp_path / room[-2:], answering(), program.format(room), [silent], rooms)
         assert mission.state is state, room
 
@@ -171,10 +171,11 @@ def told_room(room: str | None) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("where", "state"), [(None, State.STOPPED), ("lab", State.DONE), ("lab 2", State.STOPPED)]
+    ("where", "state"),
+    [(None, MissionState.STOPPED), ("lab", MissionState.DONE), ("lab 2", MissionState.STOPPED)],
 )
 def test_where_a_drive_may_have_led_counts_unless_the_robot_tells(
-    tmp_path: Path, where: str | None, state: State
+    tmp_path: Path, where: str | None, state: MissionState
 ) -> None:
     robot = answering(lambda skill, _: told_room(where) if skill == "get_current_location" else None)
     program = "def task_program():\n    go_to('the lab 2, at the window')\n    say('hello')\n"
@@ -206,7 +207,7 @@ def test_robot_is_asked_once_and_only_if_a_rule_depends_on_it(tmp_path: Path, ru
         return "lab" if skill == "get_current_location" else None
 
     mission, _ = ran(tmp_path, answering(answer), THREE, [rule], LABS)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     assert calls.count("get_current_location") == asked
 
 
@@ -221,7 +222,7 @@ def test_mission_stops_and_says_why_if_nobody_knows_the_room(tmp_path: Path, *, 
     robot = answering(answer)
     rule = Rule("quiet", IN_LAB_2.says, IN_LAB_2.formula, refuse=refuse)
     mission, lines = ran(tmp_path, robot, THREE.replace("say('one')", CAUGHT), [rule], LABS)
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert calls == ["go_to", "get_current_location"]
     assert robot.cancels
     (line,) = [line for line in lines if line["event"] == "rule"]
@@ -229,7 +230,7 @@ def test_mission_stops_and_says_why_if_nobody_knows_the_room(tmp_path: Path, *, 
         "quiet",
         ["say", "one"],
         True,
-        NO_ROOM,
+        UNKNOWN_ROOM,
     )
     assert line["why"] in event_text(line)
 
@@ -248,11 +249,11 @@ def test_mission_stops_after_a_drive_if_nobody_knows_which_room_was_meant(
 
     robot = answering(answer)
     mission, lines = ran(tmp_path, robot, THREE, [AFTER_LAB], LABS)
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert robot.cancels
     assert [line["event"] for line in lines].count("skill") == 1
     (line,) = [line for line in lines if line["event"] == "rule"]
-    assert (line["rule"], line["prevented"], line["why"]) == ("after", False, NO_GOAL)
+    assert (line["rule"], line["prevented"], line["why"]) == ("after", False, AMBIGUOUS_GOAL)
 
 
 def test_failed_drive_to_one_room_needs_no_question(tmp_path: Path) -> None:
@@ -261,12 +262,16 @@ def test_failed_drive_to_one_room_needs_no_question(tmp_path: Path) -> None:
 
     program = "def task_program():\n    try: go_to('lab')\n    except Exception: pass\n"
     mission, _ = ran(tmp_path, answering(answer), program, [AFTER_LAB], LABS)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
 
 
 def test_room_at_the_start_is_asked_for_if_a_rule_depends_on_it(tmp_path: Path) -> None:
     program = "def task_program():\n    say('hello')\n"
-    for where, state in ((None, State.STOPPED), ("lab 2", State.STOPPED), ("lab", State.DONE)):
+    for where, state in (
+        (None, MissionState.STOPPED),
+        ("lab 2", MissionState.STOPPED),
+        ("lab", MissionState.DONE),
+    ):
         robot = answering(lambda skill, _: told_room(where) if skill == "get_current_location" else None)  # noqa: B023 - at once
         mission, _ = ran(tmp_path / str(where), robot, program, [IN_LAB_2], LABS, place="")
         assert mission.state is state, where
@@ -281,13 +286,13 @@ def test_rule_of_the_end_is_not_kept_if_nobody_knows_the_room(tmp_path: Path) ->
         return told_room(None) if skill == "get_current_location" else None
 
     mission, lines = ran(tmp_path, answering(answer), THREE, [end], LABS)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     assert calls.count("get_current_location") == 1
     assert [line["rule"] for line in lines if line["event"] == "rule"] == ["end"]
 
 
 def test_robot_that_lists_no_rooms_is_judged_by_the_words_of_drives(tmp_path: Path) -> None:
-    for room, state in (("lab 2", State.STOPPED), ("lab", State.DONE)):
+    for room, state in (("lab 2", MissionState.STOPPED), ("lab", MissionState.DONE)):
         mission = Mission(tmp_path / room, "robot")
         mission.draft(f"def task_program():\n    go_to('{room}')\n    say('hello')\n")
         mission.check([])
@@ -304,7 +309,7 @@ def test_a_robot_that_tells_of_a_room_which_nobody_meant_is_there(tmp_path: Path
         robot = answering(lambda skill, _: where if skill == "get_current_location" else None)  # noqa: B023 - at once
         program = f"def task_program():\n    go_to({request_!r})\n    say('hello')\n"
         mission, _ = ran(tmp_path / where.strip(), robot, program, [IN_LAB_2], LABS)
-        assert mission.state is State.STOPPED, request_
+        assert mission.state is MissionState.STOPPED, request_
 
 
 def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: Path) -> None:
@@ -318,7 +323,7 @@ def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: 
     )
     program = "def task_program():\n    try: go_to('hall by the lab')\n    except Exception: say('hello')\n"
     mission, _ = ran(tmp_path, answering(answer), program, [tried], LABS)
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
 
 
 def test_a_drive_that_failed_began_where_the_robot_was(tmp_path: Path) -> None:
@@ -327,7 +332,7 @@ def test_a_drive_that_failed_began_where_the_robot_was(tmp_path: Path) -> None:
 
     back = Rule("back", "Stay in lab 2.", parse('not tr.Exists(at("lab 2", goto(".*")))'))
     program = "def task_program():\n    try: go_to('lab 2')\n    except Exception: pass\n"
-    for again, state in (("", State.DONE), ("    go_to('hall')\n", State.STOPPED)):
+    for again, state in (("", MissionState.DONE), ("    go_to('hall')\n", MissionState.STOPPED)):
         mission, _ = ran(tmp_path / state, answering(answer), program + again, [back], LABS)
         assert mission.state is state
 
@@ -370,12 +375,12 @@ def test_a_skill_of_a_user_that_moves_the_robot_moves_it_for_rules_too(
     program = f"def task_program():\n    {call}\n    say('hello')\n"
     mission, lines = ran(tmp_path, robot, program, [rule], rooms)
     assert [line["event"] for line in lines].count("skill") == done
-    assert mission.state is (State.DONE if done == 2 else State.STOPPED)
+    assert mission.state is (MissionState.DONE if done == 2 else MissionState.STOPPED)
 
 
-@pytest.mark.parametrize(("where", "state"), [(None, State.STOPPED), ("hall", State.DONE)])
+@pytest.mark.parametrize(("where", "state"), [(None, MissionState.STOPPED), ("hall", MissionState.DONE)])
 def test_a_robot_may_be_anywhere_between_after_a_drive_that_failed(
-    tmp_path: Path, where: str | None, state: State
+    tmp_path: Path, where: str | None, state: MissionState
 ) -> None:
     def answer(skill: str, _: str) -> RobotResult:
         if skill == "go_to":
@@ -393,7 +398,7 @@ def test_where_the_robot_starts_is_no_request(tmp_path: Path) -> None:
     rule = Rule("bob", "Say nothing at Bob's.", parse('not tr.Exists(at("bob\'s office", say(".*")))'))
     program = "def task_program():\n    say('hello')\n"
     mission, _ = ran(tmp_path, answering(), program, [rule], rooms, place="bob's office")
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
 
 
 def test_what_is_carried_counts_on_the_simulated_robot(tmp_path: Path) -> None:
@@ -401,7 +406,7 @@ def test_what_is_carried_counts_on_the_simulated_robot(tmp_path: Path) -> None:
     rule = Rule("glass", "No glass leaves the hall.", parse('not tr.Exists(holding("glass", goto(".*")))'))
     program = "def task_program():\n    go_to('hall')\n    pick('glass')\n    go_to('kitchen')\n"
     mission, lines = ran(tmp_path, Simulated(world, speed=None), program, [rule])
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert [line["arguments"] for line in lines if line["event"] == "skill"][-1] == {"obj": "glass"}
 
 
@@ -414,7 +419,7 @@ def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: 
     robot = knowing("hall")
     rule = Rule("acme", "Stay out.", parse('not tr.Exists(goto("acme inc[.]"))'))
     mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], REGEXES)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     assert robot.done[0] == "acme inc"
 
 
@@ -432,7 +437,7 @@ def test_a_room_whose_name_is_a_regex_counts_by_the_words_of_the_request_too(
 ) -> None:
     rule = Rule("lab", "Take nothing in lab 3.", parse(formula))
     program = "def task_program():\n    go_to('lab {}')\n    pick('knife')\n"
-    for number, state in ((3, State.STOPPED), (4, State.DONE)):
+    for number, state in ((3, MissionState.STOPPED), (4, MissionState.DONE)):
         mission, _ = ran(tmp_path / str(number), answering(), program.format(number), [rule], REGEXES)
         assert mission.state is state
 
@@ -442,7 +447,7 @@ def test_an_answer_is_judged_as_the_option_that_it_means(tmp_path: Path) -> None
     robot = answering(lambda skill, _: "\tNo\n" if skill == "ask" else None)
     program = "def task_program():\n    say(ask('ann', 'Tea?', ['yes', 'no']))\n"
     mission, _ = ran(tmp_path, robot, program, [rule])
-    assert mission.state is State.STOPPED
+    assert mission.state is MissionState.STOPPED
     assert robot.done == ["ann"]
 
 
@@ -453,13 +458,18 @@ def test_rules_hold_in_a_building_of_more_rooms_than_a_check_takes(tmp_path: Pat
     robot = knowing(*rooms.rooms)
     program = "def task_program():\n    go_to('into the vault')\n"
     session = MissionSession(
-        robot, tmp_path, Order(program=program), open_model=recorded, check=checker(SKILLS), rules=(rule,)
+        robot,
+        tmp_path,
+        MissionOrder(program=program),
+        open_model=recorded,
+        check=checker(SKILLS),
+        rules=(rule,),
     )
     session.start()
     view = session.wait_until(lambda now: now.may_be_approved)
     assert any("1,502 rooms" in remark for remark in view.remarks)
     session.approve(view.digest, despite_problems=True)
-    assert session.wait_until(lambda _: False).state is State.STOPPED
+    assert session.wait_until(lambda _: False).state is MissionState.STOPPED
     assert "into the vault" not in robot.done
 
 
@@ -467,7 +477,7 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
     session = MissionSession(
         knowing("hall", "vault"),
         tmp_path,
-        Order(program=STUBBORN),
+        MissionOrder(program=STUBBORN),
         open_model=recorded,
         check=checker(SKILLS),
         rules=(VAULT,),
@@ -486,7 +496,7 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
 
 
 def test_a_rule_that_was_switched_off_is_in_force_for_what_a_model_writes_next(tmp_path: Path) -> None:
-    order = Order(next(iter(recorded("recorded").replies)), "recorded")
+    order = MissionOrder(next(iter(recorded("recorded").replies)), "recorded")
     session = MissionSession(
         knowing("hall", "vault"), tmp_path, order, open_model=recorded, check=checker(SKILLS), rules=(VAULT,)
     )

@@ -12,21 +12,28 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender
-from codebotler.missions.log import EVENTS, SUMMARY, State, Summary, events_of, log_of
+from codebotler.missions.log import (
+    EVENTS_FILE,
+    SUMMARY_FILE,
+    MissionState,
+    MissionSummary,
+    open_log,
+    read_events,
+)
 from codebotler.missions.mission import Mission
-from codebotler.missions.store import missions, recover
+from codebotler.missions.store import read_missions, recover_missions
 
 IF_TOOL_DIES = "its worker cancelled the goal"
 
 
-def left(home: Path, state: State, *events: dict[str, object], torn: str = "") -> Path:
+def left(home: Path, state: MissionState, *events: dict[str, object], torn: str = "") -> Path:
     """The folder of a mission that nobody has open."""
     folder = home / "missions" / "20260102-030405"
     folder.mkdir(parents=True)
-    summary = Summary(folder.name, state, "ros1", 1_000.0, if_tool_dies=IF_TOOL_DIES)
+    summary = MissionSummary(folder.name, state, "ros1", 1_000.0, if_tool_dies=IF_TOOL_DIES)
     summary.write(folder)
     lines = [json.dumps({"time": 1_000.0 + n, "clock": n / 2, **event}) for n, event in enumerate(events)]
-    (folder / EVENTS).write_text("".join(f"{line}\n" for line in lines) + torn)
+    (folder / EVENTS_FILE).write_text("".join(f"{line}\n" for line in lines) + torn)
     return folder
 
 
@@ -44,43 +51,43 @@ THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "r
 @pytest.mark.parametrize(
     ("state", "events", "named"),
     [
-        (State.DRAFTING, [], ["drafting", "not moved"]),
-        (State.APPROVED, [], ["approved", "not moved"]),
-        (State.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen")', "(at (1.0, 2.0))", IF_TOOL_DIES]),
-        (State.STOPPING, [RUNNING, DRIVE], ['go_to("kitchen"); ', IF_TOOL_DIES]),
-        (State.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot was idle"]),
+        (MissionState.DRAFTING, [], ["drafting", "not moved"]),
+        (MissionState.APPROVED, [], ["approved", "not moved"]),
+        (MissionState.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen")', "(at (1.0, 2.0))", IF_TOOL_DIES]),
+        (MissionState.STOPPING, [RUNNING, DRIVE], ['go_to("kitchen"); ', IF_TOOL_DIES]),
+        (MissionState.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot was idle"]),
     ],
 )
 def test_mission_of_a_tool_that_died_was_interrupted(
-    tmp_path: Path, state: State, events: list[dict[str, object]], named: list[str]
+    tmp_path: Path, state: MissionState, events: list[dict[str, object]], named: list[str]
 ) -> None:
     folder = left(tmp_path, state, *events, torn='{"time": 17')
-    (summary,) = recover(tmp_path)
+    (summary,) = recover_missions(tmp_path)
     assert summary.state == "interrupted"
     assert all(name in summary.reason for name in named), summary.reason
-    assert Summary.read(folder) == summary
-    *before, last = events_of(folder)
+    assert MissionSummary.read(folder) == summary
+    *before, last = read_events(folder)
     assert [line["event"] for line in before] == [event["event"] for event in events]
     assert (last["state"], last["reason"]) == ("interrupted", summary.reason)
     assert last["clock"] == (before[-1]["clock"] if before else 0)
-    assert recover(tmp_path) == []
+    assert recover_missions(tmp_path) == []
 
 
 def test_mission_that_ended_before_its_summary_was_written_is_not_interrupted(tmp_path: Path) -> None:
     end: dict[str, object] = {"event": "state", "state": "failed", "reason": "odd"}
-    folder = left(tmp_path, State.RUNNING, RUNNING, end)
-    assert recover(tmp_path) == []
-    summary = Summary.read(folder)
+    folder = left(tmp_path, MissionState.RUNNING, RUNNING, end)
+    assert recover_missions(tmp_path) == []
+    summary = MissionSummary.read(folder)
     assert (summary.state, summary.reason, summary.ended) == ("failed", "odd", 1001.0)
 
 
 def test_mission_of_a_living_tool_is_left_alone(tmp_path: Path) -> None:
     with Mission(tmp_path, "simulated") as mission:
-        assert recover(tmp_path) == []
-        assert mission.state is State.DRAFTING
+        assert recover_missions(tmp_path) == []
+        assert mission.state is MissionState.DRAFTING
         with pytest.raises(BlockingIOError):
-            log_of(mission.folder)
-    assert recover(tmp_path) == []
+            open_log(mission.folder)
+    assert recover_missions(tmp_path) == []
 
 
 @pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOSPC])
@@ -88,29 +95,29 @@ def test_mission_that_cannot_be_closed_is_told_and_others_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], number: int
 ) -> None:
     for name in ("20260101-000001", "20260101-000002"):
-        left(tmp_path, State.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
+        left(tmp_path, MissionState.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
 
-    def open_log(folder: Path) -> Appender:
+    def open_second(folder: Path) -> Appender:
         if folder.name.endswith("1"):
-            raise OSError(number, os.strerror(number), str(folder / EVENTS))
-        return log_of(folder)
+            raise OSError(number, os.strerror(number), str(folder / EVENTS_FILE))
+        return open_log(folder)
 
-    monkeypatch.setattr("codebotler.missions.store.log_of", open_log)
-    (summary,) = recover(tmp_path)
+    monkeypatch.setattr("codebotler.missions.store.open_log", open_second)
+    (summary,) = recover_missions(tmp_path)
     assert summary.state == "interrupted"
     unclosed, closed = capsys.readouterr().err.splitlines()
     assert "20260101-000001" in unclosed
     assert os.strerror(number) in unclosed
     assert " was interrupted: " in closed
-    assert [summary.state for summary in missions(tmp_path)] == ["running", "interrupted"]
+    assert [summary.state for summary in read_missions(tmp_path)] == ["running", "interrupted"]
 
 
 def test_missions_come_in_their_order(tmp_path: Path) -> None:
-    assert missions(tmp_path) == []
+    assert read_missions(tmp_path) == []
     for name in ("b", "a"):
         with Mission(tmp_path, name):
             time.sleep(0.01)
-    assert [summary.robot for summary in missions(tmp_path)] == ["b", "a"]
+    assert [summary.robot for summary in read_missions(tmp_path)] == ["b", "a"]
 
 
 WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
@@ -125,12 +132,12 @@ WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
     ],
 )
 def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
-    folder = left(tmp_path, State.DONE)
-    (folder / SUMMARY).write_text(text)
+    folder = left(tmp_path, MissionState.DONE)
+    (folder / SUMMARY_FILE).write_text(text)
     with pytest.raises(UserError, match="not the summary") as error:
-        missions(tmp_path)
-    assert error.value.file == folder / SUMMARY
-    assert recover(tmp_path) == [], "a robot can work nevertheless"
+        read_missions(tmp_path)
+    assert error.value.file == folder / SUMMARY_FILE
+    assert recover_missions(tmp_path) == [], "a robot can work nevertheless"
 
 
 @pytest.mark.parametrize(
@@ -142,16 +149,16 @@ def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None
     ],
 )
 def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
-    folder = left(tmp_path, State.DONE, RUNNING)
-    with (folder / EVENTS).open("a") as file:
+    folder = left(tmp_path, MissionState.DONE, RUNNING)
+    with (folder / EVENTS_FILE).open("a") as file:
         file.write(f"{text}\n")
     with pytest.raises(UserError, match=r"JSON|not an event") as error:
-        events_of(folder)
-    assert (error.value.file, error.value.line) == (folder / EVENTS, 2)
+        read_events(folder)
+    assert (error.value.file, error.value.line) == (folder / EVENTS_FILE, 2)
 
 
 def test_summary_of_a_later_version_is_read(tmp_path: Path) -> None:
-    folder = left(tmp_path, State.DONE)
-    data = json.loads((folder / SUMMARY).read_text())
-    (folder / SUMMARY).write_text(json.dumps({**data, "colour": "red"}))
-    assert missions(tmp_path)[0].state == "done"
+    folder = left(tmp_path, MissionState.DONE)
+    data = json.loads((folder / SUMMARY_FILE).read_text())
+    (folder / SUMMARY_FILE).write_text(json.dumps({**data, "colour": "red"}))
+    assert read_missions(tmp_path)[0].state == "done"

@@ -45,8 +45,8 @@ def test_limits_are_those_of_the_code() -> None:
         f"at most {MAX_LABEL_CHARACTERS} characters",
         f"from a score of {MIN_SCORE} on",
         f"temperature={DETECTOR_SETTINGS.temperature:g}, timeout={DETECTOR_SETTINGS.timeout:g}",
-        f"more than {missionpictures.MOST_BYTES // 10**6} MB is left out",
-        f"beyond {missionpictures.MOST_IN_ALL // 10**6} MB in one mission",
+        f"more than {missionpictures.MAX_STORED_PICTURE_BYTES // 10**6} MB is left out",
+        f"beyond {missionpictures.MAX_MISSION_PICTURE_BYTES // 10**6} MB in one mission",
     ):
         assert told in TEXT, told
     listed = re.search(r"with the encoding (.*?)\. They", TEXT)

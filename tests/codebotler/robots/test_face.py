@@ -16,7 +16,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
 from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType
 from codebotler.core.world import Room, World
-from codebotler.missions.log import State, events_of
+from codebotler.missions.log import MissionState, read_events
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import missing_skills
 from codebotler.robots.base import AnswerError, CancelledError, Options, RobotArgument
@@ -289,13 +289,13 @@ def run(home: Path, program: str, seconds: float, does: Callable[[Mission, Face]
 
 def test_a_mission_speaks_and_hears(tmp_path: Path) -> None:
     mission = run(tmp_path, TEA, LONG, lambda _, face: face.answer(question_of(face).number, 0))
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     assert [(event.kind, event.text, event.answer) for event in mission.trace] == [
         ("say", "Good morning", None),
         ("ask", "Tea?", "Yes"),
         ("say", "She says Yes", None),
     ]
-    events = [line["event"] for line in events_of(mission.folder) if line["event"] not in {"state", "log"}]
+    events = [line["event"] for line in read_events(mission.folder) if line["event"] not in {"state", "log"}]
     assert events == ["skill", "feedback", "result"] * 3
 
 
@@ -306,18 +306,18 @@ def test_a_mission_that_is_stopped_while_it_asks(tmp_path: Path) -> None:
         assert face.shown.question is None
 
     mission = run(tmp_path, TEA, LONG, stop)
-    assert mission.state == State.STOPPED
+    assert mission.state == MissionState.STOPPED
     assert "by a test" in mission.summary.reason
-    assert "cancelled" in [line["event"] for line in events_of(mission.folder)]
+    assert "cancelled" in [line["event"] for line in read_events(mission.folder)]
 
 
 def test_a_program_can_catch_that_nobody_answers(tmp_path: Path) -> None:
     mission = run(tmp_path, PATIENT, 0.05, lambda _mission, _face: None)
-    assert mission.state is State.DONE
+    assert mission.state is MissionState.DONE
     silence = rf'{ASK_TIMEOUT}: .*"Tea\?" .*0\.05 s'
     assert re.match(silence, mission.trace[-1].text)
     failed = run(tmp_path, TEA, 0.05, lambda _mission, _face: None)
-    assert failed.state is State.FAILED
+    assert failed.state is MissionState.FAILED
     assert re.match(silence, failed.summary.reason)
-    (error,) = [line for line in events_of(failed.folder) if line["event"] == "error"]
+    (error,) = [line for line in read_events(failed.folder) if line["event"] == "error"]
     assert error["kind"] == ASK_TIMEOUT

@@ -24,15 +24,15 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.live import LiveRobot
-from codebotler.missions.log import State
+from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Mission
-from codebotler.missions.preflight import preflight
+from codebotler.missions.preflight import ask_rooms
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError
 from codebotler.robots.open import check_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATED_RULES
+from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATION
 from codebotler.rtl import parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.house_rule import Rule
@@ -107,10 +107,10 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
         if not scenario.world.may_wait_forever
     ]
     pairs = [(program, world) for _, program, world in tasks]
-    expected = list(run(pairs, workers=1, rules=SIMULATED_RULES))
+    expected = list(run(pairs, workers=1, settings=SIMULATION))
     manipulating = set()
     for (name, program, world), outcome in zip(tasks, expected, strict=True):
-        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=SIMULATED_RULES.clock_starts)
+        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=SIMULATION.clock_starts)
         found = worker.run_live(program, robot)
         assert (found.status, found.error) == (outcome.status, outcome.error), name
         assert found.trace == outcome.trace, name
@@ -497,7 +497,7 @@ def test_it_is_listed() -> None:
 
 
 def test_rooms_are_regexes_for_the_check_as_in_its_world() -> None:
-    plan, place = preflight(connected(World((Room("hall"), Room("kitchen|cafe")), "hall")), print)
+    plan, place = ask_rooms(connected(World((Room("hall"), Room("kitchen|cafe")), "hall")), print)
     assert plan is not None
     assert (plan.room("the cafe"), place) == ("kitchen|cafe", "hall")
 
@@ -514,8 +514,8 @@ def test_rules_about_where_it_is_hold_along_its_own_way(
     mission.check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission:
-        room_map, place = preflight(robot, mission.note, world)
+        room_map, place = ask_rooms(robot, mission.note, world)
         rules = [Rule("never", "Never be there.", formula)]
         assert not check(mission.summary.program, room_map=room_map, house_rules=rules).problems or is_stopped
         mission.run(reserved, place, rules=rules, room_map=room_map)
-    assert mission.state is (State.STOPPED if is_stopped else State.DONE)
+    assert mission.state is (MissionState.STOPPED if is_stopped else MissionState.DONE)

@@ -13,7 +13,7 @@ from types import CodeType
 import pytest
 
 from codebotler.checking.check import check, check_on
-from codebotler.simulator.pool import SHARED, WorkerPool, shared_pool
+from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.process import bytecode
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
@@ -125,7 +125,7 @@ def test_an_interrupt_ends_the_pool_of_the_process_and_the_next_check_has_anothe
         patch.setattr(WorkerPool, "call", interrupted)
         with pytest.raises(KeyboardInterrupt):
             check(PROGRAM)
-    assert SHARED.pool is None
+    assert SHARED_POOL.pool is None
     assert check(PROGRAM).problems == ()
     assert shared_pool() is not before
 

@@ -22,9 +22,9 @@ from codebotler.core.skills.table import Parameter, Recording, Skill, SkillTable
 from codebotler.core.skills.values import TEXT_TYPE
 from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key_of
+from codebotler.simulator.batches.replay import Replay, Transcript, key_of, parse_transcript
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
-from codebotler.simulator.pool import FEW, LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool
+from codebotler.simulator.pool import MAX_BATCH_KEYS, MAX_KEYS_AHEAD, MIN_BATCH_KEYS, DistinctKeys, WorkerPool
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
@@ -62,8 +62,8 @@ def started(worker: Worker) -> Iterator[Worker]:
     worker.close()
 
 
-def robot(world: World = WORLD, rules: SimulationSettings = RULES) -> SimulatedRobot:
-    return SimulatedRobot(world, rules)
+def robot(world: World = WORLD, settings: SimulationSettings = RULES) -> SimulatedRobot:
+    return SimulatedRobot(world, settings)
 
 
 def job(program: str, worlds: Sequence[World] = WORLDS) -> Job:
@@ -303,8 +303,8 @@ def test_few_outcomes_are_remembered_and_no_long_ones(
 ) -> None:
     known: dict[object, object] = {}
     monkeypatch.setattr("codebotler.simulator.batches.replay.REPLAYED", known)
-    monkeypatch.setattr("codebotler.simulator.batches.replay.MOST_REMEMBERED", 5)
-    monkeypatch.setattr("codebotler.simulator.batches.replay.LONGEST_REMEMBERED", 100)
+    monkeypatch.setattr("codebotler.simulator.batches.replay.MAX_REPLAYS", 5)
+    monkeypatch.setattr("codebotler.simulator.batches.replay.MAX_REPLAY_BYTES", 100)
     worker.run_all([job(saying(str(number)), [WORLD]) for number in range(23)])
     assert len(known) == 23 % 5
     worker.run_all([job(saying("x" * 100), [WORLD])])
@@ -551,10 +551,12 @@ def test_a_child_that_is_not_believed_ends_at_once(monkeypatch: pytest.MonkeyPat
 # --- replay
 
 
-def follow(calls: object, order: object, moments: object = (), rules: SimulationSettings = RULES) -> Replay:
-    transcript = decoded(json.dumps([calls, order, moments, {"end": "finished"}]).encode())
+def follow(
+    calls: object, order: object, moments: object = (), settings: SimulationSettings = RULES
+) -> Replay:
+    transcript = parse_transcript(json.dumps([calls, order, moments, {"end": "finished"}]).encode())
     assert transcript is not None
-    replay = Replay(robot(rules=rules))
+    replay = Replay(robot(settings=settings))
     replay.follow(transcript)
     return replay
 
@@ -580,13 +582,13 @@ REFUSED: dict[str, Callable[[], object]] = {
     "an answer of later": lambda: follow(
         [["get_current_location", [], "ok", "lab"], ["go_to", ["lab"], "ok", None]], [0, 1]
     ),
-    "a call that is beyond a limit": lambda: follow([A], [0, 0, 0], rules=TIGHT),
-    "a call after a limit": lambda: follow([A, ["say", ["a"], "stop", None]], [0, 0, 1, 1], rules=TIGHT),
-    "a call after a text that was too long": lambda: follow([A, LONG], [1, 0], rules=TIGHT),
-    "a call after the time": lambda: follow([A], [0, 0], [[1, 11.0]], rules=TIGHT),
-    "a call after a stop for time": lambda: follow([A, STOPPED], [1, 0], [[0, 11.0]], rules=TIGHT),
+    "a call that is beyond a limit": lambda: follow([A], [0, 0, 0], settings=TIGHT),
+    "a call after a limit": lambda: follow([A, ["say", ["a"], "stop", None]], [0, 0, 1, 1], settings=TIGHT),
+    "a call after a text that was too long": lambda: follow([A, LONG], [1, 0], settings=TIGHT),
+    "a call after the time": lambda: follow([A], [0, 0], [[1, 11.0]], settings=TIGHT),
+    "a call after a stop for time": lambda: follow([A, STOPPED], [1, 0], [[0, 11.0]], settings=TIGHT),
     "a call for an answer after a limit": lambda: follow(
-        [LONG, ["say", ["a"], "ask", None]], [0, 1], rules=TIGHT
+        [LONG, ["say", ["a"], "ask", None]], [0, 1], settings=TIGHT
     ),
     "an unknown skill": lambda: follow([["fly", ["a"], "ok", None]], [0]),
     "an unknown skill that is never called": lambda: follow([A, ["fly", ["a"], "ok", None]], [0]),
@@ -610,7 +612,7 @@ REFUSED: dict[str, Callable[[], object]] = {
         [["is_in_room", ["unicorn"], "ok", False]],
         [0] * 60,
         [[59, 11.0]],
-        rules=SimulationSettings(limits=Limits(seconds=10)),
+        settings=SimulationSettings(limits=Limits(seconds=10)),
     ),
     "time that goes back": lambda: follow([A], [0, 0, 0], [[1, 2.0], [2, 1.0]]),
 }
@@ -660,14 +662,14 @@ def test_replay_does_what_was_done() -> None:
 def test_replay_reaches_the_limits_that_were_reached(calls: object, order: object, moments: object) -> None:
     ledger = follow(calls, order, moments, TIGHT).ledger
     assert ledger.limit is not None
-    outcome = ledger.ended({"end": "finished"})
+    outcome = ledger.outcome_at_end({"end": "finished"})
     assert (outcome.status, outcome.error) == (Status.TIMEOUT, RunError("TimeoutError", ledger.limit))
 
 
 def test_a_robot_of_ones_own_kind_performs_every_call(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.ledger.FEW", 0)
+    monkeypatch.setattr("codebotler.simulator.ledger.UNREMEMBERED_CALLS", 0)
     performed: list[str] = []
 
     class Noting(SimulatedRobot):
@@ -744,11 +746,11 @@ HISTORIES: dict[str, list[Call]] = {
 def test_what_was_done_before_is_done_again_in_the_same_way(
     history: list[Call], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.ledger.FEW", 0)
-    rules = SimulationSettings(limits=Limits(trace=250_000))
+    monkeypatch.setattr("codebotler.simulator.ledger.UNREMEMBERED_CALLS", 0)
+    settings = SimulationSettings(limits=Limits(trace=250_000))
     told = []
     for kind in (Ledger, RememberingLedger):
-        ledger = kind(SimulatedRobot(WORLD, rules))
+        ledger = kind(SimulatedRobot(WORLD, settings))
         answers = []
         for now, skill, arguments in history:
             ledger.let_time_pass(now)
@@ -759,7 +761,7 @@ def test_what_was_done_before_is_done_again_in_the_same_way(
 
 @pytest.mark.parametrize(("few", "performed"), [(0, 1), (50, 51)])
 def test_a_thousand_looks_cost_one(monkeypatch: pytest.MonkeyPatch, few: int, performed: int) -> None:
-    monkeypatch.setattr("codebotler.simulator.ledger.FEW", few)
+    monkeypatch.setattr("codebotler.simulator.ledger.UNREMEMBERED_CALLS", few)
     perform = Mock(return_value=False)
     monkeypatch.setattr(SimulatedRobot, "perform", perform)
     looking = SimulatedRobot(WORLD)
@@ -871,7 +873,7 @@ def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
     assert [number for call in calls for number in call] == list(range(300))
     sizes = list(map(len, calls))
     assert sizes[:-1] == sorted(sizes[:-1])
-    assert (sizes[0], max(sizes)) == (FEW, LARGEST)
+    assert (sizes[0], max(sizes)) == (MIN_BATCH_KEYS, MAX_BATCH_KEYS)
 
 
 def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
@@ -901,8 +903,8 @@ def test_batches_grow_at_first_and_shrink_at_the_end(width: int) -> None:
     top = sizes.index(max(sizes))
     assert sizes[: top + 1] == sorted(sizes[: top + 1])
     assert sizes[top:-1] == sorted(sizes[top:-1], reverse=True)
-    assert (sizes[0], max(sizes)) == (FEW, LARGEST)
-    assert sizes[-1] <= FEW
+    assert (sizes[0], max(sizes)) == (MIN_BATCH_KEYS, MAX_BATCH_KEYS)
+    assert sizes[-1] <= MIN_BATCH_KEYS
 
 
 def test_few_keys_are_spread_over_all_calls() -> None:
@@ -913,10 +915,18 @@ def test_few_keys_are_spread_over_all_calls() -> None:
 
 def test_keys_are_read_a_little_ahead_and_no_further_than_somebody_takes_them() -> None:
     keys = DistinctKeys(iter([1, 1, 2, 1, 3, 2, *range(4, 10_000)]), in_two_bytes)
-    assert list(keys.batch(1).values()) == list(range(1, 1 + FEW))
-    assert [int.from_bytes(name) for name in keys.waiting] == [1, 1, 2, 1, 3, 2, *range(4, 1 + FEW)]
+    assert list(keys.batch(1).values()) == list(range(1, 1 + MIN_BATCH_KEYS))
+    assert [int.from_bytes(name) for name in keys.waiting] == [
+        1,
+        1,
+        2,
+        1,
+        3,
+        2,
+        *range(4, 1 + MIN_BATCH_KEYS),
+    ]
     while keys.batch(1):
         pass
-    assert len(keys.waiting) == MOST_AHEAD
+    assert len(keys.waiting) == MAX_KEYS_AHEAD
     keys.waiting.clear()
-    assert len(keys.batch(1)) == LARGEST
+    assert len(keys.batch(1)) == MAX_BATCH_KEYS

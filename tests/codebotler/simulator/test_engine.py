@@ -25,7 +25,7 @@ from codebotler.core.world import Room, World
 from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
 from codebotler.simulator.ledger import SkillAnswer
-from codebotler.simulator.pool import FEW, WorkerPool
+from codebotler.simulator.pool import MIN_BATCH_KEYS, WorkerPool
 from codebotler.simulator.process import bytecode, spawn
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.fork_server_client import BatchServer
@@ -133,7 +133,7 @@ def test_the_pool_of_the_process_is_tried_again_where_it_could_not_start(
     def fails(_: BatchServer) -> None:
         raise LostProcessError("no memory")
 
-    monkeypatch.setattr(pool, "SHARED", shared := pool.SharedPool())
+    monkeypatch.setattr(pool, "SHARED_POOL", shared := pool.SharedPool())
     with monkeypatch.context() as broken:
         broken.setattr(BatchServer, "_set_up", fails)
         with pytest.raises(EngineError, match="cannot start"):
@@ -276,10 +276,10 @@ def task_program():
 def test_outcome_depends_neither_on_workers_nor_on_the_start_nor_on_what_ran_before() -> None:
     programs = [UNSTEADY.replace("NUMBER", f"unseen_{number}") for number in range(10, 22)]
     pairs = [(program, WORLD) for program in programs]
-    first = list(run(pairs, workers=1, rules=AS_WRITTEN))
-    assert list(run(pairs, workers=4, rules=AS_WRITTEN)) == first
+    first = list(run(pairs, workers=1, settings=AS_WRITTEN))
+    assert list(run(pairs, workers=4, settings=AS_WRITTEN)) == first
     before = [(saying("x" * number), WORLD) for number in range(5)]
-    assert list(run([*before, *reversed(pairs)], workers=1, rules=AS_WRITTEN))[5:] == first[::-1]
+    assert list(run([*before, *reversed(pairs)], workers=1, settings=AS_WRITTEN))[5:] == first[::-1]
     assert len({tuple(said(outcome)[:-1]) for outcome in first}) == 1
     assert len(said(first[0])) == 14
 
@@ -317,10 +317,12 @@ def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
 
 
 LONG_RUNS = [
-    *((saying(str(number)), WORLD) for number in range(FEW)),  # the first batch, whose results come at once
+    *(
+        (saying(str(number)), WORLD) for number in range(MIN_BATCH_KEYS)
+    ),  # the first batch, whose results come at once
     *(
         (f"def task_program():\n    sum(range(10**12))\n    say('{number}')\n", WORLD)
-        for number in range(2 * FEW)
+        for number in range(2 * MIN_BATCH_KEYS)
     ),
 ]
 
@@ -454,7 +456,7 @@ def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_an
 
 
 def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.simulator.process.isolated_process.LONGEST", 1.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.MAX_WAIT_SECONDS", 1.0)
 
     def slow(robot: SimulatedRobot, message: str) -> None:
         time.sleep(2.5)
@@ -556,7 +558,7 @@ def test_suite_sets_the_limits() -> None:
         "for i in range(3): say('abcde')": "texts of more than 12 characters in all",
     }
     pairs = ((f"def task_program():\n    {body}\n", WORLD) for body in bodies)
-    outcomes = run(pairs, workers=1, rules=SimulationSettings(limits=limits))
+    outcomes = run(pairs, workers=1, settings=SimulationSettings(limits=limits))
     assert [outcome.error.message for outcome in outcomes if outcome.error] == list(bodies.values())
 
 

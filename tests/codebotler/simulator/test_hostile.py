@@ -322,7 +322,7 @@ def reach(
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            "codebotler.simulator.process.preparer_client.SERVES", 10_000
+            "codebotler.simulator.process.preparer_client.MAX_PREPARED", 10_000
         )  # one that is replaced would look new
         yield reach
     for pid in carry_the_marker():  # a test has failed; nothing of it stays
@@ -406,7 +406,7 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
 def test_program_that_is_silent_for_too_long_is_ended_though_it_computes(
     reach: Reach, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.process.isolated_process.LONGEST", 0.5)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.MAX_WAIT_SECONDS", 0.5)
     outcome = reach.run("def task_program():\n    sum(range(10**12))\n")
     assert outcome.status is Status.TIMEOUT
     assert outcome.error is not None

@@ -206,15 +206,17 @@ AS_HAPPENED = SimulationSettings(literals="as-written", events="as-happened")
 
 
 @pytest.mark.parametrize(
-    ("rules", "name"),
+    ("settings", "name"),
     [(AS_WRITTEN, "^mug$"), (AS_HAPPENED, "^cup[|]mug$")],
     ids=["as-requested", "as-happened"],
 )
-def test_a_thing_whose_name_is_a_regex_counts_as_it_is_recorded(rules: SimulationSettings, name: str) -> None:
+def test_a_thing_whose_name_is_a_regex_counts_as_it_is_recorded(
+    settings: SimulationSettings, name: str
+) -> None:
     world = World((Room("hall", ("cup|mug",)), Room("office")), "hall")
 
     def guarded(formula: str) -> SimulatedRobot:
-        return SimulatedRobot(world, rules, guard=RuleGuard([rule(formula)]))
+        return SimulatedRobot(world, settings, guard=RuleGuard([rule(formula)]))
 
     assert not refused(guarded(f'not tr.Exists(pick("{name}"))'), "pick", "mug").is_late
     for formula, skill, request in (
@@ -234,9 +236,9 @@ def test_a_room_is_without_a_word_if_none_of_its_names_has_it() -> None:
     refused(one, "go_to", "lab 4")
 
 
-@pytest.mark.parametrize("rules", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
-def test_a_drive_that_fails_has_happened(rules: SimulationSettings) -> None:
-    one = SimulatedRobot(WORLD, rules, guard=RuleGuard([rule('not tr.AtLeast(goto(".*"), 2)')]))
+@pytest.mark.parametrize("settings", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
+def test_a_drive_that_fails_has_happened(settings: SimulationSettings) -> None:
+    one = SimulatedRobot(WORLD, settings, guard=RuleGuard([rule('not tr.AtLeast(goto(".*"), 2)')]))
     with pytest.raises(RobotError, match="attic"):
         one.perform("go_to", ["attic"])
     refused(one, "go_to", "office")
@@ -266,7 +268,7 @@ def swap_for(sim: Simulation, what: str) -> None:
 """
 
 
-@pytest.mark.parametrize("rules", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
+@pytest.mark.parametrize("settings", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
 @pytest.mark.parametrize(
     ("calls", "formula", "breaks"),
     [
@@ -285,12 +287,12 @@ def swap_for(sim: Simulation, what: str) -> None:
     ],
 )
 def test_what_a_skill_of_a_user_does_inside_counts(
-    tmp_path: Path, rules: SimulationSettings, calls: list[str], formula: str, *, breaks: bool
+    tmp_path: Path, settings: SimulationSettings, calls: list[str], formula: str, *, breaks: bool
 ) -> None:
     (tmp_path / "own.py").write_text(OWN)
     skills = skills_from(tmp_path / "own.py")
     guard = RuleGuard([Rule("own", "So it is.", parse(formula, skills=skills))])
-    one = SimulatedRobot(WORLD, rules, skills, guard=guard)
+    one = SimulatedRobot(WORLD, settings, skills, guard=guard)
     *first, (skill, _, argument) = (call.partition(" ") for call in calls)
     for name, _, given_ in first:
         one.perform(name, [given_])

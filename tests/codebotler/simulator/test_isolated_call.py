@@ -19,7 +19,7 @@ from codebotler.core.program import FILE, LONGEST_PROGRAM
 from codebotler.prompts.extract import program_in, program_of
 from codebotler.simulator.isolated_call import IsolatedCallError, end_all
 from codebotler.simulator.worker import EngineError
-from roboeval.mutation.program_tree import apply_edit, read
+from roboeval.mutation.program_tree import apply_edit, parse_tree
 from roboeval.training.rollouts import Rollout, judge
 
 TASK = "def task_program():\n    say('hello')\n"
@@ -84,7 +84,7 @@ def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
 
 def test_process_that_cannot_start_is_no_fault_of_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
     end_all()
-    monkeypatch.setattr("codebotler.simulator.isolated_call.CODE", "raise SystemExit(1)")
+    monkeypatch.setattr("codebotler.simulator.isolated_call.SERVE_CODE", "raise SystemExit(1)")
     with pytest.raises(EngineError):
         closed.echo("a")
 
@@ -139,7 +139,7 @@ def test_programs_of_others_are_never_compiled_in_this_process() -> None:
     assert [problem.line for problem in check(TASK + "return\n").problems] == [3]
     assert program_of(f"Here:\n```\n{TASK}```\n").source == TASK
     assert program_in(TASK) == TASK
-    tree = read(TASK)
+    tree = parse_tree(TASK)
     assert tree is not None
     assert apply_edit(tree, {}) == "def task_program():\n    say('hello')"
     (whole, cut) = judge([Rollout("CountRooms", 0, 0, one) for one in (TASK, TASK + "return\n")])

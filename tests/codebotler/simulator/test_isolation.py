@@ -31,7 +31,7 @@ programs = [
     "import os, signal\\ndef task_program():\\n    " + body.replace("PARENT", str(os.getpid()))
     for body in json.loads(sys.argv[1])
 ]
-outcomes = run([(p, world) for p in programs], workers=1, rules=SimulationSettings(literals="as-written"),
+outcomes = run([(p, world) for p in programs], workers=1, settings=SimulationSettings(literals="as-written"),
                require_isolation=True)
 print(os.geteuid(), json.dumps([outcome_data(outcome) for outcome in outcomes]))
 """
@@ -145,12 +145,13 @@ def test_programs_are_kept_in_whoever_runs_the_engine(
 
 BELOW_A_FILTER = """
 import ctypes, platform, struct, sys
-from codebotler.simulator.sandbox.isolation import ALLOW, DENY, EQUAL, FIRST_ARGUMENT, LOAD, NUMBER, RETURN
+from codebotler.simulator.sandbox.isolation import ALLOW, DENY, EQUAL, FIRST_ARGUMENT, LOAD, RETURN
+from codebotler.simulator.sandbox.isolation import SYSCALL_NUMBER
 from codebotler.simulator.sandbox.isolation import PR_SET_SECCOMP, install, refuse_new_rights
 
 prctl, seccomp = {"x86_64": (157, 317), "aarch64": (167, 277)}[platform.machine()]
 code = [
-    (LOAD, 0, 0, NUMBER),
+    (LOAD, 0, 0, SYSCALL_NUMBER),
     (EQUAL, 4, 0, seccomp),
     (EQUAL, 0, 2, prctl),
     (LOAD, 0, 0, FIRST_ARGUMENT),

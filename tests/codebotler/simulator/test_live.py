@@ -16,18 +16,18 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.sandbox import LIVE_SERVER, PROGRAM
-from codebotler.simulator.settings import ENDLESS, PAPER
+from codebotler.simulator.settings import ENDLESS, PAPER_SETTINGS
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 
-LIVE = replace(PAPER, literals="as-written", limits=ENDLESS)
+LIVE = replace(PAPER_SETTINGS, literals="as-written", limits=ENDLESS)
 
 
 class Machine:
     """A robot that takes two seconds by its own clock for each skill, and waits for nothing in truth."""
 
     def __init__(self, does: Callable[[str], Result] = lambda _: None) -> None:
-        self.rules, self.skills = LIVE, SKILLS
+        self.settings, self.skills = LIVE, SKILLS
         self.is_live, self.now = True, 0.0
         self.done: list[str] = []
         self.does = does
@@ -125,7 +125,7 @@ def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
 def test_program_may_compute_for_long_if_it_acts_in_between(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.process.isolated_process.LONGEST", 3.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.MAX_WAIT_SECONDS", 3.0)
     program = (
         "def task_program():\n"
         "    for i in range(20):\n"

@@ -401,5 +401,5 @@ def test_events_say_where_they_happen_and_where_drives_lead() -> None:
 
 
 def test_rules_are_the_suites_own() -> None:
-    rules = SimulationSettings(literals="as-written")
-    assert SimulatedRobot(World((Room("a"),), "a"), rules).rules is rules
+    settings = SimulationSettings(literals="as-written")
+    assert SimulatedRobot(World((Room("a"),), "a"), settings).settings is settings

@@ -15,7 +15,7 @@ from codebotler.core.trace import Option
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.sampled_robot import RoomMap, SampledRobot, Whereabouts, meant
+from codebotler.simulator.sampled_robot import RoomMap, SampledRobot, Whereabouts, normalized
 
 ROOMS = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")
 YES_NO = (Option("Yes"), Option("No"))
@@ -120,9 +120,9 @@ def test_all_words_for_people_mean_the_same() -> None:
     for number in range(10):
         robot = robot_in(sample=number)
         assert len({look(robot, word) for word in ("person", "Somebody", "any person", "a human", "")}) == 1
-    assert meant("The  Mug") == "mug"
-    assert meant("another person") == meant("anyone")
-    assert meant("anne") == "anne"
+    assert normalized("The  Mug") == "mug"
+    assert normalized("another person") == normalized("anyone")
+    assert normalized("anne") == "anne"
 
 
 def test_a_thing_is_nobody() -> None:
@@ -167,7 +167,7 @@ def test_what_it_never_looked_for_is_as_the_program_takes_it() -> None:
         robot.perform("pick", ["stapler"])
         assert robot.perform("ask", ["alice", "Tea?", YES_NO]) in {0, 1}
         assert look(robot, "person") is True
-        fact = Whereabouts("alice", "kitchen", is_there=True, by_lot=False)
+        fact = Whereabouts("alice", "kitchen", is_there=True, is_random=False)
         assert fact in robot.facts
         assert fact.sentence == '"alice" is in "kitchen"'
 
@@ -213,7 +213,7 @@ def test_strict_draws_what_the_program_takes_for_granted() -> None:
                 ended.add("done")
             except RobotError as error:
                 ended.add(error.kind)
-        assert all(fact.by_lot for fact in robot.facts)
+        assert all(fact.is_random for fact in robot.facts)
     assert picked == {"done", "PickInvalidObject"}
     assert answered == {"done", "AskNoPerson"}
 
@@ -418,4 +418,4 @@ def test_a_draw_knows_in_which_worlds_it_would_be_the_same() -> None:
         other = robot_in(sample=number)
         same = look(other, "mug") == look(robot, "mug")
         same &= other.perform("ask", ["", "Tea?", YES_NO]) == robot.perform("ask", ["", "Tea?", YES_NO])
-        assert all(draw.is_drawn_by(other.sampler) for draw in robot.draws) is same
+        assert all(draw.holds_in(other.sampler) for draw in robot.draws) is same

@@ -42,9 +42,9 @@ def all_of(*tables: dict[str, tuple[str, object]]) -> dict[str, str]:
     return {name: program for table in tables for name, (program, _) in table.items()}
 
 
-def run_all(programs: dict[str, str], rules: SimulationSettings) -> Outcomes:
+def run_all(programs: dict[str, str], settings: SimulationSettings) -> Outcomes:
     pairs = ((program, HOUSE) for program in programs.values())
-    return dict(zip(programs, run(pairs, workers=2, rules=rules), strict=True))
+    return dict(zip(programs, run(pairs, workers=2, settings=settings), strict=True))
 
 
 # --- what works: each program says these things
@@ -664,8 +664,8 @@ def check_failure(outcomes: Outcomes, name: str) -> None:
         assert outcome.trace == ()
 
 
-def one(program: str, rules: SimulationSettings | None = None, world: World = HOUSE) -> Outcome:
-    (outcome,) = run([(program, world)], workers=1, rules=rules or SimulationSettings())
+def one(program: str, settings: SimulationSettings | None = None, world: World = HOUSE) -> Outcome:
+    (outcome,) = run([(program, world)], workers=1, settings=settings or SimulationSettings())
     return outcome
 
 
@@ -809,9 +809,9 @@ say(str(sys.getrecursionlimit() > 900))
 print("x")
 say(str(random.random()))
 """
-    rules = SimulationSettings(literals="as-written")
+    settings = SimulationSettings(literals="as-written")
     pairs = [(task(looks), HOUSE), (marks + task("say('a')"), HOUSE), (task(looks + "\n"), HOUSE)]
-    before, between, after = run(pairs, workers=1, rules=rules)
+    before, between, after = run(pairs, workers=1, settings=settings)
     assert said(between) == ["a"]
     assert said(before)[:-1] == ["['a', 'b']", "False", "False", "False", "False", "0.0", "True"]
     assert after == before

@@ -3,18 +3,20 @@ from datetime import UTC, datetime
 import pytest
 
 from codebotler.core.trace import Option
-from codebotler.simulator.settings import PAPER, Limits, Matching, SimulationSettings, choose, finds
+from codebotler.simulator.settings import PAPER_SETTINGS, Limits, Matching, SimulationSettings, choose, finds
 
 
 def test_rules_of_the_paper_are_those_that_the_published_verdicts_rest_on() -> None:
-    assert (PAPER.literals, PAPER.matching, PAPER.people) == (
+    assert (PAPER_SETTINGS.literals, PAPER_SETTINGS.matching, PAPER_SETTINGS.people) == (
         "lowercase",
         "label-in-request",
         "answer-to-any-name",
     )
-    assert PAPER.clock_starts == datetime(2024, 1, 1, 12, 0, 0, tzinfo=UTC)
-    assert PAPER.limits == Limits(seconds=3600, calls=1000, ticks=200_000, text=10_000, trace=1_000_000)
-    assert SimulationSettings() == PAPER
+    assert PAPER_SETTINGS.clock_starts == datetime(2024, 1, 1, 12, 0, 0, tzinfo=UTC)
+    assert PAPER_SETTINGS.limits == Limits(
+        seconds=3600, calls=1000, ticks=200_000, text=10_000, trace=1_000_000
+    )
+    assert SimulationSettings() == PAPER_SETTINGS
 
 
 @pytest.mark.parametrize("matching", ["label-in-request", "whole-words"])

@@ -1,4 +1,4 @@
-"""The rules by which a suite is stricter: whole words, own names, what happened; people who come and go."""
+"""The settings by which a suite is stricter: whole words, own names, what happened; people who leave."""
 
 from pathlib import Path
 
@@ -10,7 +10,13 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.settings import PAPER, WORDS_FOR_PEOPLE, SimulationSettings, choose, resolve_room
+from codebotler.simulator.settings import (
+    PAPER_SETTINGS,
+    WORDS_FOR_PEOPLE,
+    SimulationSettings,
+    choose,
+    resolve_room,
+)
 from roboeval.suites.schema import SimulationFile
 
 STRICT = SimulationSettings(
@@ -31,8 +37,8 @@ WORLD = World(
 )
 
 
-def robot(world: World = WORLD, rules: SimulationSettings = STRICT) -> SimulatedRobot:
-    return SimulatedRobot(world, rules)
+def robot(world: World = WORLD, settings: SimulationSettings = STRICT) -> SimulatedRobot:
+    return SimulatedRobot(world, settings)
 
 
 def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
@@ -43,18 +49,18 @@ def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
         one.perform("go_to", ["room 123"])
     assert [(event.kind, event.text) for event in one.trace] == [("goto", "room 1"), ("goto", "room 12")]
     assert resolve_room(["lab", "lab 2"], "lab 2", "whole-words") == "lab 2"
-    loose = robot(rules=PAPER)
+    loose = robot(settings=PAPER_SETTINGS)
     loose.perform("go_to", ["room 123"])
     assert (loose.room, loose.trace[0].text) == ("room 1", "room 123")
 
 
 def test_words_for_people_are_usual_ones_where_a_suite_names_none() -> None:
-    rules = SimulationFile.model_validate({"people": "own-name-or-word"}).rules()
-    assert robot(rules=rules).rules.words_for_people == WORDS_FOR_PEOPLE
+    settings = SimulationFile.model_validate({"people": "own-name-or-word"}).settings()
+    assert robot(settings=settings).settings.words_for_people == WORDS_FOR_PEOPLE
     assert SimulationFile.model_validate(
         {"people": "own-name-or-word", "words_for_people": ["dog"]}
-    ).rules() == SimulationSettings(people="own-name-or-word", words_for_people=("dog",))
-    assert SimulationFile().rules() == PAPER
+    ).settings() == SimulationSettings(people="own-name-or-word", words_for_people=("dog",))
+    assert SimulationFile().settings() == PAPER_SETTINGS
 
 
 WORDS = SimulationSettings(
@@ -119,8 +125,8 @@ def test_people_are_found_by_their_own_name_or_a_word_for_people(
     strict: bool,  # noqa: FBT001 - a parameter of the test
     loose: bool,  # noqa: FBT001 - the same
 ) -> None:
-    for rules, seen in ((STRICT, strict), (PAPER, loose)):
-        one = robot(rules=rules)
+    for settings, seen in ((STRICT, strict), (PAPER_SETTINGS, loose)):
+        one = robot(settings=settings)
         one.perform("go_to", ["room 1"])
         assert one.perform("is_in_room", [entity]) is seen
 
@@ -136,7 +142,7 @@ def test_who_is_asked_is_who_is_meant() -> None:
 
 
 def test_answers_are_whole_words() -> None:
-    one, loose = robot(), robot(rules=PAPER)
+    one, loose = robot(), robot(settings=PAPER_SETTINGS)
     for each, chosen in ((one, 1), (loose, 0)):
         each.perform("go_to", ["room 1"])
         assert each.perform("ask", ["kim", "Tea?", YES_NO]) == chosen
@@ -192,7 +198,7 @@ def task_program():
 
 def test_a_program_that_waits_meets_who_comes() -> None:
     world = World((Room("hall", people=(Person("kim", after_looks=5),)),), "hall")
-    (outcome,) = run([(WAITS, world)], workers=1, rules=STRICT)
+    (outcome,) = run([(WAITS, world)], workers=1, settings=STRICT)
     assert outcome.status is Status.FINISHED
     assert outcome.trace[-1].text == "6"
 

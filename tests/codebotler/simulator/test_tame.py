@@ -13,10 +13,11 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.process.preparer_client import LONG, Prepared, Preparer, is_exhausted
+from codebotler.simulator.process.preparer_client import LONG_SOURCE, Prepared, Preparer, is_exhausted
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
+from codebotler.simulator.sandbox.tame_expressions import GIVEN
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
 from in_process import all_of
@@ -508,7 +509,7 @@ def names_of_ordinary_programs() -> list[str]:
 def test_each_name_that_other_programs_find_is_allowed_or_makes_a_program_wild() -> None:
     names = names_of_ordinary_programs()
     assert {"say", "print", "exit", "sys", "time", "open", "__name__", "__spec__"} < set(names)
-    allowed = NAMES | tame.GIVEN | {"time", "__name__"}
+    allowed = NAMES | GIVEN | {"time", "__name__"}
     places = [*NAMED, "x = {}", "{}.time()", "say({})", "f(*{})", "try: pass\nexcept {}: pass", "raise {}(1)"]
     own = {"None", "True", "False", "task_program"}
     for name in (name for name in names if name.isidentifier() and name not in own):
@@ -542,7 +543,7 @@ def test_programs_that_are_prepared_together_are_as_if_each_were_alone() -> None
     try:
         alone = [preparer.prepare(program, lowercase=True, skills=skills) for program in programs]
         assert preparer.prepare_all(programs, lowercase=True, skills=skills) == alone
-        with_long = [*programs, f"'{'x' * LONG}'"]
+        with_long = [*programs, f"'{'x' * LONG_SOURCE}'"]
         together = preparer.prepare_all(with_long, lowercase=True, skills=skills)
         assert together[:-1] == alone
         assert isinstance(together[-1], Prepared)
@@ -587,11 +588,13 @@ def test_tame_programs_find_each_name_that_is_allowed() -> None:
     raising = "".join(f"    if name == '{name}': raise {name}(name)\n" for name in errors)
     tried = "".join(USES_ONE.format(*use) for use in uses.items())
     program = f"import time\ndef f(name):\n{raising}def task_program():\n{tried}"
-    rules = SimulationSettings(literals="as-written", limits=Limits(ticks=10_000))
+    settings = SimulationSettings(literals="as-written", limits=Limits(ticks=10_000))
     worker = Worker()
     try:
-        known = worker.run_tame([(program, [lambda: SimulatedRobot(WORLD, rules)])])
-        assert all_of(known[0, 0]) == all_of(worker.run_alone(program, lambda: SimulatedRobot(WORLD, rules)))
+        known = worker.run_tame([(program, [lambda: SimulatedRobot(WORLD, settings)])])
+        assert all_of(known[0, 0]) == all_of(
+            worker.run_alone(program, lambda: SimulatedRobot(WORLD, settings))
+        )
     finally:
         worker.close()
     texts = [event.text for event in known[0, 0].trace]

@@ -13,6 +13,7 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
+from codebotler.simulator.sandbox.tame_expressions import ExpressionVerifier
 
 NAMES = frozenset(SKILLS)
 SPECIAL = ("len", "type", "list", "go_to", "time", "open", "ValueError")
@@ -134,14 +135,14 @@ def judged(source: str, monkeypatch: pytest.MonkeyPatch) -> tuple[set[Position],
     """Where the verifier takes special names for data, and where for what they name; None if it is wild."""
     data: set[Position] = set()
     called: set[Position] = set()
-    name, call = tame.VALUES[ast.Name], tame.VALUES[ast.Call]
+    name, call = ExpressionVerifier.VALUES[ast.Name], ExpressionVerifier.VALUES[ast.Call]
 
-    def watch_name(verifier: tame.Verifier, node: Any) -> None:  # noqa: ANN401 - as the verifier has it
+    def watch_name(verifier: ExpressionVerifier, node: Any) -> None:  # noqa: ANN401 - as the verifier has it
         name(verifier, node)
         if isinstance(node.ctx, ast.Load) and node.id in verifier.special:
             data.add((node.lineno, node.col_offset))
 
-    def watch_call(verifier: tame.Verifier, node: Any) -> None:  # noqa: ANN401 - the same
+    def watch_call(verifier: ExpressionVerifier, node: Any) -> None:  # noqa: ANN401 - the same
         call(verifier, node)
         if isinstance(node.func, ast.Name) and node.func.id in verifier.special:
             at = node.func.lineno, node.func.col_offset
@@ -149,8 +150,8 @@ def judged(source: str, monkeypatch: pytest.MonkeyPatch) -> tuple[set[Position],
 
     tree = ast.parse(source)
     with monkeypatch.context() as patch:
-        patch.setitem(tame.VALUES, ast.Name, watch_name)
-        patch.setitem(tame.VALUES, ast.Call, watch_call)
+        patch.setitem(ExpressionVerifier.VALUES, ast.Name, watch_name)
+        patch.setitem(ExpressionVerifier.VALUES, ast.Call, watch_call)
         return (data, called) if tame.is_tame(tree, nodes_of(tree), NAMES) else None
 
 

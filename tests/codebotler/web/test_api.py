@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.missions.store import missions
+from codebotler.missions.store import read_missions
 from codebotler.robots.simulated import OFFICE
 from pageserver import SERVE, WORLD, PageServer
 from server import Server
@@ -182,10 +182,10 @@ def test_a_key_stops_only_a_robot_that_runs(server: PageServer) -> None:
 
 
 def test_a_check_alone_begins_nothing(server: PageServer) -> None:
-    before = len(missions(server.home))
+    before = len(read_missions(server.home))
     found = server.call("POST", "/api/check", {"program": "def task_program():\n    fly()\n"}).data
     assert (found["accepted"], found["problems"][0]["line"]) == (False, 2)
-    assert len(missions(server.home)) == before
+    assert len(read_missions(server.home)) == before
 
 
 def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
@@ -299,7 +299,7 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
         server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
         until(server, lambda now: now["doing"] != "")
         server.end(signal.SIGINT)
-    (stopped,) = missions(tmp_path / "home")
+    (stopped,) = read_missions(tmp_path / "home")
     assert stopped.state == "stopped"
     assert "shutting down" in stopped.reason
     with PageServer(tmp_path) as server:
@@ -311,7 +311,7 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
         assert re.search("interrupted.* go_to", server.said)
         (interrupted,) = server.call("GET", "/api/robot").data["interrupted"]
         assert "go_to" in interrupted["reason"]
-        assert missions(tmp_path / "home")[-1].state == "interrupted"
+        assert read_missions(tmp_path / "home")[-1].state == "interrupted"
 
 
 def test_nothing_of_the_page_is_loaded_for_other_commands() -> None:

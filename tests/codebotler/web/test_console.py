@@ -17,11 +17,11 @@ from codebotler.core.files import Appender
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions import log as mission_log
-from codebotler.missions.log import Line, State, Summary
+from codebotler.missions.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import known_instructions
-from codebotler.missions.store import missions
-from codebotler.missions.view import Order, SessionView, digest
+from codebotler.missions.store import read_missions
+from codebotler.missions.view import MissionOrder, SessionView, program_digest
 from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.open import open_model
 from codebotler.models.recorded import open_recorded
@@ -31,7 +31,7 @@ from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
-from codebotler.web.console import MOST_PROGRAM, Console
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.panes.instruction import examples
 from doubles import Answering
 from server import Server
@@ -97,7 +97,7 @@ def until(console: Console, holds: Callable[[SessionView], bool], seconds: float
 
 
 def checked(console: Console, program: str = HELLO) -> SessionView:
-    console.begin(Order(program=program))
+    console.begin(MissionOrder(program=program))
     return until(console, lambda view: view.check is not None)
 
 
@@ -111,17 +111,17 @@ def approved(console: Console, program: str = HELLO) -> None:
 def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
     author = Author(HELLO)
     with desk_of(tmp_path, author=author) as console:
-        session = console.begin(Order("say hello in the kitchen", "author"))
+        session = console.begin(MissionOrder("say hello in the kitchen", "author"))
         view = until(console, lambda view: view.may_be_approved)
-        assert (view.program, view.problems, view.state) == (HELLO, (), State.CHECKED)
+        assert (view.program, view.problems, view.state) == (HELLO, (), MissionState.CHECKED)
         assert "kitchen" in author.asked[0].messages[-1].text
         assert author.is_closed
         session.approve(view.digest)
         view = until(console, lambda view: view.is_over)
-        assert view.state is State.DONE
+        assert view.state is MissionState.DONE
         assert [m.text for m in view.progress.moments if m.kind == "say"] == ["hello"]
         assert [line["event"] for line in session.events()][-1] == "state"
-    (summary,) = missions(tmp_path)
+    (summary,) = read_missions(tmp_path)
     assert (summary.state, summary.model, summary.instruction) == (
         "done",
         "author",
@@ -136,12 +136,12 @@ def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> 
     with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
         assert len(examples(console)) >= 3
         for instruction in known_instructions(RoomMap.of(world)):
-            console.begin(Order(instruction))
+            console.begin(MissionOrder(instruction))
             view = until(console, lambda view: view.check is not None)
             assert console.session is not None
             console.session.approve(view.digest, despite_problems=True)
             ended = until(console, lambda view: view.is_over)
-            assert (ended.state, ended.reason) == (State.DONE, ""), instruction
+            assert (ended.state, ended.reason) == (MissionState.DONE, ""), instruction
 
 
 def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: Path) -> None:
@@ -149,7 +149,7 @@ def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: P
     for world, count in ((office, 3), (WORLD, 0)):
         robot = Simulated(world, speed=None)
         with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
-            console.begin(Order("Go to the lobby, and tell me how many people are there."))
+            console.begin(MissionOrder("Go to the lobby, and tell me how many people are there."))
             view = until(console, lambda view: view.is_over)
             known = view.suggestions
             assert known is not None
@@ -161,13 +161,13 @@ def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: P
 def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Path) -> None:
     author = Author(HELLO, waits=True)
     with desk_of(tmp_path, author=author) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         view = until(console, lambda view: bool(view.reply))
         assert (view.arriving.code, view.is_written, view.may_be_edited) == (HELLO[:10], True, False)
         console.stop("a test")
         session.join(5)
         assert console.view.is_over
-        assert (console.view.state, author.is_closed) == (State.STOPPED, True)
+        assert (console.view.state, author.is_closed) == (MissionState.STOPPED, True)
 
 
 PROSE = "I cannot do that."
@@ -176,7 +176,7 @@ PROSE = "I cannot do that."
 def test_a_reply_without_a_program_waits_for_a_person_who_asks_again(tmp_path: Path) -> None:
     author = Author(PROSE, PROSE, HELLO)
     with desk_of(tmp_path, author=author) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         for repair in (False, True):
             view = until(console, lambda view: view.waits_for_program)
             assert view.programless is not None
@@ -196,18 +196,18 @@ def test_a_reply_without_a_program_waits_for_a_person_who_asks_again(tmp_path: P
 
 def test_a_program_stays_where_the_next_reply_holds_none(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(HELLO, PROSE)) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         before = until(console, lambda view: view.may_be_approved)
         session.ask_again(repair=False)
         view = until(console, lambda view: view.may_be_approved and view.programless is not None)
         assert (view.program, view.check) == (before.program, before.check)
         session.approve(view.digest)
-        assert until(console, lambda view: view.is_over).state is State.DONE
+        assert until(console, lambda view: view.is_over).state is MissionState.DONE
 
 
 def test_a_program_can_be_typed_where_the_model_wrote_none(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(PROSE)) as console:
-        console.begin(Order("say hello", "author"))
+        console.begin(MissionOrder("say hello", "author"))
         until(console, lambda view: view.waits_for_program)
         console.edit(HELLO)
         view = until(console, lambda view: view.may_be_approved)
@@ -216,11 +216,11 @@ def test_a_program_can_be_typed_where_the_model_wrote_none(tmp_path: Path) -> No
 
 def test_a_mission_without_a_program_can_be_stopped(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(PROSE)) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         until(console, lambda view: view.waits_for_program)
         console.stop("a test")
         session.join(5)
-        assert (console.view.is_over, console.view.state) == (True, State.STOPPED)
+        assert (console.view.is_over, console.view.state) == (True, MissionState.STOPPED)
 
 
 def test_a_higher_limit_counts_from_then_on(tmp_path: Path) -> None:
@@ -234,7 +234,7 @@ def test_a_higher_limit_counts_from_then_on(tmp_path: Path) -> None:
         Server(answer=lambda _: program, limits=True) as server,
         Console(robot, tmp_path, model, models=("openai-chat:m",), world=WORLD) as console,
     ):
-        session = console.begin(Order("say hello"))
+        session = console.begin(MissionOrder("say hello"))
         view = until(console, lambda view: view.waits_for_program)
         assert view.programless is not None
         assert (view.programless.kind, view.programless.higher_limit) == ("cut-off", 32)
@@ -249,7 +249,7 @@ def test_a_higher_limit_counts_from_then_on(tmp_path: Path) -> None:
 
 def test_a_blank_program_is_none_where_there_is_an_instruction(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(HELLO)) as console:
-        console.begin(Order("say hello", program=" \n"))
+        console.begin(MissionOrder("say hello", program=" \n"))
         assert until(console, lambda view: view.may_be_approved).program == HELLO
 
 
@@ -257,14 +257,14 @@ def test_an_emptied_program_has_a_problem_and_can_be_filled_again(console: Conso
     checked(console)
     console.edit("")
     view = until(console, lambda view: view.check is not None and not view.program)
-    assert (view.state, len(view.problems)) == (State.CHECKED, 1)
+    assert (view.state, len(view.problems)) == (MissionState.CHECKED, 1)
     console.edit(HELLO)
     assert until(console, lambda view: view.may_be_approved and bool(view.program)).problems == ()
 
 
 def test_without_an_instruction_no_model_is_asked_again(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(HELLO)) as console:
-        session = console.begin(Order(model="author", program=HELLO))
+        session = console.begin(MissionOrder(model="author", program=HELLO))
         assert not until(console, lambda view: view.may_be_approved).may_be_asked_again
         with pytest.raises(MissionError, match="cannot be asked again"):
             session.ask_again(repair=False)
@@ -277,9 +277,9 @@ def test_problems_need_a_word_about_them(console: Console) -> None:
     assert '"cellar"' in view.problems[0]
     with pytest.raises(MissionError, match="problems"):
         session.approve(view.digest)
-    assert console.view.state is State.CHECKED
+    assert console.view.state is MissionState.CHECKED
     session.approve(view.digest, despite_problems=True)
-    assert until(console, lambda view: view.is_over).state is State.FAILED
+    assert until(console, lambda view: view.is_over).state is MissionState.FAILED
 
 
 def test_only_the_program_that_was_seen_can_be_approved(console: Console) -> None:
@@ -292,7 +292,7 @@ def test_only_the_program_that_was_seen_can_be_approved(console: Console) -> Non
     until(console, lambda view: view.check is not None)
     with pytest.raises(MissionError, match="changed"):
         session.approve(seen.digest)
-    assert console.view.state is State.CHECKED
+    assert console.view.state is MissionState.CHECKED
 
 
 def test_a_program_typed_by_hand_has_the_instruction_only_if_it_is_still_that_ones(console: Console) -> None:
@@ -301,14 +301,14 @@ def test_a_program_typed_by_hand_has_the_instruction_only_if_it_is_still_that_on
         (written.replace("bye", "later"), "Greet the kitchen."),
         ("def task_program():\n    pick('mug')\n    place('mug')\n", ""),
     ):
-        console.begin(Order("Greet the kitchen.", program=written, author="some:model"))
+        console.begin(MissionOrder("Greet the kitchen.", program=written, author="some:model"))
         until(console, lambda view: view.check is not None)
         console.stop("a test")
         until(console, lambda view: view.is_over)
         console.edit(program)
         view = until(console, lambda view: view.check is not None)
         assert (view.instruction, view.author) == (instruction, "")
-        filed = Summary.read(console.home / "missions" / view.id)
+        filed = MissionSummary.read(console.home / "missions" / view.id)
         assert (filed.instruction, filed.model) == (instruction, "")
 
 
@@ -319,7 +319,7 @@ def test_an_edited_program_is_checked_again_and_the_last_one_counts(console: Con
     view = until(console, lambda view: view.check is not None)
     assert view.program.endswith("say('4')\n")
     assert not view.busy
-    assert Summary.read(console.home / "missions" / view.id).program == view.program
+    assert MissionSummary.read(console.home / "missions" / view.id).program == view.program
 
 
 def test_a_program_can_be_edited_while_the_robot_is_connected(
@@ -333,13 +333,13 @@ def test_a_program_can_be_edited_while_the_robot_is_connected(
 
     monkeypatch.setattr(Simulated, "connect", slow)
     with desk_of(tmp_path) as console:
-        console.begin(Order(program=BAD))
+        console.begin(MissionOrder(program=BAD))
         until(console, lambda view: view.busy == "connecting the robot")
         console.edit(HELLO)
         go_on.set()
         view = until(console, lambda view: view.check is not None)
         assert (view.program, view.problems) == (HELLO, ())
-        assert Summary.read(console.home / "missions" / view.id).program == HELLO
+        assert MissionSummary.read(console.home / "missions" / view.id).program == HELLO
 
 
 def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
@@ -353,7 +353,7 @@ def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
 
     monkeypatch.setattr(Simulated, "connect", slow)
     with desk_of(tmp_path) as console:
-        session = console.begin(Order(program=HELLO))
+        session = console.begin(MissionOrder(program=HELLO))
         until(console, lambda view: view.busy == "connecting the robot")
         began = time.monotonic()
         console.stop("a test")
@@ -361,14 +361,18 @@ def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
         assert not console.view.is_over, "it has not stopped yet"
         go_on.set()
         session.join(10)
-        assert (console.view.state, console.view.is_over, console.view.check) == (State.STOPPED, True, None)
+        assert (console.view.state, console.view.is_over, console.view.check) == (
+            MissionState.STOPPED,
+            True,
+            None,
+        )
         assert not console.view.progress.moments
 
 
 def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path) -> None:
     author = Author(BAD, HELLO)
     with desk_of(tmp_path, author=author) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         until(console, lambda view: view.may_be_approved)
         session.ask_again(repair=True)
         view = until(console, lambda view: view.may_be_approved and view.program == HELLO)
@@ -379,28 +383,28 @@ def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path
 def test_a_model_that_fails_when_asked_again_takes_nothing_away(tmp_path: Path) -> None:
     author = Author(BAD)
     with desk_of(tmp_path, author=author) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         until(console, lambda view: view.may_be_approved)
         console.edit(HELLO)
         before = until(console, lambda view: view.may_be_approved and view.program == HELLO)
         session.ask_again(repair=False)
         view = until(console, lambda view: bool(view.error))
         assert view.error == "the model is not there"
-        assert (view.program, view.check, view.state) == (HELLO, before.check, State.CHECKED)
+        assert (view.program, view.check, view.state) == (HELLO, before.check, MissionState.CHECKED)
         session.approve(view.digest)
-        assert until(console, lambda view: view.is_over).state is State.DONE
+        assert until(console, lambda view: view.is_over).state is MissionState.DONE
         assert console.view.program == HELLO
 
 
 def test_a_program_is_there_again_when_the_asking_is_stopped(tmp_path: Path) -> None:
     author = Author(HELLO, BAD)
     with desk_of(tmp_path, author=author) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         until(console, lambda view: view.may_be_approved)
         author.waits = True
         session.ask_again(repair=False)
         view = until(console, lambda view: view.reply == BAD[:10])
-        assert (view.state, view.phase) == (State.CHECKED, "writing")
+        assert (view.state, view.phase) == (MissionState.CHECKED, "writing")
         console.stop("a test")
         assert until(console, lambda view: view.is_over).program == HELLO
 
@@ -409,7 +413,7 @@ def test_no_other_program_is_asked_for_while_one_is_being_approved(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with desk_of(tmp_path, author=Author(HELLO, BAD)) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         view = until(console, lambda view: view.may_be_approved)
         approve = Mission.approve
 
@@ -431,7 +435,7 @@ def test_no_other_program_is_asked_for_while_one_is_being_approved(
         session.approve(view.digest)
         view = until(console, lambda view: view.is_over)
         thread.join()
-        assert (view.state, view.phase, view.program, len(refused)) == (State.DONE, "done", HELLO, 1)
+        assert (view.state, view.phase, view.program, len(refused)) == (MissionState.DONE, "done", HELLO, 1)
 
 
 def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> None:
@@ -448,11 +452,15 @@ def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> N
         raise CancelledError
 
     with desk_of(tmp_path, Slow(answer)) as console:
-        session = console.begin(Order(program=HELLO))
+        session = console.begin(MissionOrder(program=HELLO))
         assert until(console, lambda view: bool(view.id)).phase == "starting"
         console.stop("a test")
         session.join(5)
-        assert (console.view.is_over, console.view.state, console.view.error) == (True, State.STOPPED, "")
+        assert (console.view.is_over, console.view.state, console.view.error) == (
+            True,
+            MissionState.STOPPED,
+            "",
+        )
 
 
 def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
@@ -461,18 +469,18 @@ def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
         view = until(console, lambda view: bool(view.progress.skill))
         assert (view.progress.doing, view.progress.line) == ('drives to "kitchen"', 3)
         with pytest.raises(MissionError, match="stop it first"):
-            console.begin(Order(program=HELLO))
+            console.begin(MissionOrder(program=HELLO))
         with pytest.raises(MissionError, match="cannot be changed"):
             console.edit(HELLO)
         console.stop("a test")
-        assert until(console, lambda view: view.is_over).state is State.STOPPED
+        assert until(console, lambda view: view.is_over).state is MissionState.STOPPED
 
 
 def test_another_instruction_takes_the_place_of_one_that_waits(console: Console) -> None:
     first = checked(console)
-    console.begin(Order(program=BAD))
+    console.begin(MissionOrder(program=BAD))
     until(console, lambda view: view.check is not None and view.number > first.number)
-    assert [summary.state for summary in missions(console.home)] == ["stopped", "checked"]
+    assert [summary.state for summary in read_missions(console.home)] == ["stopped", "checked"]
 
 
 def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
@@ -480,7 +488,7 @@ def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
     with desk_of(tmp_path, robot) as console:
         approved(console, FAR)
         until(console, lambda view: bool(view.progress.skill))
-    assert missions(tmp_path)[0].state == "stopped"
+    assert read_missions(tmp_path)[0].state == "stopped"
 
 
 def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -494,13 +502,17 @@ def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(Console, "check", slow)
     with desk_of(tmp_path) as console:
-        session = console.begin(Order(program=HELLO))
+        session = console.begin(MissionOrder(program=HELLO))
         until(console, lambda view: view.busy == "checking" and bool(view.id))
         console.stop("a test")
-        assert until(console, lambda view: view.state is State.STOPPED).check is None
+        assert until(console, lambda view: view.state is MissionState.STOPPED).check is None
         go_on.set()
         session.join(10)
-        assert (console.view.state, console.view.check, console.view.is_over) == (State.STOPPED, None, True)
+        assert (console.view.state, console.view.check, console.view.is_over) == (
+            MissionState.STOPPED,
+            None,
+            True,
+        )
 
 
 def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
@@ -514,14 +526,14 @@ def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
 
 def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author()) as console:
-        console.begin(Order("say hello", "author"))
+        console.begin(MissionOrder("say hello", "author"))
         view = until(console, lambda view: view.is_over)
-        assert (view.error, view.state) == ("the model is not there", State.FAILED)
+        assert (view.error, view.state) == ("the model is not there", MissionState.FAILED)
 
 
 def test_the_same_program_keeps_its_author_when_it_is_run_again(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(HELLO)) as console:
-        session = console.begin(Order("say hello", "author"))
+        session = console.begin(MissionOrder("say hello", "author"))
         session.approve(until(console, lambda view: view.may_be_approved).digest)
         until(console, lambda view: view.is_over)
         for program, author in ((HELLO, "author"), (HELLO + "# mine\n", "")):
@@ -530,7 +542,7 @@ def test_the_same_program_keeps_its_author_when_it_is_run_again(tmp_path: Path) 
             assert (view.author, view.model, view.program) == (author, "author", program)
             console.stop("a test")
             until(console, lambda view: view.is_over)
-    assert [one.model for one in missions(tmp_path)] == ["author", "author", ""]
+    assert [one.model for one in read_missions(tmp_path)] == ["author", "author", ""]
 
 
 def test_a_mission_whose_end_cannot_be_logged_has_ended_in_the_view(
@@ -538,8 +550,8 @@ def test_a_mission_whose_end_cannot_be_logged_has_ended_in_the_view(
 ) -> None:
     add = mission_log.add_event
 
-    def full(log: Appender, event: str, clock: float, **data: object) -> Line:
-        if data.get("state") == State.DONE:
+    def full(log: Appender, event: str, clock: float, **data: object) -> LogLine:
+        if data.get("state") == MissionState.DONE:
             raise OSError(errno.ENOSPC, "No space left on device")
         return add(log, event, clock, **data)
 
@@ -547,31 +559,31 @@ def test_a_mission_whose_end_cannot_be_logged_has_ended_in_the_view(
     with desk_of(tmp_path) as console:
         approved(console)
         view = until(console, lambda view: view.is_over)
-        assert (view.state, view.phase) == (State.DONE, "done")
+        assert (view.state, view.phase) == (MissionState.DONE, "done")
         assert "No space left" in view.error
 
 
 def test_the_first_model_writes_where_none_is_named(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(HELLO)) as console:
-        console.begin(Order("say hello"))
+        console.begin(MissionOrder("say hello"))
         assert until(console, lambda view: view.may_be_approved).model == console.models[0]
 
 
 def test_an_order_that_says_nothing_is_refused() -> None:
     with pytest.raises(UserError, match="instruction is empty"):
-        Order(" ", "author", program="\n")
+        MissionOrder(" ", "author", program="\n")
 
 
 def test_a_program_that_is_too_long_is_refused(console: Console) -> None:
-    with pytest.raises(UserError, match="too long"):
-        console.begin(Order(program="#" * (MOST_PROGRAM + 1)))
-    assert missions(console.home) == []
+    with pytest.raises(UserError, match="the limit is"):
+        console.begin(MissionOrder(program="#" * (MAX_PROGRAM_CHARACTERS + 1)))
+    assert read_missions(console.home) == []
 
 
 def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> None:
     with desk_of(tmp_path) as one, desk_of(tmp_path) as other:
         checked(one)
-        other.begin(Order(program=HELLO))
+        other.begin(MissionOrder(program=HELLO))
         view = until(other, lambda view: view.is_over)
         assert "robot simulated" in view.error
         assert view.id == ""
@@ -579,7 +591,7 @@ def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> Non
 
 def test_viewers_are_woken_at_each_change(console: Console) -> None:
     async def watch() -> bool:
-        session = console.begin(Order(program=HELLO))
+        session = console.begin(MissionOrder(program=HELLO))
         return await console.notifier.until(lambda: session.view.check is not None, 10.0)
 
     assert asyncio.run(watch())
@@ -593,12 +605,12 @@ def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
     with desk_of(tmp_path, robot) as console:
         approved(console, "def task_program():\n    for n in range(300):\n        say(str(n))\n")
         view = until(console, lambda view: view.is_over)
-        assert view.state is State.DONE
+        assert view.state is MissionState.DONE
         assert len(view.progress.moments) == 200
         assert console.session is not None
         assert len(console.session.events()) > 900
 
 
 def test_a_digest_tells_programs_apart() -> None:
-    assert digest(HELLO) != digest(BAD)
-    assert digest("\ud800")
+    assert program_digest(HELLO) != program_digest(BAD)
+    assert program_digest("\ud800")

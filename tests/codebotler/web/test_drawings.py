@@ -11,20 +11,20 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
-from codebotler.missions.log import State, Summary
-from codebotler.missions.progress import MOST, MOST_STEPS, Find, Moment, Progress
+from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment, Progress
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import title
 from codebotler.robots.simulated import OFFICE
 from codebotler.simulator.sampled_robot import RoomMap
-from codebotler.web.floorplan import HALO, MOST_ROOMS, MapState, floorplan
+from codebotler.web.floorplan import _HALO_RADIUS, MAX_DRAWN_ROOMS, MapState, floorplan
 from codebotler.web.panes.past_mission import timeline
 from codebotler.web.panes.robot import map_state
 from codebotler.web.storyboard import (
-    LEFT_OUT,
-    MOST_STRIPS,
-    Deed,
-    Reached,
+    _LEFT_OUT,
+    MAX_STRIPS,
+    Action,
+    RouteProgress,
     Scene,
     Strip,
     folded,
@@ -174,12 +174,14 @@ def test_the_line_is_the_one_that_the_program_says() -> None:
 def test_a_robot_that_looks_for_ever_fills_no_memory() -> None:
     looks = [call("is_in_room", entity=" mug "), done("is_in_room", result=True)] * 200
     now = after(*looks, call("go_to", location="hall"), line("feedback", text=f"at ({'9' * 400}, 1)"))
-    assert now.looks == (("mug", True),) * MOST_STEPS
+    assert now.looks == (("mug", True),) * _MAX_STEPS
     assert now.at is None
 
 
 def test_only_the_last_moments_are_kept() -> None:
-    assert len(after(*[call("say", message=str(n)) for n in range(MOST + 50)]).moments) == MOST
+    assert (
+        len(after(*[call("say", message=str(n)) for n in range(_MAX_MOMENTS + 50)]).moments) == _MAX_MOMENTS
+    )
 
 
 def test_a_floorplan_is_well_formed_whatever_rooms_are_called() -> None:
@@ -204,7 +206,7 @@ def test_a_floorplan_is_well_formed_whatever_rooms_are_called() -> None:
 
 def test_a_floorplan_of_a_huge_building_stays_small() -> None:
     world = World(tuple(Room(f"room {n}") for n in range(5_000)), "room 0")
-    assert floorplan(world, MapState()).count("<polygon") == MOST_ROOMS
+    assert floorplan(world, MapState()).count("<polygon") == MAX_DRAWN_ROOMS
 
 
 def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
@@ -230,7 +232,7 @@ def test_what_was_found_in_a_large_room_is_clear_of_the_robot() -> None:
     (find,) = re.findall(r'<text class="find"[^>]* y="([\d.]+)"', drawn)
     (held,) = re.findall(r'<text class="held"[^>]* y="([\d.]+)"', drawn)
     names = [float(y) for y in re.findall(r'<text class="name"[^>]* y="([\d.]+)"[^>]*>printer<', drawn)]
-    assert float(robot) + HALO < float(held) < float(find) - 0.3 < min(names) - 0.3
+    assert float(robot) + _HALO_RADIUS < float(held) < float(find) - 0.3 < min(names) - 0.3
 
 
 def test_strips_show_each_kind_of_world_once() -> None:
@@ -244,8 +246,8 @@ def test_strips_show_each_kind_of_world_once() -> None:
     found = check(program, rooms=["hall", "kitchen"])
     shown = strips(found)
     assert {strip.scenes[-1].deeds[-1] for strip in shown} == {
-        Deed("say", "here it is"),
-        Deed("say", "there is none"),
+        Action("say", "here it is"),
+        Action("say", "there is none"),
     }
     assert all([scene.room for scene in strip.scenes] == ["hall", "kitchen"] for strip in shown)
     assert all(strip.ends_well for strip in shown)
@@ -263,10 +265,13 @@ def test_strips_show_each_kind_of_world_once() -> None:
     ],
 )
 def test_rooms_are_ticked_off_as_they_are_reached(visited: tuple[str, ...], reached: int | None) -> None:
-    rooms = ("start_loc", "kitchen", "hall", LEFT_OUT, "study")
+    rooms = ("start_loc", "kitchen", "hall", _LEFT_OUT, "study")
     strip = Strip("", tuple(map(Scene, rooms)), "Done.", ends_well=True)
-    assert scenes_reached(strip, Reached(visited)) == reached
-    assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), Reached(("kitchen",))) is None
+    assert scenes_reached(strip, RouteProgress(visited)) == reached
+    assert (
+        scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), RouteProgress(("kitchen",)))
+        is None
+    )
 
 
 def test_strips_are_folded_only_beside_one_that_fits() -> None:
@@ -280,7 +285,9 @@ def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> Non
     assert len(shown) == 2
     said = {}
     for found in (True, False):
-        possible = [one for one in shown if scenes_reached(one, Reached(("kitchen",), (("mug", found),)))]
+        possible = [
+            one for one in shown if scenes_reached(one, RouteProgress(("kitchen",), (("mug", found),)))
+        ]
         said[found] = [one.scenes[-1].deeds[-1].text for one in possible]
     assert said == {True: ["yes"], False: ["no"]}
 
@@ -292,7 +299,7 @@ def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> 
     assert sorted(answers) == ["No", "Yes"]
 
     def possible(*heard: str | None) -> list[str]:
-        reached = Reached(("kitchen",), answers=heard)
+        reached = RouteProgress(("kitchen",), answers=heard)
         return [a for a, one in zip(answers, shown, strict=True) if scenes_reached(one, reached) is not None]
 
     assert sorted(possible()) == ["No", "Yes"]
@@ -315,8 +322,11 @@ def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> 
     ],
 )
 def test_a_typed_program_is_named_by_its_first_skills(program: str, told: str) -> None:
-    assert title(Summary("id", State.DONE, "simulated", 0.0, program=program)) == told
-    assert title(Summary("id", State.DONE, "simulated", 0.0, "Do it.", program=program)) == "Do it."
+    assert title(MissionSummary("id", MissionState.DONE, "simulated", 0.0, program=program)) == told
+    assert (
+        title(MissionSummary("id", MissionState.DONE, "simulated", 0.0, "Do it.", program=program))
+        == "Do it."
+    )
 
 
 def test_strips_say_what_their_worlds_are_like() -> None:
@@ -338,7 +348,7 @@ def test_a_drive_to_nowhere_and_a_long_run_are_shown() -> None:
     many = "def task_program():\n    for n in range(200):\n        say(str(n))\n"
     (long,) = strips(check(many, rooms=["hall"]))
     assert "182 more steps" in [deed.text for scene in long.scenes for deed in scene.deeds]
-    assert len(strips(check(many, rooms=["hall"]))) <= MOST_STRIPS
+    assert len(strips(check(many, rooms=["hall"]))) <= MAX_STRIPS
 
 
 def test_what_fails_is_shown_first_also_in_the_last_of_many_worlds() -> None:
@@ -346,5 +356,5 @@ def test_what_fails_is_shown_first_also_in_the_last_of_many_worlds() -> None:
     program = f"def task_program():\n{looks}    if is_in_room('key'):\n        go_to('cellar')\n"
     found = check(program, rooms=["hall"], samples=20)
     shown = strips(found)
-    assert len(shown) == MOST_STRIPS
-    assert [strip.ends_well for strip in shown] == [False, *[True] * (MOST_STRIPS - 1)]
+    assert len(shown) == MAX_STRIPS
+    assert [strip.ends_well for strip in shown] == [False, *[True] * (MAX_STRIPS - 1)]

@@ -16,16 +16,16 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from codebotler.core.world import Room, World
-from codebotler.missions.log import State, events_of
-from codebotler.missions.mission import UNCONFIRMED
-from codebotler.missions.store import missions
+from codebotler.missions.log import MissionState, read_events
+from codebotler.missions.mission import UNCONFIRMED_STOP
+from codebotler.missions.store import read_missions
 from codebotler.missions.view import SessionView
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.robots.simulated import Simulated
-from codebotler.web.access import SHORTEST_TOKEN
+from codebotler.web.access import MIN_TOKEN_LENGTH
 from codebotler.web.console import Console
-from codebotler.web.face import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
-from codebotler.web.guard import MOST_BYTES
+from codebotler.web.face import MAX_FACE_OPTIONS, MAX_FACE_TEXT, face_data, question_data, screen_text
+from codebotler.web.guard import MAX_BODY_BYTES
 from command_line import ENVIRONMENT
 from forked import Forked
 from pageserver import PageServer
@@ -130,10 +130,10 @@ def test_nobody_answers_in_time(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--face", "--speed", "0", "--face-timeout", "1") as server:
         server.run(TEA)
         assert until(server, lambda now: now["is_over"])["ended"]["how"] == "unanswered"
-        (mission,) = missions(server.home)
+        (mission,) = read_missions(server.home)
         assert mission.state == "failed"
         assert re.match(r'AskTimeout: .*"Tea\?" .*1 s', mission.reason)
-        events = events_of(server.home / "missions" / mission.id)
+        events = read_events(server.home / "missions" / mission.id)
         assert any("no face" in line.get("text", "") for line in events)
 
 
@@ -154,8 +154,10 @@ def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path:
     console = Console(
         Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face
     )
-    console._session = type("Ended", (), {"view": SessionView(1, "m", State.FAILED, reason=UNCONFIRMED)})()
-    assert face_data(console, face)["reason"] == UNCONFIRMED
+    console.session = type(
+        "Ended", (), {"view": SessionView(1, "m", MissionState.FAILED, reason=UNCONFIRMED_STOP)}
+    )()
+    assert face_data(console, face)["reason"] == UNCONFIRMED_STOP
 
 
 def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> None:
@@ -163,7 +165,7 @@ def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> 
     until(server, lambda now: now["doing"] == "moving")
     assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": True}
     assert until(server, lambda now: now["is_over"])["state"] == "stopped"
-    assert "at the face" in missions(server.home)[-1].reason
+    assert "at the face" in read_missions(server.home)[-1].reason
     server.call("POST", "/api/missions", {"program": FAR})
     while server.call("GET", "/api/robot").data["state"] != "checked":
         time.sleep(0.01)
@@ -192,7 +194,7 @@ def test_a_face_that_reads_nothing_holds_nothing_up(tmp_path: Path) -> None:
 
 def test_what_a_face_sends_has_a_limit(server: PageServer) -> None:
     with watching(server) as socket:
-        socket.send("x" * (MOST_BYTES + 1))
+        socket.send("x" * (MAX_BODY_BYTES + 1))
         with pytest.raises(ConnectionClosedError) as closed:
             heard(socket, lambda _: False)
         assert closed.value.rcvd is not None
@@ -268,15 +270,15 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
         server.run("def task_program():\n    say('hello')\n")
         while not server.call("GET", "/api/robot").data["is_over"]:
             time.sleep(0.01)
-        assert missions(server.home)[-1].state == "done"
+        assert read_missions(server.home)[-1].state == "done"
 
 
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["--face-token", "short"], f"{SHORTEST_TOKEN} characters"),
-        (["--token", "x" * 20, "--face-token", "x" * 20], "operator's page"),
-        (["--no-token", "--face-token", "x" * 20], "this machine only"),
+        (["--face-token", "short"], f"{MIN_TOKEN_LENGTH} characters"),
+        (["--token", "x" * 20, "--face-token", "x" * 20], "must differ from the operator's"),
+        (["--no-token", "--face-token", "x" * 20], "--no-token works only"),
         (["--face-timeout", "0"], "'--face-timeout'"),
         (["--stop-when-alone", "0"], "'--stop-when-alone'"),
     ],
@@ -301,11 +303,11 @@ def test_tokens_can_be_named_so_that_a_tablets_link_stays(tmp_path: Path) -> Non
 
 
 def test_texts_are_cut_and_made_visible_but_keep_their_lines() -> None:
-    assert words("one\ntwo\r\n\u202ethree") == "one\ntwo\n\\u202ethree"
-    assert words("x" * (MOST_TEXT + 1_000)) == f"{'x' * MOST_TEXT}... 1,000 more characters"
-    assert words("\ud800") == "\\ud800"
+    assert screen_text("one\ntwo\r\n\u202ethree") == "one\ntwo\n\\u202ethree"
+    assert screen_text("x" * (MAX_FACE_TEXT + 1_000)) == f"{'x' * MAX_FACE_TEXT}... 1,000 more characters"
+    assert screen_text("\ud800") == "\\ud800"
 
 
 def test_more_options_than_a_screen_holds_are_counted() -> None:
-    data = question_data(FaceQuestion(1, "ann", "Which?", tuple(map(str, range(MOST_OPTIONS + 7)))))
-    assert (len(data["options"]), data["more_options"]) == (MOST_OPTIONS, 7)
+    data = question_data(FaceQuestion(1, "ann", "Which?", tuple(map(str, range(MAX_FACE_OPTIONS + 7)))))
+    assert (len(data["options"]), data["more_options"]) == (MAX_FACE_OPTIONS, 7)

@@ -16,16 +16,16 @@ from websockets.sync.client import connect
 
 from codebotler.core.errors import UserError
 from codebotler.web.access import (
-    LOOPBACK,
-    TRIES,
-    WINDOW,
+    LOCAL_HOST_NAMES,
+    MAX_WRONG_TOKENS,
+    WRONG_TOKEN_SECONDS,
     Access,
     GuardRules,
     PageAddress,
     Role,
     TooManyTriesError,
 )
-from codebotler.web.guard import MOST_BYTES, Guard, _is_same
+from codebotler.web.guard import MAX_BODY_BYTES, Guard, _is_same
 from codebotler.web.proxy import OuterAddress, proxies_in_front
 from command_line import ENVIRONMENT
 from forked import Forked
@@ -139,8 +139,8 @@ def test_a_token_in_the_address_opens_pages_only(server: PageServer) -> None:
 def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--token", "one-that-a-person-made") as server:
         cookie = server.cookie
-        wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(TRIES + 2)]
-        assert wrong == [401] * TRIES + [429] * 2
+        wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(MAX_WRONG_TOKENS + 2)]
+        assert wrong == [401] * MAX_WRONG_TOKENS + [429] * 2
         assert server.call("GET", "/api/robot").status == 429
         forwarded = server.ask("GET", f"/?token={server.token}", x_forwarded_for="10.9.8.7")
         assert (forwarded.status, forwarded.headers["retry-after"]) == (429, "60")
@@ -149,7 +149,7 @@ def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
 
 def test_nobody_keeps_the_token_that_was_made_from_a_stop(tmp_path: Path) -> None:
     with PageServer(tmp_path) as server:
-        wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(TRIES + 1)]
+        wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(MAX_WRONG_TOKENS + 1)]
         assert wrong[-1] == 429
         assert server.call("POST", "/api/stop").status == 202
 
@@ -157,18 +157,18 @@ def test_nobody_keeps_the_token_that_was_made_from_a_stop(tmp_path: Path) -> Non
 def test_tries_are_counted_by_address_and_for_a_while() -> None:
     now = [0.0]
     access = Access("a token", "a face", now=lambda: now[0])
-    for _ in range(TRIES):
+    for _ in range(MAX_WRONG_TOKENS):
         assert access.of_token("wrong", "here") is None
     with pytest.raises(TooManyTriesError):
         access.of_token("a token", "here")
     assert access.of_token("a token", "there") is Role.OPERATOR
-    now[0] = WINDOW
+    now[0] = WRONG_TOKEN_SECONDS
     assert access.of_token("a token", "here") is Role.OPERATOR
 
 
 def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
-    access = Access.asked_for(None, "the tablet's own", open_to_all=False, is_private=True)
-    for _ in range(TRIES):
+    access = Access.from_options(None, "the tablet's own", open_to_all=False, is_private=True)
+    for _ in range(MAX_WRONG_TOKENS):
         access.of_token("wrong", "here")
     assert access.of_token(access.operator or "", "here") is Role.OPERATOR
     for token in ("wrong", "the tablet's own"):
@@ -177,7 +177,7 @@ def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
 
 
 def test_addresses_that_tried_are_not_kept_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.web.access.MOST_ADDRESSES", 3)
+    monkeypatch.setattr("codebotler.web.access.MAX_ADDRESSES", 3)
     access = Access("a token", "a face")
     for number in range(9):
         access.of_token("wrong", f"address {number}")
@@ -193,15 +193,15 @@ def test_a_token_is_made_for_each_start() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--no-token", "--host", "0.0.0.0"], "this machine only"),
+        (["--no-token", "--host", "0.0.0.0"], "--no-token works only"),
         *(
-            pytest.param(["--no-token", "--host", host], "this machine only", marks=pytest.mark.slow)
+            pytest.param(["--no-token", "--host", host], "--no-token works only", marks=pytest.mark.slow)
             for host in ("::", "0", "127.example", "")
         ),
-        (["--no-token", "--token", "x" * 20], "this machine only"),
-        (["--no-token", "--behind-proxy", "https://robot.example"], "this machine only"),
-        (["--behind-proxy", "https://robot.example/missions"], "the page itself uses /missions"),
-        (["--behind-proxy", "https://robot.example/_nicegui/x"], "the page itself uses /_nicegui"),
+        (["--no-token", "--token", "x" * 20], "--no-token works only"),
+        (["--no-token", "--behind-proxy", "https://robot.example"], "--no-token works only"),
+        (["--behind-proxy", "https://robot.example/missions"], ": /missions is a path of the page"),
+        (["--behind-proxy", "https://robot.example/_nicegui/x"], ": /_nicegui is a path of the page"),
         (["--behind-proxy", "robot.example"], "https://HOST"),
         (["--token", "short"], "too short"),
         (["--host", "999.1.1.1"], "cannot listen"),
@@ -384,7 +384,7 @@ def test_every_answer_has_the_headers(server: PageServer) -> None:
 
 
 def test_what_is_sent_has_a_limit(server: PageServer) -> None:
-    huge = b'{"program": "' + b"x" * MOST_BYTES + b'"}'
+    huge = b'{"program": "' + b"x" * MAX_BODY_BYTES + b'"}'
     assert server.call("POST", "/api/check", huge).status == 413
     lying = server.ask(
         "POST", "/api/check", b"{}", authorization=f"Bearer {server.token}", content_length="-1"
@@ -397,7 +397,7 @@ def test_what_is_told_to_be_too_large_is_not_waited_for(server: PageServer) -> N
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
     connection.putrequest("POST", "/api/check")
     connection.putheader("Authorization", f"Bearer {server.token}")
-    connection.putheader("Content-Length", str(MOST_BYTES + 1))
+    connection.putheader("Content-Length", str(MAX_BODY_BYTES + 1))
     connection.endheaders()
     assert connection.getresponse().status == 413
     connection.close()
@@ -411,7 +411,7 @@ def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
             passed.append(await receive())
 
     async def receive() -> Message:
-        return {"type": "http.request", "body": b"x" * (MOST_BYTES // 2), "more_body": True}
+        return {"type": "http.request", "body": b"x" * (MAX_BODY_BYTES // 2), "more_body": True}
 
     async def send(message: Message) -> None:
         raise AssertionError(message)
@@ -434,7 +434,7 @@ def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) 
     connection.putheader("Transfer-Encoding", "chunked")
     connection.endheaders()
     # No more than one byte too many, since what is sent after it might meet a closed connection.
-    for size in (*[100_000] * (MOST_BYTES // 100_000), 1):
+    for size in (*[100_000] * (MAX_BODY_BYTES // 100_000), 1):
         connection.send(b"%x\r\n%b\r\n" % (size, b"x" * size))
     answer = connection.getresponse()
     told = json.loads(answer.read())["detail"]
@@ -463,7 +463,7 @@ def passed(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
     headers = [*named, (b"authorization", f"Bearer {token}".encode())]
     scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "scheme": "http"}
     scope["headers"] = headers
-    rules = GuardRules(Access("an operator's", "a face's"), LOOPBACK | {"robot.local"})
+    rules = GuardRules(Access("an operator's", "a face's"), LOCAL_HOST_NAMES | {"robot.local"})
     guard = Guard(behind, rules, set().__contains__)
     asyncio.run(guard(scope, receive, send))
     return int(sent[0]["status"])
@@ -493,14 +493,14 @@ def test_names_by_which_the_page_may_be_called() -> None:
 def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with PageAddress(port=0).listening() as first, PageAddress(port=0).listening() as other:
+    with PageAddress(port=0).listen() as first, PageAddress(port=0).listen() as other:
         taken, free = first.getsockname()[1], other.getsockname()[1]
         other.close()
-        monkeypatch.setattr("codebotler.web.access.PORTS", (taken, free))
-        with PageAddress().listening() as found:
+        monkeypatch.setattr("codebotler.web.access.PAGE_PORTS", (taken, free))
+        with PageAddress().listen() as found:
             assert found.getsockname()[1] == free
         with pytest.raises(UserError, match=f"port {taken} is already in use"):
-            PageAddress(port=taken).listening()
+            PageAddress(port=taken).listen()
 
 
 # --- behind a proxy

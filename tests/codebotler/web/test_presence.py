@@ -9,9 +9,9 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from codebotler.web.access import Role
-from codebotler.web.server import SOCKETS, Presence
+from codebotler.web.server import _PAGE_SOCKETS, Presence
 
-PAGE = f"{SOCKETS}socket.io/"
+PAGE = f"{_PAGE_SOCKETS}socket.io/"
 SECONDS = 10.0
 
 

@@ -65,17 +65,6 @@ def test_who_never_returned(drives: Sequence[str], *, away: bool) -> None:
     assert never_returned(cast("Row", row(*drives))) is away
 
 
-def test_nobody_knows_of_rows_of_an_earlier_version_who_never_returned(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.delitem(VERDICT, "places")  # with which rows are filled in
-    old = row("kitchen", index=1)
-    del old["verdicts"][0]["places"]
-    table = compare_report_back(results_of([old, row("kitchen", "start", index=2)], ABLE))
-    assert table["never_returned"].to_list() == [None]
-    assert table["failed"].to_list() == [2]
-
-
 def test_coming_back_by_hand() -> None:
     passed = {"task": "Visit", "prompt": 0, "index": 0, "passed": True}
     failed = [

@@ -16,14 +16,14 @@ from roboeval.analysis.compare import (
     ComparedRun,
     compare_scores,
     comparison_data,
+    comparison_sentence,
     other_differences,
     pairs_to_compare,
     sample_size_sentences,
-    verdict,
 )
 from roboeval.cli.inputs import Opened, expect_same_suite
 from roboeval.cli.views.comparison import comparison_view
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
@@ -59,7 +59,7 @@ def test_verdicts() -> None:
     def said(differences: list[float], tasks: int) -> str:
         a = {(f"T{i % tasks}", i): 0.4 for i in range(len(differences))}
         b = {key: 0.4 + d for key, d in zip(a, differences, strict=True)}
-        return verdict(compare_scores(a, b), ("one", "two"))
+        return comparison_sentence(compare_scores(a, b), ("one", "two"))
 
     assert "equally" in said([0.0] * 4, 4)
     assert "two is better than one by 10.0 points (p = 0.002 over tasks)." in said([0.1] * 10, 10)
@@ -70,11 +70,14 @@ def test_verdicts() -> None:
 
 
 def test_prompts_that_only_one_has_are_left_out_in_words() -> None:
-    assert "2 prompts in common" in verdict(compare_scores(FIRST, {("A", 0): 1.0, ("B", 0): 0.0}), ("x", "y"))
-    assert re.search(
-        r"\b3 prompts in common, without 2 prompts\b", verdict(compare_scores(FIRST, SECOND), ("x", "y"))
+    assert "2 prompts in common" in comparison_sentence(
+        compare_scores(FIRST, {("A", 0): 1.0, ("B", 0): 0.0}), ("x", "y")
     )
-    assert "without" not in verdict(compare_scores(FIRST, FIRST), ("x", "y"))
+    assert re.search(
+        r"\b3 prompts in common, without 2 prompts\b",
+        comparison_sentence(compare_scores(FIRST, SECOND), ("x", "y")),
+    )
+    assert "without" not in comparison_sentence(compare_scores(FIRST, FIRST), ("x", "y"))
 
 
 def test_of_many_runs_each_is_compared_with_the_best() -> None:
@@ -148,7 +151,7 @@ def test_what_is_unlike() -> None:
 
 def test_other_suites_are_refused() -> None:
     def opened(name: str, digest: str) -> Opened:
-        results = replace(a_run({}, {"digest": digest}), run=Run(Path(name)))
+        results = replace(a_run({}, {"digest": digest}), run=RunFolder(Path(name)))
         return Opened(results, f"roboeval evaluate {name} --suite mine")
 
     expect_same_suite([opened("a", "1"), opened("b", "1")])

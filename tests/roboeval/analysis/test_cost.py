@@ -9,7 +9,7 @@ import pytest
 
 from made_up_runs import UNCHECKED, made_up
 from roboeval.analysis.cost import budgets, cost_of
-from roboeval.analysis.resample import CheckedCompletion, rejected_share, requests
+from roboeval.analysis.resample import CheckedCompletion, mean_requests, rejected_share
 from roboeval.evaluation.runs.table import Price
 
 GOOD = CheckedCompletion(accepted=True, ran=True, passed=True)
@@ -60,10 +60,10 @@ def test_sums_do_not_depend_on_the_order_of_completions() -> None:
 
 
 def test_requests_by_hand() -> None:
-    assert requests(rejected_share((GOOD, BAD)), 0) == 1
-    assert requests(rejected_share((GOOD, BAD)), 2) == 1 + 1 / 2 + 1 / 4
-    assert requests(rejected_share((BAD,)), 4) == 5
-    assert requests(rejected_share((GOOD,)), 100) == 1
+    assert mean_requests(rejected_share((GOOD, BAD)), 0) == 1
+    assert mean_requests(rejected_share((GOOD, BAD)), 2) == 1 + 1 / 2 + 1 / 4
+    assert mean_requests(rejected_share((BAD,)), 4) == 5
+    assert mean_requests(rejected_share((GOOD,)), 100) == 1
 
 
 def test_a_budget_by_hand() -> None:

@@ -12,8 +12,8 @@ from roboeval.analysis.resample import (
     Chances,
     CheckedCompletion,
     CheckedPrompt,
-    chances,
     curve_data,
+    final_chances,
     resample,
     trials_by_prompt,
 )
@@ -41,7 +41,7 @@ def test_chances_are_what_many_draws_come_to(retries: int) -> None:
     chance = random.Random(11)
     times = 20_000
     results = [drawn(trials, retries, chance) for _ in range(times)]
-    exact = chances(trials, retries)
+    exact = final_chances(trials, retries)
     for name in ("accepted", "ran", "passed"):
         share = sum(getattr(trial, name) for trial in results) / times
         assert getattr(exact, name) == pytest.approx(share, abs=0.012), name
@@ -49,7 +49,7 @@ def test_chances_are_what_many_draws_come_to(retries: int) -> None:
 
 def test_without_retries_it_is_the_plain_share() -> None:
     trials = [GOOD, WRONG, REJECTED, UNJUST]
-    exact = chances(trials, 0)
+    exact = final_chances(trials, 0)
     assert (exact.accepted, exact.ran, exact.passed) == pytest.approx((2 / 4, 3 / 4, 2 / 4))
 
 
@@ -72,20 +72,20 @@ def test_without_retries_the_mean_is_pass_at_1_to_the_last_digit(seed: int) -> N
 def test_no_chance_is_above_one(retries: int) -> None:
     for accepted in range(1, 30):
         trials = [GOOD] * accepted + [UNJUST] * (30 - accepted)
-        exact = chances(trials, retries)
+        exact = final_chances(trials, retries)
         assert max(exact.accepted, exact.ran, exact.passed) <= 1
         assert exact.passed == pytest.approx(1)
 
 
 def test_one_retry_by_hand() -> None:
     # One of two is accepted, and passes: it is drawn at once, or in the second of two draws.
-    assert chances([GOOD, REJECTED], 1) == Chances(accepted=3 / 4, ran=3 / 4, passed=3 / 4)
+    assert final_chances([GOOD, REJECTED], 1) == Chances(accepted=3 / 4, ran=3 / 4, passed=3 / 4)
 
 
 def test_where_none_or_all_are_accepted_retries_change_nothing() -> None:
     for retries in LIMITS:
-        assert chances([REJECTED, UNJUST], retries) == Chances(accepted=0, ran=1 / 2, passed=1 / 2)
-        assert chances([GOOD, WRONG], retries) == Chances(accepted=1, ran=1, passed=1 / 2)
+        assert final_chances([REJECTED, UNJUST], retries) == Chances(accepted=0, ran=1 / 2, passed=1 / 2)
+        assert final_chances([GOOD, WRONG], retries) == Chances(accepted=1, ran=1, passed=1 / 2)
 
 
 def verdict(status: str, *, satisfied: bool = False, failed: tuple[str, ...] = ()) -> dict[str, Any]:

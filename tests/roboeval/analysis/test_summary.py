@@ -17,7 +17,7 @@ from roboeval.analysis.counts import tally_of
 from roboeval.analysis.summary import ALL, EvaluationSummary, kinds_in_order, summarise, summary_data
 from roboeval.analysis.summary import causes as causes_of
 from roboeval.cli.views.results import summary_view
-from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.failures import FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.scope import CutOff, JudgingScope
 from roboeval.suites.load import Suite
@@ -65,7 +65,7 @@ def test_a_summary_counts_tasks_prompts_and_failures() -> None:
 
 
 def test_all_known_kinds_are_always_listed_and_others_after_them() -> None:
-    none, python, robot, checks = CLASSES.values()
+    none, python, robot, checks = FAILURE_CLASSES.values()
     kinds = [[kind.name for kind in each.kinds] for each in summary(ROWS, SUITE).failures]
     assert kinds == [[*none.kinds], [*python.kinds, "MemoryError"], [*robot.kinds], [*checks.kinds]]
 

@@ -16,7 +16,7 @@ from roboeval.analysis.summary import summarise
 from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import summary_view, task_view
-from roboeval.evaluation.explanation import NOT_RECORDED, OF_SUITE
+from roboeval.evaluation.explanation import INSTRUCTION_NOT_RECORDED, OF_SUITE
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import JudgingScope
@@ -68,7 +68,7 @@ def test_text_of_the_suite_is_marked_where_the_instruction_was_not_recorded() ->
     completions = [Completion(task="Visit", prompt=prompt, index=0, program="") for prompt in range(2)]
     text = printed(task_view(task_data(results(*completions), "Visit")))
     for instruction in SUITE.tasks["Visit"].prompts:
-        assert f"{NOT_RECORDED}; {OF_SUITE}\n{instruction}\n" in text
+        assert f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}\n{instruction}\n" in text
 
 
 @pytest.mark.parametrize("colour", [False, True])

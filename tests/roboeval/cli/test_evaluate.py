@@ -18,7 +18,7 @@ from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
 from roboeval import load_results
 from roboeval.analysis.tally import Tally
-from roboeval.cli.output import watched
+from roboeval.cli.output import show_progress
 from roboeval.evaluation.runs.rows import Row
 from seals import unseal
 
@@ -89,9 +89,7 @@ def test_a_file_is_no_run(tmp_path: Path, verb: str) -> None:
 
 @pytest.mark.parametrize("command", [("evaluate",), ("import", "--out", "run")])
 @pytest.mark.parametrize("source", ["py", "py.zip"])
-def test_files_that_are_named_otherwise_are_left_aside_aloud(
-    tmp_path: Path, command: tuple[str, ...], source: str
-) -> None:
+def test_misnamed_python_files_are_refused(tmp_path: Path, command: tuple[str, ...], source: str) -> None:
     names = ["SayGoodDay_0_0.py", "SayGoodDay_1.py", "notes.txt", "x.py"]
     (tmp_path / "py").mkdir()
     for name in names:
@@ -100,17 +98,16 @@ def test_files_that_are_named_otherwise_are_left_aside_aloud(
         with zipfile.ZipFile(tmp_path / source, "w") as archive:
             for name in names:
                 archive.write(tmp_path / "py" / name, name)
-    ended = roboeval(*command, source, cwd=tmp_path)
-    assert ended.status == 0
-    warning = ended.err.splitlines()[0]
-    assert warning.startswith("2 files")
-    assert f"{source}/SayGoodDay_1.py" in warning
-    assert "TASK_PROMPT_INDEX.py" in warning
+    refusal = refused(*command, source, cwd=tmp_path)
+    assert refusal.at == (f"{source}/SayGoodDay_1.py", None)
+    assert "TASK_PROMPT_INDEX.py" in refusal.sentence
 
 
-def test_no_file_is_left_aside_where_all_are_named_alike(tmp_path: Path) -> None:
-    (tmp_path / "SayGoodDay_0_0.py").write_text("completion = ''")
-    assert roboeval("evaluate", tmp_path).err == ""
+def test_hidden_and_other_files_beside_programs_are_ignored(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        for name in ("SayGoodDay_0_0.py", "notes.txt", "__MACOSX/._SayGoodDay_0_0.py"):
+            archive.writestr(name, "completion = ''")
+    assert roboeval("evaluate", tmp_path / "a.zip").status == 0
 
 
 def test_a_zip_with_a_damaged_member(tmp_path: Path) -> None:
@@ -177,7 +174,7 @@ def test_a_program_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, program=["x"]))
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
-    for said in ("program", "['x']", "a text"):
+    for said in ("program", "['x']", "a string"):
         assert said in refusal.sentence
 
 
@@ -235,8 +232,8 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
 def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     script = (
-        "import pathlib, sys\nfrom roboeval.evaluation.runs.folder import Run\n"
-        f"with Run(pathlib.Path({str(tmp_path / 'run')!r})).writing():\n"
+        "import pathlib, sys\nfrom roboeval.evaluation.runs.folder import RunFolder\n"
+        f"with RunFolder(pathlib.Path({str(tmp_path / 'run')!r})).writing():\n"
         "    print('on', flush=True)\n    sys.stdin.read()\n"
     )
     with subprocess.Popen(
@@ -418,7 +415,7 @@ def test_progress_counts_what_has_been_passed_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("roboeval.cli.output.QUIET_S", 0.0)
-    items = watched("ab", "judging", 2)
+    items = show_progress("ab", "judging", 2)
     assert (next(items), capsys.readouterr().err) == ("a", "")
     assert (next(items), capsys.readouterr().err[:15]) == ("b", "judging: 1 of 2")
 
@@ -741,7 +738,7 @@ def test_tasks_are_listed_and_shown() -> None:
 def test_accepted_findings_are_shown_with_their_reasons() -> None:
     linted = roboeval("tasks", "HalloweenShopping", "--lint")
     assert linted.status == 0
-    assert re.search(r"\b1 finding\b.* --accepted\b", linted.out)
+    assert re.search(r"\b1 accepted finding\b.* --accepted\b", linted.out)
     shown = roboeval("tasks", "HalloweenShopping", "--lint", "--accepted")
     assert shown.status == 0
     assert re.search(r"HalloweenShopping.yaml:\d+: accepted: .* \[same-worlds: 4 and 5\]: \w+", shown.out)

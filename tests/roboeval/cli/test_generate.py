@@ -174,7 +174,7 @@ def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
     [
         (("--model", "nonsense"), ['"nonsense"', "recorded, "]),
         (("--tasks", "Nonsense"), ['"paper"', '"Nonsense"', "CountSavory"]),
-        (("--temperature", "-1"), ["temperature", "-1", "0 and 100"]),
+        (("--temperature", "-1"), ["temperature", "-1", "0 to 100"]),
         (("--num-completions", "0"), ["invalid value", "'--num-completions'"]),
         (("--concurrency", "0"), ["invalid value", "'--concurrency'"]),
         (("--out", ""), ["empty", "a run"]),
@@ -231,7 +231,7 @@ def test_a_key_that_cannot_be_sent_is_one_sentence(tmp_path: Path, model: str, k
             *served(server.url, model=model), cwd=tmp_path, environment={**ENVIRONMENT, variable: key}
         )
     assert (ended.status, ended.out) == (2, "")
-    assert ended.err.startswith(f"roboeval: the key in {variable} cannot be sent: ")
+    assert ended.err.startswith(f"roboeval: the key in {variable} has ")
     assert ended.err.count("\n") == 1
     assert "sk-" not in ended.err
     assert server.requests == []

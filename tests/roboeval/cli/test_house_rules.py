@@ -139,7 +139,7 @@ def test_rules_are_read_before_anything_is_judged(folder: Path) -> None:
     assert not (folder / "run").exists()
     (folder / "My Rules.yaml").write_text(RULES)
     told = refused("evaluate", "recorded:careful", "--rules", "My Rules.yaml", cwd=folder)
-    assert "small letters" in told.sentence
+    assert "lower-case letters" in told.sentence
 
 
 def test_a_suite_with_rules_of_its_own_takes_no_others(folder: Path) -> None:

@@ -21,7 +21,12 @@ from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
-from roboeval.evaluation.explanation import LOWERED, NOT_RECORDED, OF_SUITE, completion_data
+from roboeval.evaluation.explanation import (
+    INSTRUCTION_NOT_RECORDED,
+    LOWERCASED_NOTE,
+    OF_SUITE,
+    completion_data,
+)
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
@@ -119,7 +124,7 @@ def test_a_prompt_groups_equal_programs_and_gives_reasons() -> None:
 
 def test_a_prompt_is_shown_line_by_line() -> None:
     text = printed(prompt_view(prompt_data(results(ROWS, THREE), "Visit", 0)), 160)
-    unrecorded = f"{NOT_RECORDED}; {OF_SUITE}"
+    unrecorded = f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}"
     assert text.startswith(
         f"Visit/0  2 of 4 passed (pass@1 0.50)\n{unrecorded}\nVisit Amy.\n\n  0  x2  passed\n"
     )
@@ -161,7 +166,7 @@ not satisfied, finished
   6  office → lab  (asked for "the lab, please")
   7      picked up "mug"
   8      put down "mug"
-  9      wave "amy"
+  9      did wave "amy"
   failed greets("amy"): the robot"""
     assert story in text
 
@@ -233,7 +238,7 @@ def test_what_was_not_recorded_is_said_and_the_text_of_the_suite_is_marked(
     written: Completion | None,
 ) -> None:
     text = printed(completion_view(row(completion(), FINE), written, SUITE))
-    assert (f"{NOT_RECORDED}; {OF_SUITE}\nVisit Amy." in text) == (written is not None)
+    assert (f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}\nVisit Amy." in text) == (written is not None)
     assert ("no longer in this run" in text) == (written is None)
 
 
@@ -396,9 +401,9 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
 
 def test_lowered_texts_are_shown_as_they_are_judged_and_explained() -> None:
     said = Outcome(Status.FINISHED, (GOTO, Event("say", "good day")))
-    for rules in (SimulationSettings(), SimulationSettings(literals="as-written")):
-        suite = replace(SUITE, rules=rules)
+    for settings in (SimulationSettings(), SimulationSettings(literals="as-written")):
+        suite = replace(SUITE, settings=settings)
         written = replace(completion(), program="def task_program():\n    say('Good Day')\n")
         text = printed(completion_view(row(written, said), written, suite), 120)
         assert 'said "good day"' in text
-        assert (LOWERED in text) is (rules == SimulationSettings())
+        assert (LOWERCASED_NOTE in text) is (settings == SimulationSettings())

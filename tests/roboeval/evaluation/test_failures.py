@@ -2,7 +2,7 @@ import pytest
 
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.rtl import parse
-from roboeval.evaluation.failures import CLASSES, Verdict, failure
+from roboeval.evaluation.failures import FAILURE_CLASSES, Verdict, failure_of_verdicts
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
@@ -51,8 +51,8 @@ A, B = required("a", "SayAtLocation"), required("b", "Location")
 def test_the_first_unsatisfied_world_gives_the_one_reason(
     verdicts: list[Verdict], expected: Failure | None
 ) -> None:
-    assert failure(verdicts) == expected
+    assert failure_of_verdicts(verdicts) == expected
 
 
 def test_the_kinds_of_the_paper_are_always_there() -> None:
-    assert [len(one.kinds) for one in CLASSES.values()] == [6, 9, 7, 8]
+    assert [len(one.kinds) for one in FAILURE_CLASSES.values()] == [6, 9, 7, 8]

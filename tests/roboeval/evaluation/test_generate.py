@@ -24,7 +24,7 @@ from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
 from roboeval.evaluation.requests import GenerationPlan, RequestLog
 from roboeval.evaluation.runs.completions import read_completions
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import Suite
 from scripted_model import Scripted
 
@@ -34,7 +34,7 @@ REFUSED = ModelError("the key in SCRIPTED_API_KEY is refused", may_pass=False)
 
 
 def generated(
-    run: Run,
+    run: RunFolder,
     suite: Suite,
     model: Scripted,
     *,
@@ -46,11 +46,11 @@ def generated(
     return generate_run(run, plan, model, pace or Pace(), on_progress=on_progress)
 
 
-def rows(run: Run) -> list[dict[str, Any]]:
+def rows(run: RunFolder) -> list[dict[str, Any]]:
     return [row for _, row in read_rows(run.completions)]
 
 
-def keys(run: Run) -> list[tuple[str, int, int]]:
+def keys(run: RunFolder) -> list[tuple[str, int, int]]:
     return sorted((row["task"], row["prompt"], row["index"]) for row in rows(run))
 
 
@@ -58,13 +58,13 @@ def expected(count: int) -> list[tuple[str, int, int]]:
     return sorted((task, prompt, index) for task in SMALL for prompt in range(5) for index in range(count))
 
 
-def about(run: Run) -> dict[str, Any]:
+def about(run: RunFolder) -> dict[str, Any]:
     data: dict[str, Any] = json.loads(run.about.read_text())
     return data
 
 
 def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "runs" / "one")
+    run = RunFolder(tmp_path / "runs" / "one")
     sent = SamplingSettings(temperature=0.7, seed=5, base_url="http://a/v1")
     model = Scripted(settings=sent)
     progress = generated(run, paper, model)
@@ -101,12 +101,12 @@ def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite
 
 def test_first_completions_of_all_prompts_come_first(tmp_path: Path, paper: Suite) -> None:
     model = Scripted()
-    generated(Run(tmp_path / "run"), paper, model, count=2, pace=Pace(concurrency=1))
+    generated(RunFolder(tmp_path / "run"), paper, model, count=2, pace=Pace(concurrency=1))
     assert [number for _, number in model.asked] == [0] * 10 + [1] * 10
 
 
 def test_a_completed_run_asks_for_nothing_and_keeps_its_end(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted())
     before = run.completions.read_bytes(), run.about.read_bytes()
     model = Scripted()
@@ -116,7 +116,7 @@ def test_a_completed_run_asks_for_nothing_and_keeps_its_end(tmp_path: Path, pape
 
 
 def test_more_can_be_asked_for_later_and_fewer_take_nothing_away(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted(), count=1)
     model = Scripted()
     progress = generated(run, paper, model, count=3)
@@ -127,7 +127,7 @@ def test_more_can_be_asked_for_later_and_fewer_take_nothing_away(tmp_path: Path,
 
 
 def test_each_batch_of_requests_keeps_its_settings(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     first, second = (SamplingSettings(timeout=seconds) for seconds in (5.0, 6.0))
     generate_run(run, GenerationPlan(paper, frozenset({"LunchTime"}), 2), Scripted(settings=first), Pace())
     model = Scripted(settings=second)
@@ -145,12 +145,12 @@ def test_each_batch_of_requests_keeps_its_settings(tmp_path: Path, paper: Suite)
 
 def test_as_many_at_the_same_time_as_allowed(tmp_path: Path, paper: Suite) -> None:
     model = Scripted(seconds=0.002)
-    generated(Run(tmp_path / "run"), paper, model, count=5, pace=Pace(concurrency=3))
+    generated(RunFolder(tmp_path / "run"), paper, model, count=5, pace=Pace(concurrency=3))
     assert model.most == 3
 
 
 def test_each_completion_is_in_the_file_when_it_counts(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     done: list[int] = []
 
     def count(progress: GenerationProgress) -> None:
@@ -164,7 +164,7 @@ def test_each_completion_is_in_the_file_when_it_counts(tmp_path: Path, paper: Su
 def test_a_completion_counts_only_once_it_is_on_the_disk(
     tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     on_disk = [0]
     sync = Appender.sync
 
@@ -196,7 +196,7 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
 def test_other_settings_are_refused(
     tmp_path: Path, paper: Suite, settings: SamplingSettings, what: str
 ) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted())
     before = run.completions.read_bytes(), run.about.read_bytes()
     with pytest.raises(UserError, match=re.escape(what)) as error:
@@ -206,7 +206,7 @@ def test_other_settings_are_refused(
 
 
 def test_another_model_or_template_is_refused(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted())
     with pytest.raises(UserError, match=r"\(scripted:one, now scripted:two\)"):
         generated(run, paper, Scripted(name="scripted:two"))
@@ -216,7 +216,7 @@ def test_another_model_or_template_is_refused(tmp_path: Path, paper: Suite) -> N
 
 
 def test_another_timeout_or_address_is_no_matter(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted(), count=1)
     moved = SamplingSettings(timeout=5, base_url="http://other/v1")
     generated(run, paper, Scripted(settings=moved), count=2)
@@ -224,7 +224,7 @@ def test_another_timeout_or_address_is_no_matter(tmp_path: Path, paper: Suite) -
 
 
 def test_completions_from_elsewhere_are_left_alone(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     run.path.mkdir()
     run.completions.write_bytes(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}))
     with pytest.raises(UserError, match="missing") as error:
@@ -236,7 +236,7 @@ def test_completions_from_elsewhere_are_left_alone(tmp_path: Path, paper: Suite)
 
 
 def test_completions_of_another_instruction_are_refused(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted())
     first, *others = rows(run)
     changed = [first | {"instruction": "Do something else."}, *others]
@@ -246,7 +246,7 @@ def test_completions_of_another_instruction_are_refused(tmp_path: Path, paper: S
 
 
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     with run.writing(), pytest.raises(UserError, match="another process"):
         generated(run, paper, Scripted())
 
@@ -256,7 +256,7 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
 
 @pytest.mark.parametrize("cut", [1, 10, 200])
 def test_a_torn_last_line_is_asked_for_again(tmp_path: Path, paper: Suite, cut: int) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted())
     run.completions.write_bytes(run.completions.read_bytes()[:-cut])
     model = Scripted()
@@ -266,7 +266,7 @@ def test_a_torn_last_line_is_asked_for_again(tmp_path: Path, paper: Suite, cut: 
 
 
 def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     refusing = Scripted(fails=lambda number: REFUSED if number in {3, 7} else None)
     progress = generated(run, paper, refusing, pace=Pace(concurrency=1))
     assert progress.missing is not None
@@ -284,7 +284,7 @@ REFUSAL = ModelError("the server answered with status 400 (no)", may_pass=False,
 
 
 def test_refused_prompt_is_a_completion_without_a_program(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     model = Scripted(fails=lambda number: REFUSAL if number in {0, 5, 29} else None)
     progress = generated(run, paper, model, pace=Pace(concurrency=1))
     assert (progress.done, progress.missing, keys(run)) == (30, None, expected(3))
@@ -293,14 +293,14 @@ def test_refused_prompt_is_a_completion_without_a_program(tmp_path: Path, paper:
 
 
 def test_refusals_of_every_prompt_are_an_error(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     with pytest.raises(ModelError, match="400"):
         generated(run, paper, Scripted(fails=lambda _: REFUSAL), pace=Pace(concurrency=1))
     assert not run.completions.exists()
 
 
 def test_refusals_in_a_row_are_no_completions(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     model = Scripted(fails=lambda number: REFUSAL if number >= 10 else None)  # such as a key without money
     progress = generated(run, paper, model, pace=Pace(concurrency=1))
     assert progress.stopped is not None
@@ -310,7 +310,7 @@ def test_refusals_in_a_row_are_no_completions(tmp_path: Path, paper: Suite) -> N
 
 def test_a_model_that_fails_now_and_then_is_not_given_up(tmp_path: Path, paper: Suite) -> None:
     model = Scripted(fails=lambda number: REFUSED if number % 3 else None)
-    progress = generated(Run(tmp_path / "run"), paper, model, pace=Pace(concurrency=1))
+    progress = generated(RunFolder(tmp_path / "run"), paper, model, pace=Pace(concurrency=1))
     assert (len(model.asked), progress.done, progress.stopped) == (30, 10, None)
 
 
@@ -320,7 +320,7 @@ def test_a_model_that_only_fails_is_given_up_and_leaves_nothing(
 ) -> None:
     model = Scripted(fails=lambda _: REFUSED)
     with pytest.raises(ModelError, match="SCRIPTED_API_KEY"):
-        generated(Run(tmp_path / "runs" / "run"), paper, model, pace=Pace(concurrency))
+        generated(RunFolder(tmp_path / "runs" / "run"), paper, model, pace=Pace(concurrency))
     assert len(model.asked) <= most
     assert list(tmp_path.iterdir()) == []
     assert model.closed
@@ -328,11 +328,11 @@ def test_a_model_that_only_fails_is_given_up_and_leaves_nothing(
 
 def test_a_reply_too_long_to_be_kept_is_a_failure(tmp_path: Path, paper: Suite) -> None:
     with pytest.raises(ModelError, match=r"too long .* 6,0\d\d,\d\d\d bytes"):
-        generated(Run(tmp_path / "run"), paper, Scripted(text="#" * 3_000_000), pace=Pace(1))
+        generated(RunFolder(tmp_path / "run"), paper, Scripted(text="#" * 3_000_000), pace=Pace(1))
 
 
 def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: Suite) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
     assert progress.done == 10
     assert progress.missing is not None
@@ -348,14 +348,14 @@ def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: 
 
 def test_spent_budget_counts_the_requests_that_were_under_way(tmp_path: Path, paper: Suite) -> None:
     pace = Pace(concurrency=4, token_budget=1000)
-    progress = generated(Run(tmp_path / "run"), paper, Scripted(seconds=0.001), pace=pace)
+    progress = generated(RunFolder(tmp_path / "run"), paper, Scripted(seconds=0.001), pace=pace)
     assert f"{110 * progress.done:,} tokens were used" in (progress.missing or "")
 
 
 def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
     tmp_path: Path, paper: Suite
 ) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     notes: list[list[str]] = []
 
     def fails(number: int) -> ModelError | None:
@@ -373,7 +373,7 @@ def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
 @pytest.mark.slow
 def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, paper: Suite) -> None:
     chance = random.Random(3)
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     model = Scripted(fails=lambda _: CUT if chance.random() < 0.1 else None)
     progress = generate_run(run, GenerationPlan(paper), model, Pace(concurrency=100))
     assert (progress.done, progress.missing) == (4000, None)
@@ -389,20 +389,20 @@ sys.path.insert(0, {tests!r})
 from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import Pace, generate_run
 from roboeval.evaluation.requests import GenerationPlan
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import load_suite
 from scripted_model import Scripted
 print("on", flush=True)
 {before}
 generate_run(
-    Run(pathlib.Path({run!r})), GenerationPlan(load_suite(), {tasks!r}, {count}),
+    RunFolder(pathlib.Path({run!r})), GenerationPlan(load_suite(), {tasks!r}, {count}),
     Scripted(seconds={seconds}, log=pathlib.Path({log!r})), Pace(concurrency=5),
 )
 """
 
 
 def started(
-    run: Run, log: Path, *, count: int, seconds: float = 0.01, before: str = ""
+    run: RunFolder, log: Path, *, count: int, seconds: float = 0.01, before: str = ""
 ) -> subprocess.Popen[bytes]:
     script = SCRIPT.format(
         tests=str(Path(__file__).parents[1]),
@@ -443,7 +443,7 @@ def asked_of(log: Path, pid: int, suite: Suite) -> set[tuple[str, int, int]]:
 
 @pytest.mark.slow
 def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
-    run, log = Run(tmp_path / "run"), tmp_path / "log"
+    run, log = RunFolder(tmp_path / "run"), tmp_path / "log"
     chance = random.Random(5)
     lost: Counter[tuple[str, int, int]] = Counter()
     kills = 0
@@ -472,7 +472,7 @@ def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Su
 
 @pytest.mark.slow
 def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
-    run, log = Run(tmp_path / "run"), tmp_path / "log"
+    run, log = RunFolder(tmp_path / "run"), tmp_path / "log"
     process = started(run, log, count=60, seconds=0.05)
     wait_for_notes(log, 50)
     process.send_signal(signal.SIGINT)
@@ -491,7 +491,7 @@ def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path,
 def test_an_interruption_counts_what_waits_for_the_disk(
     tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     seen: list[GenerationProgress] = []
     sync, once = Appender.sync, threading.Lock()
 
@@ -513,7 +513,7 @@ def test_an_interruption_counts_what_waits_for_the_disk(
 
 @pytest.mark.slow
 def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper: Suite) -> None:
-    run, log = Run(tmp_path / "run"), tmp_path / "log"
+    run, log = RunFolder(tmp_path / "run"), tmp_path / "log"
     limit = (
         "import resource, signal\nsignal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))\n"
@@ -533,7 +533,7 @@ def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper
 
 @pytest.mark.parametrize("line", ["{}", '{"sent": 3}', '{"sent": ["a", "b", 1]}'])
 def test_a_note_that_somebody_broke_is_refused(tmp_path: Path, paper: Suite, line: str) -> None:
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted())
     run.in_flight.write_text(f'{{"lost": 0}}\n{line}\n')
     with pytest.raises(UserError, match="request") as error:

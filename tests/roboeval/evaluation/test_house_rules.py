@@ -92,5 +92,5 @@ def test_an_errand_costs_more_with_rules(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_the_benchmark_refuses_rules_about_where_a_robot_is(tmp_path: Path) -> None:
     path = tmp_path / "house.yaml"
     path.write_text("rules:\n- {name: lab, says: Never., always: 'not tr.Exists(inside(\"lab\"))'}\n")
-    with pytest.raises(UserError, match='the rule "lab" uses inside'):
+    with pytest.raises(UserError, match=r'the rule "lab" uses .?inside'):
         HouseRules.read(path)

@@ -12,10 +12,10 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.core.world import Room, World
 from codebotler.rtl import holds
 from codebotler.rtl.formulas import Formula
-from codebotler.simulator.worker import EVENTS
-from roboeval.evaluation.failures import Verdict, failure
+from codebotler.simulator.worker import run_log
+from roboeval.evaluation.failures import Verdict, failure_of_verdicts
 from roboeval.evaluation.judge import evaluate, judge
-from roboeval.evaluation.result_cache import LONGEST_REMEMBERED, ResultCache
+from roboeval.evaluation.result_cache import MAX_RESULT_EVENTS, ResultCache
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -74,7 +74,7 @@ def test_a_program_is_judged_by_what_its_prompt_asks_for(
         for prompt in range(3)
         for program in (says, errs)
     ]
-    with caplog.at_level(logging.DEBUG, logger=EVENTS.name):
+    with caplog.at_level(logging.DEBUG, logger=run_log.name):
         rows = list(evaluate(completions, suite))
     assert [row["passed"] for row in rows[::2]] == [True, False, False]
     assert [row["verdicts"][0]["failed_checks"] for row in rows[::2]] == [[], *[['not says("hi")']] * 2]
@@ -208,8 +208,8 @@ def test_the_first_unsatisfied_world_decides() -> None:
         return Verdict("w", Outcome(status, (), error), (), satisfied=satisfied)
 
     verdicts = [verdict("A", satisfied=True), verdict("B", satisfied=False), verdict("C", satisfied=False)]
-    assert failure(verdicts) == {"class": "PythonError", "kind": "B", "world": 1, "check": None}
-    assert failure(verdicts[:1]) is None
+    assert failure_of_verdicts(verdicts) == {"class": "PythonError", "kind": "B", "world": 1, "check": None}
+    assert failure_of_verdicts(verdicts[:1]) is None
 
 
 def test_options_are_compared_as_they_were_offered() -> None:
@@ -323,9 +323,9 @@ def test_what_a_run_has_met_is_found_once_for_what_a_world_requires(
 def test_long_runs_are_not_remembered_and_others_forgotten(
     suite: Suite, tested: list[Trace], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("roboeval.evaluation.result_cache.MOST_REMEMBERED", 2)
+    monkeypatch.setattr("roboeval.evaluation.result_cache.MAX_RESULTS", 2)
     scenario = suite.tasks["T"].scenarios[1]
-    long = Outcome(Status.FINISHED, HI * LONGEST_REMEMBERED)
+    long = Outcome(Status.FINISHED, HI * MAX_RESULT_EVENTS)
     runs = [Outcome(Status.FINISHED, (*HI, Event("say", text))) for text in "abc"]
     for run, times in ((long, 2), (runs[0], 1), (runs[1], 1), (runs[2], 1), (runs[0], 1)):
         tested.clear()

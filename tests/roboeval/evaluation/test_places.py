@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
@@ -23,15 +23,12 @@ from codebotler.rtl.semantics import visible
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
-from made_results import results_of
-from roboeval.analysis.breakdown import never_returned
 from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
-from roboeval.analysis.tasks import prompt_data
-from roboeval.evaluation.explanation import CHANGED, completion_data
-from roboeval.evaluation.judge import is_met, judged, run_in_worlds
+from roboeval.evaluation.explanation import SUITE_CHANGED, completion_data
+from roboeval.evaluation.judge import is_met, judge_outcomes, run_in_worlds
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.rows import Row, decode_row, key_of
-from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, trace_of
+from roboeval.evaluation.runs.rows import decode_row, key_of
+from roboeval.evaluation.runs.traces import circumstances, trace_of
 from roboeval.evaluation.serialization import row_line
 from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
@@ -60,7 +57,7 @@ def suite_of(world: World, rules: SimulationSettings, *formulas: str, skills: Sk
 def judge(worker: Worker, suite: Suite, program: str) -> tuple[Outcome, dict[str, Any]]:
     """How a program ends, and its row as it is read back."""
     ((name, outcomes),) = run_in_worlds(suite, worker, [("T", program)], ablated=False)
-    told = judged(suite, (name, outcomes), ablated=False)
+    told = judge_outcomes(suite, (name, outcomes), ablated=False)
     assert told is not None
     line = row_line(Completion(task="T", prompt=0, index=0, program=program), told[0])
     assert key_of(decode_row(line, check_kinds=suite.skills is SKILLS)) == ("T", 0, 0)
@@ -83,7 +80,7 @@ def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:
     outcome, row = judge(worker, suite, program)
     require = suite.tasks["T"].scenarios[0].require
     met = [is_met(one, outcome.trace) for one in require]
-    assert [why.startswith(CHANGED) for why in explained(row, suite)] == met
+    assert [why.startswith(SUITE_CHANGED) for why in explained(row, suite)] == met
     assert [bool(find(row, one.text).worlds) for one in require] == met
     return met
 
@@ -280,37 +277,3 @@ def test_both_kinds_of_processes_say_where_events_happen(worker: Worker) -> None
         "holding": [[2, "mug"], [5, ""]],
     }
     assert (outcome.trace[2].place, outcome.trace[2].holding) == ("office", "mug")
-
-
-# --- rows of earlier versions
-
-
-def earlier(row: dict[str, Any]) -> dict[str, Any]:
-    verdicts = [
-        {name: value for name, value in verdict.items() if name not in CIRCUMSTANCES}
-        for verdict in row["verdicts"]
-    ]
-    return {**row, "verdicts": verdicts}
-
-
-def test_rows_of_earlier_versions_answer_what_needs_no_places(worker: Worker) -> None:
-    formulas = (SAYS_THERE, 'tr.Exists(holding("mug", say("hi")))', 'tr.Exists(say("bye"))')
-    suite = suite_of(OFFICES, STRICT, *formulas)
-    _, row = judge(worker, suite, THERE)
-    old = earlier(row)
-    where, held, said = explained(old, suite)
-    assert "--redo" in where
-    assert held == where
-    assert "never said" in said
-    for formula in formulas[:2]:
-        for negated in (False, True):
-            found = match_row(old, TraceQuery(formula, negated), parse(formula))
-            assert (found.worlds, found.undecided, found.earlier) == ((), ((1, "w"),), ((1, "w"),))
-    assert find(old, 'tr.Exists(say("hi"))').worlds == ((1, "w"),)
-    assert not find(row, formulas[1]).undecided
-    (program,) = prompt_data(results_of([old], suite), "T", 0)["programs"]
-    assert program["explanation"] == where if program["failure"]["check"] == SAYS_THERE else True
-    (world,) = completion_data(old, None, suite)["worlds"]
-    assert "place" not in world["steps"][0]
-    assert never_returned(cast("Row", old)) is None
-    assert never_returned(cast("Row", row)) is True

@@ -182,7 +182,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_many_programs_are_judged_in_processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("codebotler.simulator.pool.cores", lambda: 3)
-    monkeypatch.setattr(engine_choice, "PROGRAMS_FOR_PROCESSES", 80)
+    monkeypatch.setattr(engine_choice, "MIN_PROGRAMS_FOR_PROCESSES", 80)
     chosen: list[str] = []
 
     def noted(engine: type[Local | Processes]) -> None:

@@ -18,7 +18,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP
+from codebotler.simulator.pool import MAX_KEYS_AHEAD, NO_SECCOMP
 from codebotler.simulator.worker import EngineError
 from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import engines
@@ -81,7 +81,7 @@ def test_missing_isolation_is_warned_of_once_or_refused(
     result = run_shard(functions, works, VERSIONS, {})
     cluster = RayCluster()
     cluster._ray = SimpleNamespace(wait=lambda shards, **_: (shards, []), get=lambda _: result)
-    assert [values for _, values in cluster._ended(range(3))] == [[0, 1]] * 3
+    assert [values for _, values in cluster._wait_for_some(range(3))] == [[0, 1]] * 3
     (message,) = caplog.messages
     assert message.endswith(f": {NO_SECCOMP}")
 
@@ -217,11 +217,11 @@ def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluste
     )
     first = [next(results) for _ in range(50)]
     assert [number for number, _ in first] == list(range(50))
-    assert len(read) <= 50 + MOST_AHEAD
+    assert len(read) <= 50 + MAX_KEYS_AHEAD
     more = [next(results) for _ in range(6000)]
     del results
     assert more[2950:3000] == first  # the very same calls
-    assert len(read) <= 6050 + MOST_AHEAD
+    assert len(read) <= 6050 + MAX_KEYS_AHEAD
 
 
 def test_what_a_call_raises_is_raised_here(cluster: RayCluster) -> None:

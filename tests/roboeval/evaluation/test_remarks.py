@@ -6,7 +6,7 @@ import pytest
 
 from codebotler.core.trace import Event, Option, Status, Trace
 from codebotler.core.world import Answer, Person, Room, World
-from codebotler.simulator.settings import PAPER, SimulationSettings
+from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
 from roboeval.evaluation.remarks import cycle_at_end, misplaced_questions, remarks_on
 
 THERE, LOOK, BACK = Event("goto", "lab"), Event("check", "mug", found=False), Event("goto", "hall")
@@ -100,14 +100,14 @@ LUNCH, WHEN = asked("lunch?", "yes", "no", answer="yes"), asked("when?", "12:30"
 
 
 def test_question_that_comes_too_early_is_named() -> None:
-    (remark,) = misplaced_questions((WHEN,), world(JILL), PAPER)
+    (remark,) = misplaced_questions((WHEN,), world(JILL), PAPER_SETTINGS)
     for part in ("office", '1st gets "yes"', "2nd gets the first option", '1st was "when?"'):
         assert part in remark
 
 
 def test_question_that_comes_too_late_is_named() -> None:
     person = Person("jill", ("yes", r"12:\d\d"))
-    (remark,) = misplaced_questions((LUNCH, LUNCH), world(person), PAPER)
+    (remark,) = misplaced_questions((LUNCH, LUNCH), world(person), PAPER_SETTINGS)
     assert '2nd was "lunch?"' in remark
 
 
@@ -127,13 +127,13 @@ def test_question_that_comes_too_late_is_named() -> None:
 def test_questions_in_the_order_of_the_answers_need_no_remark(
     trace: Trace, people: tuple[Person, ...]
 ) -> None:
-    assert [*misplaced_questions(trace, world(*people), PAPER)] == []
+    assert [*misplaced_questions(trace, world(*people), PAPER_SETTINGS)] == []
 
 
 def test_answer_that_became_a_no_is_remarked_on_as_well() -> None:
     early = asked("which tea?", "green", "none", answer="none")
     person = Person("jill", ("yes", "green"))
-    assert [*misplaced_questions((early,), world(person), PAPER)]
+    assert [*misplaced_questions((early,), world(person), PAPER_SETTINGS)]
 
 
 @pytest.mark.parametrize(("answer", "told"), [(-1, "the last option"), (2, "option 2"), ("tea", '"tea"')])
@@ -145,6 +145,6 @@ def test_answers_are_described(answer: Answer, told: str) -> None:
 
 def test_satisfied_world_and_unknown_world_need_no_remark_on_questions() -> None:
     failed = {"status": Status.ROBOT_ERROR, "satisfied": False}
-    assert remarks_on(failed, (WHEN,), world(JILL), PAPER)
-    assert remarks_on({**failed, "satisfied": True}, (WHEN,), world(JILL), PAPER) == []
-    assert remarks_on(failed, (WHEN,), None, PAPER) == []
+    assert remarks_on(failed, (WHEN,), world(JILL), PAPER_SETTINGS)
+    assert remarks_on({**failed, "satisfied": True}, (WHEN,), world(JILL), PAPER_SETTINGS) == []
+    assert remarks_on(failed, (WHEN,), None, PAPER_SETTINGS) == []

@@ -21,11 +21,11 @@ import pytest
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Outcome, RunError, Status
 from codebotler.simulator.pool import shared_pool
-from codebotler.simulator.process.spawn import ONE_AT_A_TIME
-from codebotler.simulator.worker import EVENTS, Worker
+from codebotler.simulator.process.spawn import START_LOCK
+from codebotler.simulator.worker import Worker, run_log
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate, is_met
-from roboeval.evaluation.rewards import Share, batches, first_alike, reward, total
+from roboeval.evaluation.rewards import Share, first_equal_prompt, reward, split_programs, total
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 from small_suite import a_suite
@@ -103,7 +103,7 @@ def test_a_world_that_only_asks_to_let_something_be_counts_as_the_others_do() ->
 
 def test_equal_programs_are_judged_once(caplog: pytest.LogCaptureFixture) -> None:
     (program,) = distinct(1, "once")
-    with caplog.at_level(logging.DEBUG, logger=EVENTS.name):
+    with caplog.at_level(logging.DEBUG, logger=run_log.name):
         first = reward("SayGoodDay", 0, [program] * 50)
         assert reward("SayGoodDay", 3, [program]) == first[:1] == [1.0]
     started = [record for record in caplog.records if record.getMessage().endswith("started")]
@@ -129,7 +129,7 @@ worlds:
         "def task_program():\n    go_to('lab')\n    say('x')\n",
     )
     assert [reward("T", prompt, [program], suite=suite) for prompt in range(3)] == [[1.0], [0.0], [1.0]]
-    assert [first_alike(suite, "T", prompt) for prompt in range(3)] == [0, 1, 0]
+    assert [first_equal_prompt(suite, "T", prompt) for prompt in range(3)] == [0, 1, 0]
 
 
 def test_it_may_be_called_from_many_threads_at_once() -> None:
@@ -166,7 +166,7 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(pool, "submit", noted)
     waited_for, given_up = distinct(8, "interrupted"), distinct(1_000, "given up")
-    few, many = (len(batches(programs, pool.workers)) for programs in (waited_for, given_up))
+    few, many = (len(split_programs(programs, pool.workers)) for programs in (waited_for, given_up))
 
     def interrupt() -> None:
         while len(futures) < few + many:
@@ -282,7 +282,7 @@ def test_nobody_forks_in_the_middle_of_a_start() -> None:
     began = threading.Event()
 
     def starting() -> None:
-        with ONE_AT_A_TIME:
+        with START_LOCK:
             began.set()
             time.sleep(0.3)
 
@@ -291,11 +291,11 @@ def test_nobody_forks_in_the_middle_of_a_start() -> None:
     assert began.wait(10)
     child = os.fork()
     if child == 0:
-        os._exit(0 if ONE_AT_A_TIME.acquire(timeout=5) else 1)
+        os._exit(0 if START_LOCK.acquire(timeout=5) else 1)
     other.join()
     assert os.waitpid(child, 0)[1] == 0
-    assert ONE_AT_A_TIME.acquire(timeout=5)
-    ONE_AT_A_TIME.release()
+    assert START_LOCK.acquire(timeout=5)
+    START_LOCK.release()
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")

@@ -445,17 +445,6 @@ def test_a_person_in_a_text_who_is_in_another_world_only(
     ]
 
 
-def test_worlds_that_require_the_same_in_other_words(linted: Lint) -> None:
-    checks = {"speaks": SPEAKS, "mute": 'tr.Count(say("hello"), 0)', "goes": GOES}
-    checks["says_once"] = 'tr.AtLeast(say("hello"), 1) and not tr.AtLeast(say("hello"), 2)'
-    checks["says_1"] = 'tr.Count(say("hello"), 1)'
-    assert "same-worlds: 1 and 2" in names(linted(checks, ["speaks"], ["not mute"]))
-    assert "same-worlds: 1 and 2" in names(linted(checks, ["goes", "says_1"], ["says_once", "goes"]))
-    assert "same-worlds: 1 and 2" in names(linted(checks, ["says_1"], ["speaks", "says_once"]))
-    for one, other in ((["speaks"], ["says_1"]), (["says_1"], ["speaks"]), (["goes"], ["goes", "speaks"])):
-        assert "same-worlds" not in [each.kind for each in linted(checks, one, other)]
-
-
 def test_worlds_that_cannot_be_satisfied_do_not_require_the_same(linted: Lint) -> None:
     checks = {"goes": GOES, "stays": STAYS, "speaks": SPEAKS}
     found = linted(checks, ["goes", "stays", "speaks"], ["goes", "not goes"], ["speaks"])

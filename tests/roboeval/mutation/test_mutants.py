@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 
 from codebotler.core.world import Room, World
-from roboeval.mutation.mutants import OPERATORS, Mutant, Original, mutants, originals, sample_mutants
+from roboeval.mutation.mutants import MUTATION_OPERATORS, Mutant, Original, mutants, originals, sample_mutants
 from roboeval.mutation.operator import Context, operators_in
 from roboeval.mutation.operators import misuse
 from roboeval.suites.load import Suite
@@ -82,7 +82,7 @@ def test_originals_are_right_solutions_and_what_a_user_names(paper: Suite) -> No
 
 @pytest.mark.slow
 def test_every_operator_finds_something_to_do_in_the_right_programs(paper: Suite) -> None:
-    idle = {operator.name: operator for operator in OPERATORS}
+    idle = {operator.name: operator for operator in MUTATION_OPERATORS}
     for task in paper.tasks.values():
         context = Context.of([scenario.world for scenario in task.scenarios])
         for made in mutants(originals(task), context, idle.copy().values()):

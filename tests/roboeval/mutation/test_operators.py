@@ -20,9 +20,9 @@ from codebotler.core.trace import Event, Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.settings import Limits, SimulationSettings
-from roboeval.mutation.mutants import OPERATORS
+from roboeval.mutation.mutants import MUTATION_OPERATORS
 from roboeval.mutation.operator import Context, Operator
-from roboeval.mutation.program_tree import apply_edit, read
+from roboeval.mutation.program_tree import apply_edit, parse_tree
 
 WORLD = World(
     rooms=(
@@ -47,7 +47,7 @@ def pour(sim: Simulation, cup: str, size: Literal["small", "large"]) -> bool:  #
 
 
 TABLE = SKILLS.with_skill(pour)
-BY_NAME = {operator.name: operator for operator in OPERATORS}
+BY_NAME = {operator.name: operator for operator in MUTATION_OPERATORS}
 
 
 class Example(TypedDict):
@@ -71,7 +71,7 @@ def program(body: str) -> str:
 
 def mutants(operator: Operator, body: str) -> Iterator[str]:
     """What an operator makes of a body."""
-    source = read(program(body))
+    source = parse_tree(program(body))
     assert source is not None
     found = (apply_edit(source, edit) for edit in operator.edits(source, CONTEXT))
     yield from (one for one in found if one is not None)
@@ -81,7 +81,7 @@ def mutants(operator: Operator, body: str) -> Iterator[str]:
 def outcomes() -> dict[str, Outcome]:
     """How all programs of the examples ended."""
     programs = [program(body) for example in EXAMPLES for body in (example["before"], example["after"])]
-    ended = run(((source, WORLD) for source in programs), workers=2, rules=RULES, skills=TABLE)
+    ended = run(((source, WORLD) for source in programs), workers=2, settings=RULES, skills=TABLE)
     return dict(zip(programs, ended, strict=True))
 
 
@@ -97,9 +97,9 @@ def told_event(event: Event) -> str:
 
 
 def test_each_operator_has_an_example_a_name_and_a_sentence() -> None:
-    assert [operator.name for operator in OPERATORS] == NAMES
-    assert len(BY_NAME) == len(OPERATORS)
-    for operator in OPERATORS:
+    assert [operator.name for operator in MUTATION_OPERATORS] == NAMES
+    assert len(BY_NAME) == len(MUTATION_OPERATORS)
+    for operator in MUTATION_OPERATORS:
         assert re.fullmatch(r"[a-z]+(-[a-z]+)*", operator.name)
         assert re.fullmatch(r"[A-Z].+\.", operator.about)
 
@@ -164,7 +164,7 @@ LEFT_OUT = [
 
 @pytest.mark.parametrize(("name", "body", "asking"), LEFT_OUT, ids=[name for name, *_ in LEFT_OUT])
 def test_what_no_phrasing_asks_for_may_be_left_out(name: str, body: str, asking: str) -> None:
-    source = read(program(body))
+    source = parse_tree(program(body))
     assert source is not None
     made = {
         phrasings: len([*BY_NAME[name].edits(source, Context.of([WORLD], phrasings))])
@@ -186,6 +186,6 @@ def test_what_no_phrasing_asks_for_may_be_left_out(name: str, body: str, asking:
 def test_what_is_only_to_be_brought_here_may_be_held(
     name: str, phrasings: tuple[str, ...], made: int
 ) -> None:
-    source = read(program("pick('mug')\nplace('mug')"))
+    source = parse_tree(program("pick('mug')\nplace('mug')"))
     assert source is not None
     assert len([*BY_NAME[name].edits(source, Context.of([WORLD], phrasings))]) == made

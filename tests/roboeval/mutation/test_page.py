@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from command_line import ENVIRONMENT, roboeval
-from roboeval.mutation.mutants import OPERATORS
+from roboeval.mutation.mutants import MUTATION_OPERATORS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "roboeval-plus.md").read_text()
 WIDE = {**ENVIRONMENT, "COLUMNS": "160"}
@@ -18,7 +18,7 @@ WIDE = {**ENVIRONMENT, "COLUMNS": "160"}
 def test_operators_are_documented() -> None:
     (table,) = re.findall(r"^\| operator \|.+\n(?:\|.+\n)+", PAGE, re.MULTILINE)
     rows = re.findall(r"^\| `([a-z-]+)` \| (.+) \|$", table, re.MULTILINE)
-    assert rows == [(operator.name, operator.about) for operator in OPERATORS]
+    assert rows == [(operator.name, operator.about) for operator in MUTATION_OPERATORS]
 
 
 @pytest.mark.slow

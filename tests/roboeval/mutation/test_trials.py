@@ -17,7 +17,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.report import to_yaml
 from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, TriedMutant
-from roboeval.mutation.trials import mutation_score, result_of, worlds_of
+from roboeval.mutation.trials import judge_mutant, mutation_score, mutation_worlds
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import equivalent_mutants
 from small_suite import a_suite
@@ -68,7 +68,7 @@ def program(body: str) -> str:
 
 
 def outcomes_of(source: str, suite: Suite, pool: WorkerPool) -> list[Outcome]:
-    robots = [partial(SimulatedRobot, one.world, suite.rules) for one in suite.task("T").scenarios]
+    robots = [partial(SimulatedRobot, one.world, suite.settings) for one in suite.task("T").scenarios]
     return pool.here().run_all([(source, robots)])[0]
 
 
@@ -92,7 +92,7 @@ def outcomes_of(source: str, suite: Suite, pool: WorkerPool) -> list[Outcome]:
 )
 def test_what_becomes_of_a_mutant(body: str, result: MutantResult, suite: Suite, pool: WorkerPool) -> None:
     before, now = (outcomes_of(source, suite, pool) for source in (RIGHT.program, program(body)))
-    assert result_of(now, before, suite.task("T").scenarios) == result
+    assert judge_mutant(now, before, suite.task("T").scenarios) == result
 
 
 def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, pool: WorkerPool) -> None:
@@ -203,9 +203,9 @@ def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> N
 
 
 def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
-    assert worlds_of(suite, task, None, 1) == task.scenarios
+    assert mutation_worlds(suite, task, None, 1) == task.scenarios
     with pytest.raises(UserError, match=r'"mine".* --worlds'):
-        worlds_of(suite, task, 200, 1)
+        mutation_worlds(suite, task, 200, 1)
 
 
 def test_worlds_that_a_suite_makes_for_mutants_are_not_those_it_judges_by(
@@ -219,8 +219,8 @@ def test_worlds_that_a_suite_makes_for_mutants_are_not_those_it_judges_by(
 
     monkeypatch.setattr(Suite, "with_worlds", with_worlds)
     makes = replace(suite, worlds=30, seed=3)
-    assert worlds_of(makes, task, 3, 1) == task.scenarios
-    assert [worlds_of(makes, task, None, seed) for seed in range(5)] == [task.scenarios] * 5
+    assert mutation_worlds(makes, task, 3, 1) == task.scenarios
+    assert [mutation_worlds(makes, task, None, seed) for seed in range(5)] == [task.scenarios] * 5
     assert [count for count, _ in drawn] == [3, *[200] * 5]
     seeds = [seed for _, seed in drawn[1:]]
     assert 3 not in seeds

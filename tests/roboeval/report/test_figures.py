@@ -19,14 +19,15 @@ from PIL import Image
 from made_up_runs import cases, made_up
 from roboeval.analysis.metrics import overall
 from roboeval.analysis.resample import LIMITS, accepted_after
-from roboeval.evaluation.failures import CLASSES, FailureClass
-from roboeval.report.cost import curves
+from roboeval.evaluation.failures import FAILURE_CLASSES, FailureClass
+from roboeval.report.cost import retry_curves
+from roboeval.report.curves import draw_accepted, draw_limits, draw_thresholds, most_completions
 from roboeval.report.drawing import (
+    BACKGROUND,
     COLOURS,
-    DARK,
-    PAPER,
+    DARK_COLOURS,
+    PAGE_WIDTH,
     WHITE,
-    WIDE,
     darken,
     new_figure,
     render,
@@ -36,27 +37,25 @@ from roboeval.report.drawing import (
 from roboeval.report.failures import all_causes
 from roboeval.report.figures import (
     WORST_AND_BEST,
-    accepted,
-    bars,
-    causes,
-    heat,
-    limits,
-    most_completions,
-    overall_scores,
-    thresholds,
+    draw_causes,
+    draw_heat_map,
+    draw_overall,
+    draw_task_scores,
 )
 from roboeval.report.runs import JudgedRun
 
 PICTURES = Path(__file__).with_name("pictures")
 DRAWINGS: dict[str, Callable[[list[JudgedRun]], Figure]] = {
-    "overall": overall_scores,
-    "tasks": bars,
-    "thresholds": thresholds,
-    "causes": lambda runs: causes(all_causes(runs, with_published=True)),
-    "rejection-sampling": lambda runs: limits(
-        {run.name: curves(run.trials) for run in runs}, most_completions(runs)
+    "overall": draw_overall,
+    "tasks": draw_task_scores,
+    "thresholds": draw_thresholds,
+    "causes": lambda runs: draw_causes(all_causes(runs, with_published=True)),
+    "rejection-sampling": lambda runs: draw_limits(
+        {run.name: retry_curves(run.trials) for run in runs}, most_completions(runs)
     ),
-    "accepted": lambda runs: accepted({run.name: accepted_after(run.trials, LIMITS[-1]) for run in runs}),
+    "accepted": lambda runs: draw_accepted(
+        {run.name: accepted_after(run.trials, LIMITS[-1]) for run in runs}
+    ),
 }
 KEPT: list[Any] = [*(("usual", name) for name in DRAWINGS)]
 KEPT += [("40 models", name) for name in DRAWINGS]
@@ -119,7 +118,7 @@ def test_other_numbers_look_different() -> None:
 
 def test_a_further_class_of_failures_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     one = FailureClass("RuleError", "broken rule", "broken rules", ())
-    monkeypatch.setitem(cast("dict[str, FailureClass]", CLASSES), one.name, one)
+    monkeypatch.setitem(cast("dict[str, FailureClass]", FAILURE_CLASSES), one.name, one)
     with use_style():
         figure = DRAWINGS["causes"](cases()["usual"])
     assert [axes.get_title(loc="left") for axes in figure.axes][-1] == "(e) broken rules"
@@ -153,7 +152,7 @@ def test_classes_keep_their_colours() -> None:
 def test_whisker_is_the_interval_and_marks_are_the_worst_and_the_best_prompt() -> None:
     run = made_up("a", {"Visit": (4, 5, 6), "CountMugs": (4,), "BringTea": (3, 3, 3)})
     with use_style():
-        (axes,) = bars([run]).axes
+        (axes,) = draw_task_scores([run]).axes
     (ends,) = [np.asarray(line)[:, 1] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
     passed = run.scores[0].pass_at(1)
     assert np.allclose(ends, (passed.low, passed.high)), "the others have no known interval"
@@ -166,7 +165,7 @@ def test_whisker_is_the_interval_and_marks_are_the_worst_and_the_best_prompt() -
 def test_overall_figure_has_the_interval_over_tasks() -> None:
     runs = cases()["usual"]
     with use_style():
-        (axes,) = overall_scores(runs).axes
+        (axes,) = draw_overall(runs).axes
     passed = [overall(run.scores, 1) for run in runs]
     ends = [np.asarray(line)[:, 0] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
     assert np.allclose(ends, [(one.low, one.high) for one in passed])
@@ -189,7 +188,7 @@ def test_lines_end_where_the_axis_ends() -> None:
     run = made_up("a", {"Visit": (1,), "Wait": (0,)}, of=50)
     other = made_up("b", {"Visit": (5,)}, accepted=~pl.col("passed"))  # after 100 retries nearly none passes
     with use_style():
-        drawn = {1 / 50: thresholds([run]), 1 / 10: limits({"b": curves(other.trials)}, 10)}
+        drawn = {1 / 50: draw_thresholds([run]), 1 / 10: draw_limits({"b": retry_curves(other.trials)}, 10)}
     for end, figure in drawn.items():
         ticks = [text.get_text() for text in figure.axes[0].get_xticklabels()]
         assert (ticks[0], ticks[-1]) == ("1", f"1/{1 / end:.0f}")
@@ -205,9 +204,9 @@ def test_lines_end_where_the_axis_ends() -> None:
 def test_numbers_stand_out_from_their_shades() -> None:
     shares = [n / 100 for n in range(101)]
     with use_style():
-        figure = new_figure(WIDE, WIDE)
+        figure = new_figure(PAGE_WIDTH, PAGE_WIDTH)
         axes = figure.add_subplot()
-        heat(axes, [[share] for share in shares], [""] * len(shares), [""])
+        draw_heat_map(axes, [[share] for share in shares], [""] * len(shares), [""])
         figure.draw_without_rendering()
         cells = np.asarray(axes.collections[0].get_facecolor())
     for text, cell in zip(axes.texts, cells, strict=True):
@@ -224,8 +223,8 @@ def in_the_dark(colour: str) -> str:
 def test_each_colour_has_one_meaning() -> None:
     shaded = {to_hex(shades()(n)) for n in range(1, 256)}
     assert len(shaded) == 255
-    assert not shaded & {colour.lower() for colour in (*COLOURS, *DARK, WHITE)}
-    assert in_the_dark(PAPER) != in_the_dark(WHITE) == WHITE
+    assert not shaded & {colour.lower() for colour in (*COLOURS, *DARK_COLOURS, WHITE)}
+    assert in_the_dark(BACKGROUND) != in_the_dark(WHITE) == WHITE
     assert in_the_dark(COLOURS[0]) == COLOURS[0].lower()
 
 
@@ -235,8 +234,8 @@ def test_nothing_of_a_dark_figure_is_left_light(name: str) -> None:
     with use_style():
         svg = render(DRAWINGS[name](cases()["usual"]))["svg"]
     dark = darken(svg)
-    assert PAPER.encode() in svg
-    assert not re.search(b"#(%s)" % b"|".join(colour[1:].encode() for colour in DARK), dark)
+    assert BACKGROUND.encode() in svg
+    assert not re.search(b"#(%s)" % b"|".join(colour[1:].encode() for colour in DARK_COLOURS), dark)
     assert not re.search(rb"rgb\(|(?:fill|stroke): (?!none|#|url)", svg), "a colour that is not exchanged"
 
 
@@ -251,7 +250,7 @@ def light(colour: tuple[float, float, float]) -> float:
 def test_the_same_numbers_give_the_same_bytes(kind: str) -> None:
     def drawn() -> bytes:
         with use_style():
-            return render(bars(cases()["usual"]))[kind]
+            return render(draw_task_scores(cases()["usual"]))[kind]
 
     first = drawn()
     assert first == drawn()

@@ -94,7 +94,7 @@ def test_the_first_screen_says_who_is_ahead_and_what_fails_most() -> None:
     assert re.search(r"Most frequent failure: \w+ \([\w ]+\), \d+% of all completions\.", first)
     assert "Every program passes." in first
     assert re.search(r"<p>strong (is better|passes more often) than weak by 70\.0 points", first)
-    assert '<a href="tables/overall.csv">overall</a>' in text
+    assert '<a href="tables/overall.csv">tables/overall.csv</a>' in text
 
 
 def test_a_p_that_is_nothing_is_said_to_be_small() -> None:

@@ -19,7 +19,7 @@ from roboeval.report.breakdown import (
     spread_sheet,
 )
 from roboeval.report.cost import budget_sheet, cost_sheet, expect_known, price_of, read_prices
-from roboeval.report.failures import similar_failures
+from roboeval.report.failures import failures_section
 from roboeval.report.runs import JudgedRun
 from roboeval.report.scores import differences
 from roboeval.report.sheets import Groups, Prose, Sheet
@@ -128,8 +128,6 @@ def test_prices() -> None:
     for wrong in ("gpt", "gpt=1", "=1/2", "gpt=a/b", "gpt=-1/2", "gpt=nan/1", "gpt=1/2/3"):
         with pytest.raises(UserError, match="MODEL=INPUT/OUTPUT"):
             read_prices([wrong])
-    with pytest.raises(UserError, match=r'--price .*"a" twice'):
-        read_prices(["a=1/1", "a=2/2"])
     with pytest.raises(UserError, match=r'--price .*"x".*\ba$'):
         expect_known({"x": Price(1, 1)}, [made_up("a", {"Visit": (1,)})])
 
@@ -168,22 +166,22 @@ def test_pairs_that_were_asked_otherwise_are_told() -> None:
 
 def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     run = made_up("a", {"Visit": (3,)})
-    _, groups, table = similar_failures([run]).parts
+    _, groups, table = failures_section([run]).parts
     assert isinstance(groups, Groups)
     assert sum(len(one.members) for _, one in groups.shown) == 7
     assert isinstance(table, Sheet)
     rows = as_dicts(table)
     assert (rows[0]["passes"], rows[0]["lines apart"]) == ("Visit/0/0", 0)
-    monkeypatch.setattr("roboeval.report.failures.MOST", 2)
-    monkeypatch.setattr("roboeval.report.failures.FEWEST", 2)
-    about, groups, table = similar_failures([run]).parts
+    monkeypatch.setattr("roboeval.report.failures.MAX_GROUPS_PER_RUN", 2)
+    monkeypatch.setattr("roboeval.report.failures.MIN_GROUPS_PER_RUN", 2)
+    about, groups, table = failures_section([run]).parts
     assert isinstance(about, Prose)
     assert re.search(r"^a: 2 of 7 groups are shown", about.paragraphs[-1])
     assert isinstance(groups, Groups)
     assert len(groups.shown) == 2
     assert isinstance(table, Sheet)
     assert as_dicts(table) == rows
-    assert similar_failures([made_up("a", {"Visit": (10,)})]).parts == []
+    assert failures_section([made_up("a", {"Visit": (10,)})]).parts == []
 
 
 def test_where_it_comes_from() -> None:

@@ -11,7 +11,7 @@ from codebotler.core.errors import UserError
 from command_line import refused, roboeval
 from roboeval.evaluation.evaluate import evaluation_metadata
 from roboeval.evaluation.runs.source import recorded_completions
-from roboeval.suites.families.suite import MOST_TASKS, SPLITS, FamilyTasks
+from roboeval.suites.families.suite import FIRST_SEEDS, MAX_FAMILY_TASKS, FamilyTasks
 from roboeval.suites.families.tasks import trained_task
 from roboeval.suites.load import has_suite, load_suite
 from roboeval.training.prompts import load_prompts
@@ -48,7 +48,7 @@ def test_a_suite_is_the_same_each_time_and_another_for_another_seed() -> None:
 
 
 def test_seeds_and_splits_share_no_task() -> None:
-    kinds = [FamilyTasks(split, seed, 3) for split in SPLITS for seed in (0, 1)]
+    kinds = [FamilyTasks(split, seed, 3) for split in FIRST_SEEDS for seed in (0, 1)]
     assert len({seed for kind in kinds for _, _, seed in kind.seeds()}) == 3 * len(kinds)
 
 
@@ -68,7 +68,7 @@ def test_a_suite_has_one_name(name: str) -> None:
         (("test", -1), "the seed is -1, but with 17 tasks it must be from 0 to"),
         (("test", 1_000_000_000), "the seed is 1000000000"),
         (("test", 0, 0), "the number of tasks is 0"),
-        (("test", 0, MOST_TASKS + 1), f"at most {MOST_TASKS}"),
+        (("test", 0, MAX_FAMILY_TASKS + 1), f"at most {MAX_FAMILY_TASKS}"),
     ],
 )
 def test_mistakes_are_refused(wrong: tuple[str, int, int], sentence: str) -> None:

@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import pytest
 
 from codebotler.core.errors import UserError
-from roboeval.suites.expression import ExpressionError, each_of, evaluate, parse_cached
+from roboeval.suites.expression import ExpressionError, evaluate, iterate_loop, parse_cached
 from roboeval.suites.load import load_suite
 from roboeval.suites.pairwise import cover_pairs, sample_combinations
-from roboeval.suites.schema import MOST_WORLDS
+from roboeval.suites.schema import MAX_WORLDS
 from roboeval.suites.suite import _build_suite
 
 SUITE = "name: mine\nversion: 1\nabout: my tasks\nworlds: 12\nseed: 3\n"
@@ -141,7 +141,7 @@ def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:
 
 
 def test_more_worlds_than_fit_into_memory_are_not_drawn(tmp_path: Path) -> None:
-    mine, most = load_suite(suite(tmp_path)), MOST_WORLDS
+    mine, most = load_suite(suite(tmp_path)), MAX_WORLDS
     with pytest.raises(UserError, match=f"{most + 1}.* {most:,}"):
         mine.with_worlds(most + 1)
 
@@ -168,8 +168,6 @@ def test_checks_name_phrases(tmp_path: Path) -> None:
     [
         ("some:", "people:", ['"people"', "phrases"]),
         ("some:", "two words:", ['"two words"', "phrases"]),
-        ('{some}"', 'tea"', ['"some"', "{some}"]),
-        ("[tea,", """['"tea"',""", ['"tea"', "quotation mark"]),
         ("[tea, cups? for]", "[]", ['"some"', "too few"]),
     ],
 )
@@ -295,4 +293,4 @@ def test_who_calls_an_unknown_function_is_told_the_known_ones() -> None:
 def test_a_loop_binds_one_name() -> None:
     node = parse_cached("[p for p in people if p.room]")
     assert isinstance(node, ast.ListComp)
-    assert [each["p"].name for each in each_of(node.generators[0], FACTS)] == ["kim"]
+    assert [each["p"].name for each in iterate_loop(node.generators[0], FACTS)] == ["kim"]

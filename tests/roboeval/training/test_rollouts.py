@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.simulator.pool import AHEAD, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
-from roboeval.suites.families.suite import SPLITS
+from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import TrainedTask, trained_task
 from roboeval.suites.house import HouseRules
 from roboeval.training import prompts, rollouts
@@ -70,27 +68,11 @@ def test_equal_rollouts_are_judged_once_and_progress_is_told() -> None:
     assert told[-1] == 40, "nothing is judged again"
 
 
-def test_only_a_few_batches_are_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    pool, under_way, most = shared_pool(), [0], [0]
-    submit = pool.submit
-
-    def counted(*arguments: Any) -> Future[Any]:  # noqa: ANN401 - of any call
-        under_way[0] += 1
-        most[0] = max(most[0], under_way[0])
-        future: Future[Any] = submit(*arguments)
-        future.add_done_callback(lambda _: under_way.__setitem__(0, under_way[0] - 1))
-        return future
-
-    monkeypatch.setattr(pool, "submit", counted)
-    judge([saying(f"one of {number}") for number in range(400)])
-    assert 1 <= most[0] <= AHEAD * pool.workers
-
-
 def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rollouts, "_judged", broken)
+    monkeypatch.setattr(rollouts, "_judge_batch", broken)
     with pytest.raises(EngineError, match="no process"):
         judge([saying("never judged before")])
 
@@ -106,7 +88,7 @@ def test_a_prompt_that_is_not_there_is_refused() -> None:
 def test_prompts_are_the_same_each_time_and_splits_share_no_task() -> None:
     assert load_prompts(count=20) == load_prompts(count=20)
     assert load_prompts(count=20, seed=1)[0]["seed"] == 20
-    tasks = [{(row["family"], row["seed"]) for row in load_prompts(split, count=40)} for split in SPLITS]
+    tasks = [{(row["family"], row["seed"]) for row in load_prompts(split, count=40)} for split in FIRST_SEEDS]
     assert [len(one) for one in tasks] == [40] * 3
     assert not tasks[0] & tasks[1] | tasks[1] & tasks[2] | tasks[0] & tasks[2]
 

@@ -22,7 +22,7 @@ from codebotler.web.access import Access, GuardRules
 from codebotler.web.guard import Guard
 from command_line import refused, roboeval
 from pageserver import PageServer
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from runs_server import serving
 
 HOSTILE = "<script>window.owned=1</script>[x](javascript:owned)\u202e\ud800\x00'\"&"
@@ -197,7 +197,7 @@ def test_a_run_that_is_deleted_is_not_found_any_more(runs: Path) -> None:
 
 
 def test_damaged_rows_are_said_and_the_others_are_there(runs: Path) -> None:
-    rows = Run(runs / "hasty").rows("paper")
+    rows = RunFolder(runs / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
     at = next(n for n, line in enumerate(lines) if json.loads(line)["failure"])
     row = json.loads(lines[at])
@@ -216,7 +216,7 @@ def test_damaged_rows_are_said_and_the_others_are_there(runs: Path) -> None:
 
 
 def test_hostile_texts_come_as_they_are(runs: Path) -> None:
-    run = Run(runs / "hasty")
+    run = RunFolder(runs / "hasty")
     lines = run.completions.read_bytes().splitlines(keepends=True)
     row = {**json.loads(lines[0]), "model": HOSTILE, "program": HOSTILE * 3_000}
     run.completions.write_bytes(to_line(row) + b"".join(lines[1:]))
@@ -231,7 +231,7 @@ def test_hostile_texts_come_as_they_are(runs: Path) -> None:
 
 
 def test_a_suite_of_ones_own_is_named(runs: Path, tmp_path: Path) -> None:
-    head = Run(runs / "hasty").head("paper")
+    head = RunFolder(runs / "hasty").manifest("paper")
     head.write_text(json.dumps({**json.loads(head.read_text()), "suite": "mine"}))
     with serving(runs) as server:
         run = told(server, "/api/runs/hasty")
@@ -333,9 +333,8 @@ def test_the_api_is_described(server: PageServer) -> None:
         "/api/runs/{run}/tables/{table}.csv",
         "/api/runs/{run}/completions/{task}/{prompt}/{index}",
     }
-    page = server.call("GET", "/api").text
-    assert "/api/runs/{run}/completions" in page
-    assert "Only this task." in page
+    listed = paths["/api/runs/{run}/completions"]["get"]["parameters"]
+    assert all(one.get("description") for one in listed if one["in"] == "query")
 
 
 def test_without_a_robot_there_is_nothing_to_stop(server: PageServer) -> None:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from roboeval.analysis.metrics import percent
 from roboeval.evaluation.failures import plural_of
-from roboeval.evaluation.runs.folder import Run
-from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, percent, shade
+from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, shade
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import CompletionFilter
 
@@ -32,7 +33,7 @@ def test_little_is_not_nothing_and_nearly_all_is_not_all(share: float, text: str
     ],
 )
 def test_cells_of_a_run(runs: Path, chosen: CompletionFilter, column: str, value: object) -> None:
-    rows = Run(runs / "hasty").rows("paper")
+    rows = RunFolder(runs / "hasty").rows("paper")
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:30]))
     run = RunStore(runs).open("hasty")
     cells = TaskCells(run, chosen, "paper")

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import load_suite
 from roboeval.web import run_store
-from roboeval.web.run_store import MOST_HELD, MissingError, RunStore
+from roboeval.web.run_store import MAX_SNAPSHOTS, MissingError, RunStore
 from seals import unseal
 
 
@@ -83,7 +83,7 @@ def test_the_folder_itself_may_be_a_link(runs: Path) -> None:
 
 
 def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(runs: Path) -> None:
-    rows = Run(runs / "hasty").rows("paper")
+    rows = RunFolder(runs / "hasty").rows("paper")
     rows.unlink()
     os.mkfifo(rows)
     with pytest.raises(UserError, match="not a regular file") as error:
@@ -92,7 +92,7 @@ def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(runs: Path) -> None:
 
 
 def test_evaluations_are_found_by_name(runs: Path) -> None:
-    run = Run(runs / "hasty")
+    run = RunFolder(runs / "hasty")
     shutil.copy(run.rows("paper"), run.rows("paper-ablation"))
     shutil.copy(run.rows("paper"), run.rows("another"))
     store = RunStore(runs)
@@ -105,8 +105,8 @@ def test_evaluations_are_found_by_name(runs: Path) -> None:
 
 
 def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_store, "REST", 0)
-    store, run = RunStore(runs), Run(runs / "hasty")
+    monkeypatch.setattr(run_store, "REST_FACTOR", 0)
+    store, run = RunStore(runs), RunFolder(runs / "hasty")
     first = store.open("hasty")
     assert store.open("hasty") is first
     assert store.version("hasty") == first.version
@@ -124,8 +124,8 @@ def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: p
 
 
 def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_store, "REST", 1e9)
-    store, run = RunStore(runs), Run(runs / "hasty")
+    monkeypatch.setattr(run_store, "REST_FACTOR", 1e9)
+    store, run = RunStore(runs), RunFolder(runs / "hasty")
     first = store.open("hasty")
     completions = run.completions.read_bytes().splitlines(keepends=True)
     run.completions.write_bytes(b"".join(completions[:20]))
@@ -137,7 +137,7 @@ def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.
 
 
 def test_a_row_that_was_written_anew_is_not_shown_for_another(runs: Path) -> None:
-    run, rows = RunStore(runs).open("hasty"), Run(runs / "hasty").rows("paper")
+    run, rows = RunStore(runs).open("hasty"), RunFolder(runs / "hasty").rows("paper")
     assert run.results.row(("LunchBreak", 2, 1))["index"] == 1
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[1:]))
     with pytest.raises(UserError, match="replaced"):
@@ -153,7 +153,7 @@ def test_a_run_that_is_deleted_is_gone(runs: Path) -> None:
 
 
 def test_a_writer_is_seen_and_not_disturbed(runs: Path) -> None:
-    run, store = Run(runs / "hasty"), RunStore(runs)
+    run, store = RunFolder(runs / "hasty"), RunStore(runs)
     for _ in range(50):  # a hold of ours that outlived a look would refuse the next writer
         assert not store.open("hasty").is_written
         with run.writing():
@@ -163,20 +163,20 @@ def test_a_writer_is_seen_and_not_disturbed(runs: Path) -> None:
 
 
 def test_the_oldest_are_forgotten(runs: Path) -> None:
-    for number in range(MOST_HELD):
+    for number in range(MAX_SNAPSHOTS):
         (runs / f"run-{number}").mkdir()
         (runs / f"run-{number}" / "run.json").write_text("{}")
     store = RunStore(runs)
     first = store.open("hasty")
-    for number in range(MOST_HELD):
+    for number in range(MAX_SNAPSHOTS):
         store.open(f"run-{number}")
     assert store.open("hasty") is not first
 
 
 def test_suites_are_those_that_ship_and_those_that_are_named(runs: Path) -> None:
-    run = Run(runs / "hasty")
+    run = RunFolder(runs / "hasty")
     assert RunStore(runs).open("hasty").suite == load_suite("paper")
-    run.head("paper").write_text('{"suite": "../../my-suite"}')
+    run.manifest("paper").write_text('{"suite": "../../my-suite"}')
     assert RunStore(runs).open("hasty").suite is None
-    run.head("paper").write_text('{"suite": ["paper"]}')
+    run.manifest("paper").write_text('{"suite": ["paper"]}')
     assert RunStore(runs).open("hasty").suite == load_suite("paper")

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from codebotler.core.files import to_line
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results, read_results
-from roboeval.web.run_store import MOST_HELD, RunStore
+from roboeval.web.run_store import MAX_SNAPSHOTS, RunStore
 from roboeval.web.serializers import RunList, RunState, date_of, notes, run_data, settings_text
 
 
@@ -33,7 +33,7 @@ def test_settings_and_date_of_a_run_are_told() -> None:
 
 
 def test_many_cut_off_replies_are_noted(runs: Path) -> None:
-    completions = Run(runs / "hasty").completions
+    completions = RunFolder(runs / "hasty").completions
     rows = [json.loads(line) for line in completions.read_bytes().splitlines()]
     cut = [{**row, "finish_reason": "length"} for row in rows[:3]] + rows[3:]
     completions.write_bytes(b"".join(map(to_line, cut)))
@@ -45,7 +45,7 @@ def test_many_cut_off_replies_are_noted(runs: Path) -> None:
 
 
 def test_many_damaged_lines_are_counted(runs: Path) -> None:
-    completions = Run(runs / "hasty").completions
+    completions = RunFolder(runs / "hasty").completions
     again = completions.read_bytes().splitlines(keepends=True)[0]
     completions.write_bytes(b"nothing\n" * 12 + completions.read_bytes() + again)
     run = RunStore(runs).open("hasty")
@@ -60,12 +60,12 @@ def test_many_damaged_lines_are_counted(runs: Path) -> None:
 def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
     runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for number in range(MOST_HELD + 2):
+    for number in range(MAX_SNAPSHOTS + 2):
         shutil.copytree(runs / "hasty", runs / f"run-{number}")
     (runs / "run-0" / "run.json").write_text("[]")
     reads: list[Path] = []
 
-    def counted(run: Run, key: str | None, **others: Any) -> Results:  # noqa: ANN401 - as it is called
+    def counted(run: RunFolder, key: str | None, **others: Any) -> Results:  # noqa: ANN401 - as it is called
         reads.append(run.path)
         return read_results(run, key, **others)
 
@@ -74,12 +74,12 @@ def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
     assert {run["state"] for run in all_runs.data(0)} == {RunState.READING}
     assert reads == []
     first = all_runs.data()
-    assert len(reads) == len(first) == MOST_HELD + 3
+    assert len(reads) == len(first) == MAX_SNAPSHOTS + 3
     assert {run["judged"] for run in first} == {45}
     assert [run["run"] for run in first if run["state"] == RunState.DAMAGED] == ["run-0"]
     assert all_runs.data(0) == all_runs.data() == first
     assert len(reads) == len(first)
-    rows = Run(runs / "run-3").rows("paper")
+    rows = RunFolder(runs / "run-3").rows("paper")
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:9]))
     shutil.rmtree(runs / "run-4")
     (runs / "run-5" / "completions.jsonl").unlink()

@@ -11,7 +11,7 @@ import pytest
 
 from codebotler.core.files import to_line
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import RunState, state_of
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -32,7 +32,7 @@ def keys(frame: Any) -> list[Any]:  # noqa: ANN401 - a table
 
 def test_a_row_for_each_completion(runs: Path) -> None:
     run = opened(runs / "hasty")
-    rows = [json.loads(line) for line in lines_of(Run(runs / "hasty").rows("paper"))]
+    rows = [json.loads(line) for line in lines_of(RunFolder(runs / "hasty").rows("paper"))]
     assert run.completions.height == len(rows) == 45
     assert len(run.results.completions) == run.results.scope.total == run.judged == 45
     assert (len(run.results.stale), run.results.faults, run.models) == (0, (), ["recorded:hasty"])
@@ -54,7 +54,7 @@ def test_a_row_for_each_completion(runs: Path) -> None:
 
 
 def test_a_limit_that_ended_a_program_is_called_one(runs: Path) -> None:
-    rows = Run(runs / "hasty").rows("paper")
+    rows = RunFolder(runs / "hasty").rows("paper")
     lines = [json.loads(line) for line in lines_of(rows)]
     at = next(n for n, row in enumerate(lines) if row["failure"] and row["failure"]["check"] is None)
     for message, why in (
@@ -69,7 +69,7 @@ def test_a_limit_that_ended_a_program_is_called_one(runs: Path) -> None:
 
 
 def test_what_is_not_judged_yet_or_judged_and_gone_is_there_too(runs: Path) -> None:
-    run = Run(runs / "hasty")
+    run = RunFolder(runs / "hasty")
     completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
     run.completions.write_bytes(b"".join(completions[5:]))
     run.rows("paper").write_bytes(b"".join(rows[:40]))
@@ -92,7 +92,7 @@ def _key(line: bytes) -> tuple[str, int, int]:
 
 
 def test_a_program_that_changed_since_it_was_judged_is_stale(runs: Path) -> None:
-    completions = Run(runs / "hasty").completions
+    completions = RunFolder(runs / "hasty").completions
     lines = lines_of(completions)
     row = json.loads(lines[7])
     completions.write_bytes(b"".join([*lines[:7], to_line({**row, "program": "x = 1\n"}), *lines[8:]]))
@@ -124,7 +124,7 @@ def test_filters_prompts_and_neighbours(runs: Path) -> None:
 
 
 def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
-    rows = Run(runs / "hasty").rows("paper")
+    rows = RunFolder(runs / "hasty").rows("paper")
     first, *others = [json.loads(line) for line in lines_of(rows)]
     first |= {"passed": False, "failure": {"class": "NoProgram", "kind": "empty", "world": 0, "check": None}}
     rows.write_bytes(b"".join(map(to_line, [first, *others])))
@@ -137,7 +137,7 @@ def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
 
 
 def test_how_far_a_run_has_come(runs: Path) -> None:
-    run = Run(runs / "hasty")
+    run = RunFolder(runs / "hasty")
     completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
     cases: list[tuple[int, int, bool, int | None, RunState]] = [
         (45, 0, True, 60, RunState.GENERATING),
@@ -150,8 +150,10 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
         (45, 40, False, 45, RunState.UNFINISHED),
         (45, 45, False, None, RunState.JUDGED),
     ]
-    head = json.loads(run.head("paper").read_text())
-    run.head("paper").write_text(json.dumps({k: v for k, v in head.items() if k not in {"rows", "sha256"}}))
+    head = json.loads(run.manifest("paper").read_text())
+    run.manifest("paper").write_text(
+        json.dumps({k: v for k, v in head.items() if k not in {"rows", "sha256"}})
+    )
     for written, judged, is_written, requested, state in cases:
         run.completions.write_bytes(b"".join(completions[:written]))
         run.rows("paper").write_bytes(b"".join(rows[:judged]))
@@ -165,7 +167,7 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
 
 @pytest.mark.parametrize("content", [b"{broken\n", b"[1]\n", b'{"task": "LunchBreak"}\n', b"\xff\n"])
 def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: bytes) -> None:
-    rows = Run(runs / "hasty").rows("paper")
+    rows = RunFolder(runs / "hasty").rows("paper")
     lines = lines_of(rows)
     rows.write_bytes(b"".join([*lines[:10], content, *lines[11:]]))
     run = opened(runs / "hasty")
@@ -176,7 +178,7 @@ def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: by
 
 
 def test_half_a_character_in_a_name_of_a_task_breaks_nothing(runs: Path) -> None:
-    completions = Run(runs / "hasty").completions
+    completions = RunFolder(runs / "hasty").completions
     odd = {**json.loads(lines_of(completions)[0]), "task": "half \ud800"}
     completions.write_bytes(completions.read_bytes() + to_line(odd))
     run = opened(runs / "hasty")

@@ -1,1 +1,1 @@
-"""Batches: `process` runs tame programs in a closed child, `replay` repeats what they asked of robots."""
+"""Batches: `process` runs tame programs in a closed child, `replay` repeats their skill calls."""

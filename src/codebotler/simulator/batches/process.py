@@ -1,7 +1,7 @@
 """Runs tame programs in a closed child, each in all of its worlds, and writes a transcript of each run.
 
-The child has a copy of each robot and of its ledger, so that a program waits for nobody. The engine does not
-believe what it writes: it replays each transcript on its own robot, which must give the same answers.
+The child has a copy of each robot and its ledger, so that programs never wait for the engine. The engine does
+not trust the transcripts: it replays each on its own robot, which must give the same answers.
 """
 
 from __future__ import annotations
@@ -24,38 +24,38 @@ from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, MAX_FR
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
-from codebotler.simulator.sandbox.fork_server import DOOR, serve
+from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
-from codebotler.simulator.sandbox.tame import GIVEN
+from codebotler.simulator.sandbox.tame_expressions import GIVEN
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    from codebotler.simulator.sandbox.execution import Skills
+    from codebotler.simulator.sandbox.execution import SkillDescriptions
     from codebotler.simulator.sandbox.isolation import Filter
 
-    Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # a skill, what it was given, the answer
-    Batch: TypeAlias = tuple[Skills, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]
+    Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # a skill, its arguments, and the answer
+    Batch: TypeAlias = tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]
 
 __all__ = ["get_ready", "serve"]
 
-# In a process of its own, a program may call itself far deeper; what is too deep here is run again there.
-RECURSION_LIMIT = 400
-FEW = 50  # calls that are written one by one, also where some are equal
-LONGEST_CALL = 50_000  # bytes of what a skill is given; as one frame, more might be too long
-SURROGATE = b"\\ud"  # in JSON, half of a pair
-ODD = b"null"  # in the place of a transcript that a process of its own must decide
+# Alone in a process, a program may call itself far deeper: a run that is too deep here is repeated there.
+BATCH_RECURSION_LIMIT = 400
+MAX_PLAIN_CALLS = 50  # calls that are written one by one, even if some are equal
+MAX_CALL_BYTES = 50_000  # bytes of the arguments of a skill, so that they fit into a frame
+SURROGATE_ESCAPE = b"\\ud"  # in JSON
+UNDECIDED_RUN = b"null"  # in place of a transcript: the run must be repeated alone
 
 
 def get_ready(
     _role: str,
 ) -> tuple[socket, TranscribedRun, Callable[[TranscribedRun], None], Filter | None, int]:
-    """Make all that batches need and share, and return what `serve` takes."""
-    door = socket(fileno=DOOR)
+    """Prepare everything that batches share, and return the arguments of `serve`."""
+    door = socket(fileno=RUN_DOOR)
     run = TranscribedRun()
     simulate_environment(run)
-    rehearsal, lessons = loads(receive_setup(door))  # noqa: S302 - from the engine
+    rehearsal, lessons = loads(_receive_setup(door))  # noqa: S302 - from the engine
     sys.meta_path.clear()
     give_up_rights(BATCH_MEMORY)
     seccomp = usable_filter()
@@ -64,8 +64,7 @@ def get_ready(
     return door, run, lambda run: execute(run, rehearsal), seccomp, BATCH_CPU_SECONDS
 
 
-def receive_setup(door: socket) -> bytes:
-    """Read the one message that the engine sends before any run."""
+def _receive_setup(door: socket) -> bytes:
     length = int.from_bytes(door.recv(4), "big")
     data = b""
     while len(data) < length:
@@ -76,8 +75,8 @@ def receive_setup(door: socket) -> bytes:
 def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
     """Run batches of programs that the engine sends, and send their transcripts, until the engine hangs up.
 
-    A child is forked before there is work for it. It rehearses first: what it writes to for the first time
-    is copied for it, which takes longer than most batches.
+    A child is forked ahead of its work, and rehearses first: the kernel copies each page at the first write,
+    which takes longer than most batches.
     """
     transcripts(run, rehearsal)
     while True:
@@ -87,7 +86,7 @@ def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
 def transcripts(
     run: TranscribedRun,
     batch: Batch,
-    send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # nobody listens to a rehearsal
+    send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # a rehearsal sends nothing
 ) -> None:
     """Run programs, each in all of its worlds, and send the transcripts of each program."""
     skills, elsewhere, pickled, programs = batch
@@ -97,24 +96,24 @@ def transcripts(
     robots = unpickled(pickled)  # noqa: S301 - from the engine
     for code, numbers in programs:
         compiled = loads(code)  # noqa: S302 - from the engine
-        # Where a run may ask the engine, that must have heard of all runs before it.
+        # A run that may ask the engine needs all transcripts before it to be sent.
         for group in [[number] for number in numbers] if elsewhere else [numbers]:
             send([run.transcript(compiled, *robots[number]) for number in group])
 
 
 class TranscribedRun(ProgramRun):
-    """Runs one tame program after the other, and writes down what each asks of its robot."""
+    """Runs one tame program after the other, and records the skill calls of each."""
 
-    recursion_limit = RECURSION_LIMIT
+    recursion_limit = BATCH_RECURSION_LIMIT
 
     def __init__(self) -> None:
         super().__init__()
-        self.elsewhere: frozenset[str] = frozenset()  # skills that only the engine's own robot can perform
+        self.elsewhere: frozenset[str] = frozenset()  # skills that only the engine's robot can perform
         self.provided: dict[str, Any] = {}
         given = {name: vars(sys.modules["builtins"])[name] for name in GIVEN}
-        self.builtins = {**given, **self.counters(), "__import__": the_clock}
+        self.builtins = {**given, **self.counters(), "__import__": lambda *_: sys.modules["time"]}
 
-    def provide(self, skills: Skills) -> None:
+    def provide(self, skills: SkillDescriptions) -> None:
         """Give programs the skills, `time`, and the builtins of tame programs."""
         self.skills = skills
         self.provided = {name: self.skill(name, parameters) for name, parameters in skills}
@@ -122,21 +121,25 @@ class TranscribedRun(ProgramRun):
 
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
         """Run a program with a robot, and return the transcript."""
-        self._begin(ROBOTS[kind](*arguments))
-        rules = self.ledger.robot.rules
-        sys.setrecursionlimit(RECURSION_LIMIT)
-        settings = (rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), False)
-        end = self.execute(code, settings)
-        data = ODD if self.is_odd else self._written(end)
-        return ODD if self.is_odd or len(data) > MAX_FRAME else data
+        self._reset(ROBOTS[kind](*arguments))
+        settings = self.ledger.robot.settings
+        sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
+        parameters = (
+            settings.limits.ticks,
+            settings.limits.seconds,
+            settings.clock_starts.timestamp(),
+            False,
+        )
+        end = self.execute(code, parameters)
+        data = UNDECIDED_RUN if self.is_undecided else self._written(end)
+        return UNDECIDED_RUN if self.is_undecided or len(data) > MAX_FRAME else data
 
-    def _begin(self, robot: SimulatedRobot) -> None:
-        """Be as before any run."""
+    def _reset(self, robot: SimulatedRobot) -> None:
         self.ledger = RememberingLedger(robot)
         self.namespace = ModuleType("__main__")
         vars(self.namespace).update(self.provided)
-        self.now = self._told = 0.0
-        self.spent = self.entered = self.is_odd = False
+        self.now = self._reported_time = 0.0
+        self.spent = self.entered = self.is_undecided = False
         self.refused_at = None
         self.codes.clear()
         self.refuel()
@@ -148,13 +151,15 @@ class TranscribedRun(ProgramRun):
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the copy of the robot execute a skill."""
-        given = [taken(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)]
+        given = [
+            _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
+        ]
         try:
-            if self.now != self._told:
+            if self.now != self._reported_time:
                 self._let_time_pass()
             answer = None if name in self.elsewhere else self.ledger.perform(name, given)
-        except BaseException:  # nothing that a program does, unless it has reached a limit
-            self.is_odd = self.is_odd or not self.spent
+        except BaseException:  # no fault of the program, unless it has reached a limit
+            self.is_undecided = self.is_undecided or not self.spent
             raise
         if answer is None:
             return self._ask_engine(name, given)
@@ -169,8 +174,8 @@ class TranscribedRun(ProgramRun):
         return value.copy() if type(value) is list else value
 
     def _let_time_pass(self) -> None:
-        """Tell the ledger what the program's clock shows, and end the run when its time is up."""
-        self._told = self.now
+        """Report the program's clock to the ledger, and end the run when its time is up."""
+        self._reported_time = self.now
         self._moments.append((len(self._calls), float(self.now)))
         self.ledger.let_time_pass(self.now)
         if self.ledger.limit is not None:
@@ -184,12 +189,12 @@ class TranscribedRun(ProgramRun):
         raise LimitReachedError
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Notice where a program has caught what depends on the process that it runs in."""
+        """Notice if a program has caught an error that depends on its process."""
 
         def caught() -> None:
             error = sys.exc_info()[0]
             if error is not None and issubclass(error, RecursionError | MemoryError):
-                self.is_odd = True
+                self.is_undecided = True
             use_fuel()
 
         return caught
@@ -199,28 +204,32 @@ class TranscribedRun(ProgramRun):
         try:
             str(error)
         except (RecursionError, MemoryError):
-            self.is_odd = True
-        self.is_odd = self.is_odd or isinstance(error, RecursionError | MemoryError)
+            self.is_undecided = True
+        self.is_undecided = self.is_undecided or isinstance(error, RecursionError | MemoryError)
         return super().ended_by(error)
 
     def _written(self, end: str) -> bytes:
-        calls, order = (self._calls, None) if len(self._calls) <= FEW else distinct(self._calls)
+        calls, order = (self._calls, None) if len(self._calls) <= MAX_PLAIN_CALLS else _distinct(self._calls)
         data = f"[{encoded([calls, order, self._moments])[1:-1]},{end}]".encode("ascii")
-        if len(data) > LONGEST_CALL or SURROGATE in data:
-            self.is_odd = self.is_odd or not all(is_plain(each) for _, given, _, _ in calls for each in given)
+        if len(data) > MAX_CALL_BYTES or SURROGATE_ESCAPE in data:
+            self.is_undecided = self.is_undecided or not all(
+                _is_plain(each) for _, given, _, _ in calls for each in given
+            )
         return data
 
     def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - what a skill returns
-        """Let the engine's robot execute a skill, once it has done all that was asked of it before."""
+        """Let the engine's robot execute a skill, after all calls before it."""
         self._calls.append((name, given, "ask", None))
         data = self._written("null")
-        if self.is_odd:
+        if self.is_undecided:
             raise MemoryError
         send_frames([data])
         self._forget_calls()
         kind, value, self.now = receive_at_once()
         if kind == "error":
-            self.ledger.errors.append(RobotError(*value[1:]))  # so that later ones have the engine's numbers
+            self.ledger.errors.append(
+                RobotError(*value[1:])
+            )  # so that later errors have the engine's numbers
             raise robot_error(*value)
         if kind == "stop":
             self.spent = True
@@ -228,47 +237,36 @@ class TranscribedRun(ProgramRun):
         return value
 
 
-def the_clock(*_: object) -> ModuleType:
-    """What `import time` imports; tame programs import nothing else."""
-    return sys.modules["time"]
-
-
-def taken(kind: str, value: Any) -> Any:  # noqa: ANN401 - of any type that skills take
-    """An argument as the robot takes it."""
+def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - of any type of skills
     if kind == "list":
-        return options(value)
+        return tuple([Option(str(each), isinstance(each, str)) for each in value])
     return tuple(value) if type(value) is list else value
 
 
-def options(values: list[object]) -> tuple[Option, ...]:
-    """Options as the robot takes them."""
-    return tuple([Option(str(value), isinstance(value, str)) for value in values])
-
-
-def is_plain(given: Argument) -> bool:
-    """Whether texts are short enough for JSON, and hold no halves of surrogate pairs, which it would join."""
+def _is_plain(given: Argument) -> bool:
+    """Whether texts are short, and have no lone surrogates, which JSON could join."""
     if isinstance(given, tuple):
         text = "".join([str(each[0] if isinstance(each, Option) else each) for each in given])
     else:
         text = str(given)
     try:
-        return len(text.encode()) <= LONGEST_CALL
+        return len(text.encode()) <= MAX_CALL_BYTES
     except UnicodeEncodeError:
         return False
 
 
-def distinct(calls: list[Called]) -> tuple[list[Called], list[int]]:
-    """Different calls, and the place among these of each call."""
-    places: dict[object, int] = {}
+def _distinct(calls: list[Called]) -> tuple[list[Called], list[int]]:
+    """The different calls, and the position of each call among them."""
+    positions: dict[object, int] = {}
     different: list[Called] = []
     order = []
     for call in calls:
         name, given, kind, value = call
         key = (name, *given, kind, tuple(value) if type(value) is list else value)
-        if key not in places:
-            places[key] = len(different)
+        if key not in positions:
+            positions[key] = len(different)
             different.append(call)
-        order.append(places[key])
+        order.append(positions[key])
     return different, order
 
 

@@ -1,4 +1,4 @@
-"""Replays what a batch wrote down on the engine's own robots, and refuses what does not fit."""
+"""Replays the transcripts of a batch on the engine's own robots, and refuses false ones."""
 
 from __future__ import annotations
 
@@ -12,66 +12,67 @@ import msgspec
 from codebotler.core.skills.table import Parameter, SkillTable
 from codebotler.core.skills.values import TEXT_TYPE, Scalar
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, kept
+from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, judge_end
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
 from codebotler.simulator.sandbox import MAX_FRAME
-from codebotler.simulator.skill_protocol import Description, described
+from codebotler.simulator.skill_protocol import SkillDescriptions, describe_skills
 
 Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
 """The code of each program, and a robot for each of its runs."""
 
 
 class Call(NamedTuple):
-    """A skill that a program called, and how it was answered."""
+    """A call of a skill, and its answer."""
 
     skill: str
     arguments: tuple[Scalar | tuple[Option | Scalar, ...], ...]
-    kind: str  # of the answer; `ask` where only the engine can give it, `time` where only time went by
+    kind: str  # of the answer; `ask` if only the engine knows it, `time` if only time passes
     value: Any
 
 
 class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """What a child says of a run: what the program asked of its robot, and how it ended."""
+    """A child's report of a run: the skill calls of the program, and how it ended."""
 
     calls: list[Call]
-    order: list[int] | None  # of each call that was made, its place in `calls`; None where each is made once
-    moments: list[tuple[int, float]]  # from which call on the program's clock shows what
-    end: dict[str, Any] | None  # None where the child waits for the answer to the last call
+    order: list[int] | None  # positions in `calls`; None for each once
+    moments: list[tuple[int, float]]  # number of a call, and the clock from then on
+    end: dict[str, Any] | None  # None if the child waits for the last answer
 
 
-Key: TypeAlias = tuple[Any, ...]  # a transcript as it is sent, and the ids of what its robot is made from
-MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 4_096  # transcripts, and bytes of one
-# Outcomes of transcripts, and what the ids of their keys belong to, so that nothing else gets these ids.
-REPLAYED: dict[Key | None, tuple[Outcome, SkillTable, Setup]] = {}
-LAST_MOMENT = (-1, 0.0)  # after all of those in a transcript: of no call
+ReplayKey: TypeAlias = tuple[Any, ...]  # a sent transcript, and the ids of the parts of its robot
+MAX_REPLAYS, MAX_REPLAY_BYTES = 2_048, 4_096  # transcripts, and bytes of one
+# Outcomes of transcripts; with the objects of their keys, so that no other object gets the same id.
+REPLAYED: dict[ReplayKey | None, tuple[Outcome, SkillTable, Setup]] = {}
+LAST_MOMENT = (-1, 0.0)  # follows the moments of a transcript
 ONLY_TIME: SkillAnswer = ("time", None)
-DECODER = msgspec.json.Decoder(Transcript | None)
+TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 
 
-def message(programs: Programs) -> tuple[Description, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """What a child is told of programs whose robots all have the same skills."""
+def message(
+    programs: Programs,
+) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
+    """The message to a child with programs, whose robots all have the same skills."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
-    told = []
+    keyed = []
     for code, robots in programs:
         keys = [tuple(map(id, each.setup[1])) for each in robots]
         setups.update(zip(keys, (each.setup for each in robots), strict=True))
-        told.append((code, keys))
+        keyed.append((code, keys))
     numbers = {key: number for number, key in enumerate(setups)}
-    numbered = [(code, [numbers[key] for key in keys]) for code, keys in told]
-    return described(robot), robot.own_skills, pickle.dumps(list(setups.values()), protocol=5), numbered
+    numbered = [(code, [numbers[key] for key in keys]) for code, keys in keyed]
+    return describe_skills(robot), robot.own_skills, pickle.dumps(list(setups.values()), protocol=5), numbered
 
 
 def outcomes(
     child: IsolatedProcess, programs: Programs, meanwhile: Callable[[], object] = bool
 ) -> Iterator[Outcome | None]:
-    """Let a child run programs; the outcome of each run in order, None where another process must decide.
+    """Let a child run programs, and yield each outcome in order; None if the run must be repeated alone.
 
-    While the child is busy, `meanwhile` is called.
-
-    Raises LostProcessError, ProtocolError or TimeoutError where the child says no more that can be used.
+    `meanwhile` is called while the child is busy. Raises LostProcessError, ProtocolError or TimeoutError if
+    the child becomes useless.
     """
     child.send(message(programs), at_once=True)
     meanwhile()
@@ -83,21 +84,23 @@ def outcomes(
 def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
     frame = _frame(child)
     key = key_of(frame, robot)
-    if (known := REPLAYED.get(key)) is not None:  # another thread may clear it at any moment
+    if (known := REPLAYED.get(key)) is not None:  # another thread may clear it
         return known[0]
     replay = Replay(robot)
-    while (transcript := decoded(frame)) is not None:
+    while (transcript := parse_transcript(frame)) is not None:
         answer = replay.follow(transcript)
         if replay.ledger.broken is not None:
             if transcript.end is None:
                 raise ProtocolError("a rule ends the run, and the child waits")
-            return None  # by itself, it also has the line at which the rule ends it
+            return None  # alone, the run also has the line at which the rule ends it
         if transcript.end is not None:
-            outcome = kept(replay.ledger.ended(transcript.end), robot)
+            outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
                 raise ProtocolError("an end is malformed")
             if key is not None:
-                remember(key, outcome, robot)
+                if len(REPLAYED) >= MAX_REPLAYS:
+                    REPLAYED.clear()
+                REPLAYED[key] = outcome, robot.skills, robot.setup
             return outcome
         child.send((*answer, robot.now), at_once=True)
         frame = _frame(child)
@@ -111,38 +114,30 @@ def _frame(child: IsolatedProcess) -> bytes:
     return frame
 
 
-def key_of(frame: bytes, robot: SimulatedRobot) -> Key | None:
-    """What a transcript is remembered by; None where it is long, or its robot of a kind of its own."""
-    if len(frame) > LONGEST_REMEMBERED or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
+def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
+    """The cache key of a transcript; None for a long one, or a robot that is not a plain copy."""
+    if len(frame) > MAX_REPLAY_BYTES or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
 
 
-def remember(key: Key, outcome: Outcome, robot: SimulatedRobot) -> None:
-    """Keep what a transcript amounts to: many programs do the same in the same world."""
-    if len(REPLAYED) >= MOST_REMEMBERED:
-        REPLAYED.clear()
-    REPLAYED[key] = outcome, robot.skills, robot.setup
-
-
-def decoded(frame: bytes) -> Transcript | None:
-    """What a child says of a run; None where another process must decide."""
+def parse_transcript(frame: bytes) -> Transcript | None:
+    """Parse a transcript; None if the run must be repeated alone."""
     try:
-        transcript: Transcript | None = DECODER.decode(frame)
+        return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # of its type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         raise ProtocolError("a transcript is malformed") from None
-    return transcript
 
 
 class Replay:
-    """Does on the engine's own robot what a child says that a program asked of its copy."""
+    """Repeats the skill calls of a transcript on the engine's own robot."""
 
     def __init__(self, robot: SimulatedRobot) -> None:
         self.robot, self.ledger = robot, RememberingLedger(robot)
         self._signatures, self._own = signatures(robot.skills), robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
-        """Perform what was asked and return the last answer; a ProtocolError where one is not as was said."""
+        """Repeat all calls, and return the last answer; ProtocolError if one differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][2] is not None):
             raise ProtocolError("a child waits for nothing")
@@ -151,7 +146,7 @@ class Replay:
             raise ProtocolError("there is no such call")
         ledger, moments = self.ledger, iter((*transcript.moments, LAST_MOMENT))
         changes, later = next(moments)
-        told: SkillAnswer = ("ok", None)
+        answer: SkillAnswer = ("ok", None)
         for number, place in enumerate(order):
             if ledger.limit is not None:
                 raise ProtocolError("the program goes on beyond a limit")
@@ -161,14 +156,16 @@ class Replay:
                 changes, later = next(moments)
             if expected == ONLY_TIME:
                 continue
-            told = ledger.perform(skill, arguments)
+            answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
-                return told
-            if expected is not None and expected != (told if told[0] != "error" else ("error", told[1][1:])):
+                return answer
+            if expected is not None and expected != (
+                answer if answer[0] != "error" else ("error", answer[1][1:])
+            ):
                 raise ProtocolError("the robot answers otherwise")
         if next(moments, None) is not None:
             raise ProtocolError("moments are out of order")
-        return told
+        return answer
 
     def _let_time_pass(self, now: float, *, is_last: bool) -> None:
         if now < self.robot.now:
@@ -178,7 +175,7 @@ class Replay:
             raise ProtocolError("the program goes on when its time is up")
 
     def _expected(self, call: Call) -> tuple[str, Sequence[Argument], SkillAnswer | None]:
-        """A call with the answer that it should have, if that is known."""
+        """A call with its expected answer, if that is known."""
         if call.kind == "time":
             return "", (), ONLY_TIME
         signature = self._signatures.get(call.skill)
@@ -191,9 +188,8 @@ class Replay:
         return call.skill, arguments, None if call.kind == "ask" else (call.kind, value)
 
     def _fits(self, call: Call) -> bool:
-        """Whether a call gives a skill, which takes more than texts, what it takes."""
-        taken = self.robot.skills[call.skill].parameters
-        return len(taken) == len(call.arguments) and all(map(_fits, taken, call.arguments))
+        parameters = self.robot.skills[call.skill].parameters
+        return len(parameters) == len(call.arguments) and all(map(_fits, parameters, call.arguments))
 
 
 def _fits(parameter: Parameter, given: object) -> bool:
@@ -204,7 +200,7 @@ def _fits(parameter: Parameter, given: object) -> bool:
 
 @lru_cache(maxsize=16)
 def signatures(skills: SkillTable) -> dict[str, tuple[type, ...]]:
-    """The types of the arguments of each skill, where that is all there is to them."""
+    """The types of the arguments of each skill; `object` for those that need another check."""
     return {
         skill.name: tuple(str if p.type == TEXT_TYPE else object for p in skill.parameters)
         for skill in skills.rows

@@ -1,4 +1,4 @@
-"""The code that isolated processes run: the modules of ours and of the standard library, compiled."""
+"""The compiled code of isolated processes: our modules and the standard library."""
 
 from __future__ import annotations
 
@@ -19,23 +19,27 @@ from codebotler.simulator.sandbox.stdlib import IMPORTED
 
 SIMULATOR = __package__.rpartition(".")[0]
 SANDBOX = Path(__file__).parents[1] / "sandbox"
-SKILLS = SANDBOX.parents[1] / "core" / "skills"
+SKILLS_FOLDER = SANDBOX.parents[1] / "core" / "skills"
 CORE, BATCHES = "codebotler.core", f"{SIMULATOR}.batches"
-# What a child needs that has robots of its own, besides the sandbox.
-SIMULATION = (
+# Further modules of a child that has robots.
+SIMULATION_MODULES = (
     f"{BATCHES}.process",
     *(
         f"{CORE}.{name}"
         for name in ("cachedproperty", "errors", "regex_flags", "trace", "unicode", "words", "world")
     ),
-    *(f"{CORE}.skills.{path.stem}" for path in sorted(SKILLS.glob("[a-z]*.py")) if path.stem != "files"),
+    *(
+        f"{CORE}.skills.{path.stem}"
+        for path in sorted(SKILLS_FOLDER.glob("[a-z]*.py"))
+        if path.stem != "files"
+    ),
     *(f"{SIMULATOR}.{name}" for name in ("fact_sampler", "ledger", "robot", "settings", "sampled_robot")),
 )
 
 
 def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
-    """The code of all modules that a process in one of the roles runs, by name, as one message."""
-    further = SIMULATION if role == BATCH_SERVER else ()
+    """The code of all modules of a role, by name, as one message."""
+    further = SIMULATION_MODULES if role == BATCH_SERVER else ()
     package = f"{SIMULATOR}.sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
     files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}
@@ -51,7 +55,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
 
 
 def stdlib_files() -> dict[str, Path]:
-    """Nearly all modules of the standard library that programs can import, or that these are made of."""
+    """Most modules of the standard library that programs can import, and their submodules."""
     folder, files = Path(os.__file__).parent, {}
     for name in IMPORTED:
         path = folder.joinpath(*name.split("."))
@@ -65,13 +69,13 @@ def stdlib_files() -> dict[str, Path]:
 
 
 def code_of(file: str, shown: str) -> bytes:
-    """The code of one module, the same however this interpreter was started; `shown` is in tracebacks."""
+    """The code of one module, the same for all options of the interpreter; tracebacks name `shown`."""
     code = None
     if not sys.flags.optimize:
-        with contextlib.suppress(EOFError, ImportError, ValueError):  # bytecode that is damaged
+        with contextlib.suppress(EOFError, ImportError, ValueError):  # damaged bytecode
             code = SourceFileLoader(shown, file).get_code(shown)
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
-        # It was written by an interpreter that leaves columns out, so that it is shorter.
+        # An interpreter without columns wrote it, so that it is shorter.
         return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
     return dumped(code, shown)
 
@@ -80,12 +84,12 @@ compiled = cache(code_of)
 
 
 def compiled_source(source: str, shown: str) -> bytes:
-    """The same of a module that is in no file, or in another form there."""
+    """The code of a source text."""
     return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), shown)
 
 
 def dumped(code: CodeType, shown: str) -> bytes:
-    """Code that names no path, whose length would move what comes after it in memory."""
+    """Code without paths, whose length would change addresses in memory."""
 
     def nameless(code: CodeType) -> CodeType:
         parts = (nameless(part) if isinstance(part, CodeType) else part for part in code.co_consts)

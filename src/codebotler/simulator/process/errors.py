@@ -1,4 +1,4 @@
-"""What can go wrong with an isolated process."""
+"""Errors of isolated processes."""
 
 
 class LostProcessError(Exception):
@@ -6,4 +6,4 @@ class LostProcessError(Exception):
 
 
 class ProtocolError(Exception):
-    """The program has got hold of the channel and sends what our own code never would."""
+    """The program has written to the channel: our own code never sends such messages."""

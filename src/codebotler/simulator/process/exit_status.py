@@ -1,4 +1,4 @@
-"""What a process died of, by its exit status."""
+"""The cause of death of a process, by its exit status."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import signal
 from codebotler.core.trace import RunError, Status
 from codebotler.simulator.sandbox import CPU_SECONDS
 
-PROCESSOR_TIME = "seconds of processor time"  # how the message of a program ends that computed for too long
+PROCESSOR_TIME = "seconds of processor time"  # end of the message about a program that computed for too long
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """What a process died of without a last message, by its exit status or minus the signal."""
+    """The cause of death of a process without a last message, by its exit status or minus the signal."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

@@ -1,4 +1,4 @@
-"""The engine's handle on a fork server: asks it for a new isolated process for a run, or for a batch."""
+"""The engine's handle on a fork server, which forks an isolated process for a run or a batch."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from codebotler.simulator.process.spawn import start
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
-from codebotler.simulator.skill_protocol import SkillProtocol, described
+from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
 
-NUMBER = 8  # bytes of a number that it reports
-EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
+REPORT_BYTES = 8  # bytes of a reported number
+EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
 REHEARSALS = 8
 
-# A little of all that most programs do. A fork server runs this itself before it serves: what the interpreter
-# learns by it, such as where it finds an attribute, lies in memory that all children share.
+# Typical code of programs. A fork server runs it before it serves, so that all children share the specialized
+# bytecode.
 WARM_UP = """
 def find(thing, rooms):
     for number, room in enumerate(sorted(rooms)):
@@ -55,11 +55,11 @@ def task_program():
 """
 WARM_UP_CODE = marshal.dumps(prepared(WARM_UP, lowercase=False)[0], WITHOUT_REFERENCES)
 WARM_UP_WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
-WARM_UP_RUNS = 20  # the interpreter learns from what it has done a few times
+WARM_UP_RUNS = 20  # the interpreter specializes code that ran a few times
 
 
 class ForkServer:
-    """One fork server in one of its roles, and the children that it forks, one at a time."""
+    """One fork server in a role, which forks children one at a time."""
 
     def __init__(self, role: str) -> None:
         self._report, report = os.pipe()
@@ -78,7 +78,7 @@ class ForkServer:
             raise
 
     def fork(self) -> IsolatedProcess:
-        """A fresh child."""
+        """A new child."""
         try:
             channel = self._ask_for_channel()
         except OSError:
@@ -92,11 +92,11 @@ class ForkServer:
 
     @property
     def has_ended(self) -> bool:
-        """Whether it is there no more."""
+        """Whether its process has ended."""
         return self._process.poll() is not None
 
     def kill(self) -> None:
-        """End it and with it a run that is still going on."""
+        """End it and its current run."""
         self._process.kill()
 
     def close(self) -> None:
@@ -107,14 +107,14 @@ class ForkServer:
         self._door.close()
 
     def forget(self) -> None:
-        """Close its descriptors in a forked process, whose child it is not."""
-        self._process.returncode = 0  # whatever becomes of it, nobody here waits for that
+        """Close its descriptors in a forked process, which is not its parent."""
+        self._process.returncode = 0  # so that `Popen` does not wait for it here
         os.close(self._report)
         self._door.close()
 
     def _set_up(self) -> None:
-        """Let it get ready, and learn whether its children will be behind a filter of system calls."""
-        setup = (described(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
+        """Prepare it, and learn whether its children will have a filter of system calls."""
+        setup = (describe_skills(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
         self._door.sendall(marshal.dumps(setup, WITHOUT_REFERENCES))
         for _ in range(self._read_report()):
             self._warm_up()
@@ -129,8 +129,8 @@ class ForkServer:
         itself.hang_up()
 
     def _rehearse(self) -> None:
-        """Run an empty program: by then the heap of the fork server, which programs can see, has settled."""
-        SkillProtocol(self.fork(), EMPTY, SimulatedRobot(WARM_UP_WORLD)).outcome()
+        """Run an empty program, so that the heap of the fork server, which programs can see, is stable."""
+        SkillProtocol(self.fork(), EMPTY_PROGRAM, SimulatedRobot(WARM_UP_WORLD)).outcome()
 
     def _ask_for_channel(self) -> socket.socket:
         ours, theirs = socket.socketpair()
@@ -144,7 +144,7 @@ class ForkServer:
 
     def _pid_of_child(self) -> int:
         if self._end_is_unread:
-            self._end_of_child()  # of the last one, which nobody waited for
+            self._end_of_child()  # of the last child
         self._end_is_unread = True
         pid = self._read_report()
         if pid <= 1:  # a signal to it would hit a whole group of processes
@@ -156,36 +156,34 @@ class ForkServer:
         return self._read_report()
 
     def _read_report(self) -> int:
-        data = os.read(self._report, NUMBER)
+        data = os.read(self._report, REPORT_BYTES)
         if not data:
             raise LostProcessError("the fork server has ended")
         return int.from_bytes(data, sys.byteorder, signed=True)
 
 
 class BatchServer(ForkServer):
-    """A fork server whose children run batches of tame programs, and are forked ahead of time."""
+    """A fork server for batches of tame programs, which forks children ahead of time."""
 
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
         super().__init__(BATCH_SERVER)
 
     def fork(self) -> IsolatedProcess:
-        """A fresh child, which may be ready already."""
+        """A new child, perhaps forked ahead."""
         child, self._next = self._next, None
-        if (
-            child is not None and self.has_ended
-        ):  # and the child with it: its number may be another process's now
+        if child is not None and self.has_ended:  # the child's id may be another process's now
             child.hang_up()
             child = None
         return child or super().fork()
 
     def fork_ahead(self) -> None:
-        """Have the next child forked now; the last one must have been killed."""
-        with contextlib.suppress(LostProcessError):  # whoever forks will learn of it
+        """Fork the next child now; the last one must have been killed."""
+        with contextlib.suppress(LostProcessError):  # the next fork raises it
             self._next = super().fork()
 
     def close(self) -> None:
-        """End it, and the child that is ready with it."""
+        """End it and the next child."""
         super().close()
         if self._next is not None:
             self._next.hang_up()
@@ -197,7 +195,7 @@ class BatchServer(ForkServer):
             self._next.hang_up()
 
     def _set_up(self) -> None:
-        """Let it run programs of ours, by which the interpreter learns; no address of these can be seen."""
+        """Let it run our own programs, which specialize bytecode; tame programs see no addresses."""
         rehearsal = message([(WARM_UP_CODE, [SimulatedRobot(WARM_UP_WORLD)])])
         setup = marshal.dumps((rehearsal, WARM_UP_RUNS), WITHOUT_REFERENCES)
         self._door.sendall(len(setup).to_bytes(HEADER, "big") + setup)

@@ -1,4 +1,4 @@
-"""Exchanges messages with an isolated process, notices that it is stuck, and ends it."""
+"""Exchanges messages with an isolated process, detects that it is stuck, and ends it."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.sandbox import HEADER, MAX_FRAME, MORE, PIECE, WITHOUT_REFERENCES
 
-LONGEST = 60.0  # seconds of waiting for a process in all; nothing that computes takes so long
-SILENCE = 1  # seconds after which a silent process is looked at
+MAX_WAIT_SECONDS = 60.0  # of waiting for a process in total; no computation takes so long
+SILENCE_SECONDS = 1  # after which a silent process is examined
 SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
 
 
 class IsolatedProcess:
-    """One isolated process, seen from outside."""
+    """One isolated process, from outside."""
 
     def __init__(
         self,
-        find_pid: Callable[[], int],  # which stays its own until the next run
+        find_pid: Callable[[], int],  # its id, unique until the next run
         channel: socket.socket,
-        wait: Callable[[], int],  # for its end; returns the exit status, or minus the signal
+        wait: Callable[[], int],  # returns its exit status, or minus the signal
         *,
-        has_seccomp: bool,  # so that it can be seen from outside whether it is isolated by now
+        has_seccomp: bool,  # so that /proc shows whether it is isolated
     ) -> None:
         self._find_pid, self._channel, self._wait = find_pid, channel, wait
-        silence = struct.pack("ll", SILENCE, 0)
-        for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call less than settimeout
+        silence = struct.pack("ll", SILENCE_SECONDS, 0)
+        for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call fewer than settimeout
             channel.setsockopt(socket.SOL_SOCKET, direction, silence)
         self._has_seccomp = has_seccomp
         self._buffer = bytearray()
-        self.patience = LONGEST  # seconds for which it will still be waited for
+        self.patience = MAX_WAIT_SECONDS  # seconds left to wait
 
     @cached_property
     def pid(self) -> int:
-        """Its process id; a process without one is lost."""
+        """Its process id; LostProcessError if it has none."""
         try:
             return self._find_pid()
         except LostProcessError:
@@ -51,11 +51,10 @@ class IsolatedProcess:
             raise
 
     def send(self, message: object, *, at_once: bool = False) -> None:
-        """Send a message; that the process is gone is noticed when it is listened to.
+        """Send a message; `receive` notices if the process has ended.
 
-        Where a program could see the heap, which what it reads leaves its mark on, a message goes in pieces:
-        each but the last is asked for more. So their sizes depend on the message only, and not on how quick
-        the process was.
+        The sizes of pieces that a process reads change its heap, which wild programs can see. So it requests
+        each piece but the first, and their sizes do not depend on its speed.
         """
         data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # made of texts, numbers and the like
         whole = len(data).to_bytes(HEADER, "big") + data
@@ -68,13 +67,13 @@ class IsolatedProcess:
             self._send_piece(memoryview(whole)[start : start + size])
 
     def _send_piece(self, rest: memoryview) -> None:
-        watch = StuckDetector(self)
+        used: int | None = None
         while rest:
             began = time.monotonic()
             try:
                 rest = rest[self._channel.send(rest) :]
-            except BlockingIOError:  # nothing for so long
-                watch.check()
+            except BlockingIOError:  # timed out
+                used = self._check_progress(used)
             except OSError:
                 return
             self._be_patient(began)
@@ -82,7 +81,7 @@ class IsolatedProcess:
     def receive(self) -> object:
         """Its next message, which is JSON; None when it has hung up.
 
-        Raises ProtocolError if it is none, and TimeoutError if the process waits for what will never come.
+        Raises ProtocolError for anything else, and TimeoutError if the process is stuck.
         """
         frame = self.receive_bytes(MAX_FRAME)
         if frame is None:
@@ -96,8 +95,8 @@ class IsolatedProcess:
         return message
 
     def receive_bytes(self, most: int) -> bytes | None:
-        """Its next frame, which may have so many bytes; None when it has hung up."""
-        watch = StuckDetector(self)
+        """Its next frame of at most so many bytes; None when it has hung up."""
+        used: int | None = None
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
@@ -110,8 +109,8 @@ class IsolatedProcess:
             began = time.monotonic()
             try:
                 piece = self._channel.recv(1 << 16)
-            except BlockingIOError:  # nothing for so long
-                watch.check()
+            except BlockingIOError:  # timed out
+                used = self._check_progress(used)
             except OSError:
                 return None
             else:
@@ -121,25 +120,33 @@ class IsolatedProcess:
             self._be_patient(began)
 
     def _be_patient(self, since: float) -> None:
-        self.patience -= min(time.monotonic() - since, SILENCE)  # the rest is this process's own delay
+        self.patience -= min(time.monotonic() - since, SILENCE_SECONDS)  # more is a delay of this process
         if self.patience < 0:
             raise TimeoutError
 
+    def _check_progress(self, before: int | None) -> int | None:
+        """Return the processor time of a sleeping process; TimeoutError if it is still `before`."""
+        fields = _stat(self.pid)
+        used = int(fields[11]) + int(fields[12]) if fields[:1] == ["S"] else None
+        if used is not None and used == before:
+            raise TimeoutError
+        return used
+
     def kill(self) -> None:
-        """End it, if it has not ended, and do not wait for that."""
+        """End it without waiting for its end."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
 
     def end(self) -> int:
-        """End it, if it has not ended, and return its exit status, or minus the signal."""
+        """End it, and return its exit status, or minus the signal."""
         self.kill()
         try:
             return self._wait()
         finally:
             self.hang_up()
 
-    def ended(self) -> int:
-        """Wait a moment for it to end by itself; then like `end`."""
+    def end_gently(self) -> int:
+        """Wait a moment for its own end, then end it; return its exit status, or minus the signal."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break
@@ -147,15 +154,15 @@ class IsolatedProcess:
         return self.end()
 
     def reset_patience(self) -> None:
-        """Wait anew, since it has answered."""
-        self.patience = LONGEST
+        """Start to wait anew, after an answer."""
+        self.patience = MAX_WAIT_SECONDS
 
     def hang_up(self) -> None:
         """Close the channel."""
         self._channel.close()
 
     def was_isolated(self) -> bool:
-        """Whether its filter was installed, as far as can be seen; of a dead process until the next run."""
+        """Whether its filter was installed, if visible; also of a dead process until the next run."""
         if not self._has_seccomp:
             return True
         try:
@@ -165,27 +172,8 @@ class IsolatedProcess:
         return any(mode in status for mode in SECCOMP_MODES)
 
 
-class StuckDetector:
-    """Distinguishes a process that waits for nothing from one that computes.
-
-    A process that sleeps at two checks, and used no processor time between them, is stuck.
-    """
-
-    def __init__(self, process: IsolatedProcess) -> None:
-        self._process = process
-        self._used: int | None = None
-
-    def check(self) -> None:
-        """Raise TimeoutError if the process is stuck."""
-        fields = _stat(self._process.pid)
-        used = int(fields[11]) + int(fields[12]) if fields[:1] == ["S"] else None
-        if used is not None and used == self._used:
-            raise TimeoutError
-        self._used = used
-
-
 def _stat(pid: int) -> list[str]:
-    """What the kernel shows of a process, from its state on; nothing once it is gone."""
+    """The fields of /proc/PID/stat from the state on; empty once the process is gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:
@@ -193,5 +181,5 @@ def _stat(pid: int) -> list[str]:
     return stat.rpartition(")")[2].split()
 
 
-# A process puts no spaces around what it says, and so need not be asked for them as `json.loads` does.
+# Faster than `json.loads`, which also skips spaces around a value.
 decode: Callable[[str], tuple[object, int]] = json.JSONDecoder().raw_decode

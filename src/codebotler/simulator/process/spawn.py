@@ -15,14 +15,14 @@ from codebotler.simulator.process.bytecode import BATCHES, SANDBOX, SIMULATOR, c
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.sandbox import BATCH_SERVER, FLAGS, FORK_SERVER, LIVE_SERVER, PREPARER
 
-MODULES = {PREPARER: f"{SIMULATOR}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}
+ROLE_MODULES = {PREPARER: f"{SIMULATOR}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}
 
 
 def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
     """Start a process in one of the roles, and hand it descriptors."""
     handed = (compiled_file(role).fileno(), *descriptors)
-    module = MODULES.get(role, f"{SIMULATOR}.sandbox.fork_server")
-    with ONE_AT_A_TIME:
+    module = ROLE_MODULES.get(role, f"{SIMULATOR}.sandbox.fork_server")
+    with START_LOCK:
         return subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
             [sys.executable, *FLAGS, str(SANDBOX / "start.py"), module, role, *map(str, handed)],
             stdin=subprocess.DEVNULL,
@@ -41,32 +41,32 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
         )
 
 
-ONE_AT_A_TIME = threading.Lock()
-# Who forks this process in the middle of a start would get half of it: a lock that nobody opens, and the end
-# of a pipe on whose closing the start waits.
+START_LOCK = threading.Lock()
+# A fork during a start would inherit half of it: a locked lock, and the end of a pipe whose closing the start
+# waits for.
 os.register_at_fork(
-    before=ONE_AT_A_TIME.acquire,
-    after_in_parent=ONE_AT_A_TIME.release,
-    after_in_child=ONE_AT_A_TIME.release,
+    before=START_LOCK.acquire,
+    after_in_parent=START_LOCK.release,
+    after_in_child=START_LOCK.release,
 )
 
 
 def compiled_file(role: str) -> IO[bytes]:
-    """A file with the code of the modules that a process in one of the roles runs."""
-    with ONE_AT_A_TIME:
+    """A file with the code of all modules of a role."""
+    with START_LOCK:
         return _written_file(FORK_SERVER if role == LIVE_SERVER else role)
 
 
 @cache
 def _written_file(role: str) -> IO[bytes]:
     codes = compiled_modules(compiled, role)
-    file: IO[bytes] = (  # closed at the end of this process; in memory if possible, since a disk may be full
+    file: IO[bytes] = (  # in memory if possible, since a disk may be full
         os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
     )
     atexit.register(file.close)
     try:
         file.write(codes)
         file.flush()
-    except OSError as error:  # a limit on the size of files holds in memory, too
+    except OSError as error:  # a limit on the size of files counts in memory, too
         raise LostProcessError(f"{error.strerror}; allow larger files with `ulimit -f unlimited`") from None
     return file

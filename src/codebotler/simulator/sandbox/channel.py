@@ -1,7 +1,7 @@
 """The socket between an isolated process and the engine: JSON goes out, Python's `marshal` comes in.
 
-Only what the engine has written is ever unmarshalled. Nothing that a program does to `json`, `os` or the
-builtins is felt here: all that is needed is held under names of our own.
+Only messages of the engine are ever unmarshalled. A program that changes `json`, `os` or the builtins changes
+nothing here, since this module holds its own references.
 """
 
 from __future__ import annotations
@@ -16,26 +16,21 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-# Functions below look here for `len` and the like, and not where a program can write.
-__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
+# A copy of the builtins, which a program cannot change.
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python accepts a dict, too
 
-TOO_LONG = '["too-long",[],0.0]'
+TOO_LONG_REQUEST = '["too-long",[],0.0]'
 
 
 def send(text: str) -> None:
     """Write one frame of JSON, which is ASCII."""
     if len(text) > MAX_FRAME:
-        text = TOO_LONG
-    send_bytes(text.encode("ascii"))
-
-
-def send_bytes(data: bytes) -> None:
-    """Write one frame."""
-    send_frames([data])
+        text = TOO_LONG_REQUEST
+    send_frames([text.encode("ascii")])
 
 
 def send_frames(frames: list[bytes]) -> None:
-    """Write frames at once."""
+    """Write frames together."""
     data = b"".join([len(frame).to_bytes(HEADER, "big") + frame for frame in frames])
     written = write(CHANNEL, data)
     while written < len(data):
@@ -43,7 +38,7 @@ def send_frames(frames: list[bytes]) -> None:
         written = write(CHANNEL, data)
 
 
-def receive() -> Any:  # noqa: ANN401 - whatever the engine sends
+def receive() -> Any:  # noqa: ANN401 - any message of the engine
     """Read one message, piece by piece."""
     pieces = [read_piece()]
     missing = HEADER + int.from_bytes(pieces[0][:HEADER], "big") - len(pieces[0])
@@ -55,7 +50,7 @@ def receive() -> Any:  # noqa: ANN401 - whatever the engine sends
 
 
 def receive_at_once() -> Any:  # noqa: ANN401 - the same
-    """Read one message that does not come in pieces."""
+    """Read one message in a single piece."""
     missing = int.from_bytes(read_piece(HEADER), "big")
     pieces = []
     while missing > 0:
@@ -65,7 +60,7 @@ def receive_at_once() -> Any:  # noqa: ANN401 - the same
 
 
 def read_piece(most: int = PIECE) -> bytes:
-    """Read what the engine has sent; without an engine, end."""
+    """Read a piece of the engine's message; exit if the engine has ended."""
     piece = read(CHANNEL, most)
     if not piece:
         _exit(1)

@@ -1,13 +1,13 @@
-"""Simulated dates: stand-ins for the classes of `datetime` that read the time from `time`."""
+"""Simulated dates: replacements for the classes of `datetime` that read the time from `time`."""
 
 from __future__ import annotations
 
-import datetime as real  # noqa: ICN001 - the stand-ins bear its usual name
+import datetime as real  # noqa: ICN001 - the replacements have its usual names
 import time
 
 
 class StandIn(type):
-    """Metaclass of a stand-in, which accepts the instances and subclasses of the class that it replaces."""
+    """Metaclass of a replacement, which accepts instances and subclasses of the original class."""
 
     def __instancecheck__(cls, thing: object) -> bool:
         if cls in (date, datetime):
@@ -20,38 +20,35 @@ class StandIn(type):
         return super().__subclasscheck__(other)
 
 
-class date(real.date, metaclass=StandIn):  # noqa: N801 - it takes the place of the real one
-    """Takes the place of `datetime.date`."""
+class date(real.date, metaclass=StandIn):  # noqa: N801 - the name of the original
+    """Replaces `datetime.date`."""
 
     @classmethod
     def today(cls) -> date:
-        """The day on the simulated clock."""
+        """The date on the simulated clock."""
         return cls.fromtimestamp(time.time())
 
     def __repr__(self) -> str:
         return f"datetime.{super().__repr__()}"
 
 
-class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the same
-    """Takes the place of `datetime.datetime`."""
+class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the name of the original
+    """Replaces `datetime.datetime`."""
 
     @classmethod
     def now(cls, tz: real.tzinfo | None = None) -> datetime:
-        """The moment on the simulated clock, which has no zone of its own."""
+        """The time on the simulated clock, which has no time zone."""
         return cls.fromtimestamp(time.time(), tz)
 
     @classmethod
-    def utcnow(cls) -> datetime:
-        """The same."""
+    def today(cls) -> datetime:
+        """The time on the simulated clock."""
         return cls.fromtimestamp(time.time())
 
-    @classmethod
-    def today(cls) -> datetime:
-        """The same."""
-        return cls.fromtimestamp(time.time())
+    utcnow = today
 
     def date(self) -> real.date:
-        """The day alone."""
+        """The date without the time."""
         return date(self.year, self.month, self.day)
 
     def __repr__(self) -> str:
@@ -59,7 +56,7 @@ class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the same
 
 
 def simulate_dates() -> None:
-    """Put the stand-ins into `datetime`."""
+    """Put the replacements into `datetime`."""
     for fake in (date, datetime):
         fake.__module__, fake.__qualname__ = "datetime", fake.__name__
         setattr(real, fake.__name__, fake)

@@ -1,4 +1,4 @@
-"""The simulated environment of programs: clock, standard streams, process ids, and what they may not do."""
+"""The simulated environment of programs: clock, standard streams, process ids and forbidden hooks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import time
 import types
 from _sitebuiltins import Quitter
 
-from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, ProgramRun
+from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, ProgramRun
 from codebotler.simulator.sandbox.locks import simulate_locks
 
 TYPE_CHECKING = False
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 
 def simulate_environment(run: ProgramRun) -> None:
-    """Give programs a simulated clock and locks, no input, an output that forgets, and no environment."""
+    """Give programs a simulated clock and locks, empty input, discarded output, and no environment."""
     simulate_time(run)
     simulate_locks(run)
     sys.stdin = io.StringIO("")
-    sys.stdout = sys.stderr = io.TextIOWrapper(Nowhere(), encoding="utf-8", errors="replace")
+    sys.stdout = sys.stderr = io.TextIOWrapper(_Nowhere(), encoding="utf-8", errors="replace")
     sys.argv = ["program"]
     os.environ.clear()
     for module in (os, posix):
@@ -32,18 +32,18 @@ def simulate_environment(run: ProgramRun) -> None:
             getpid=staticmethod(lambda: 1),
             getppid=staticmethod(lambda: 0),
             cpu_count=staticmethod(lambda: 1),
-            sysconf=staticmethod(lambda name, /: -1),  # noqa: ARG005 - as theirs; of a machine nothing is known
-            sched_getaffinity=staticmethod(lambda process, /: {0}),  # noqa: ARG005 - as theirs
+            sysconf=staticmethod(lambda name, /: -1),  # noqa: ARG005 - as in `os`; -1 means unknown
+            sched_getaffinity=staticmethod(lambda process, /: {0}),  # noqa: ARG005 - as in `os`
             times=staticmethod(lambda: os.times_result((run.now, 0.0, 0.0, 0.0, run.now))),
         )
     forbid_watching()
     for name in ("exit", "quit"):
         setattr(builtins, name, Quitter(name, "Ctrl-D (i.e. EOF)"))
-    sys.setrecursionlimit(RECURSION_LIMIT)
+    sys.setrecursionlimit(PROGRAM_RECURSION_LIMIT)
 
 
 def forbid_watching() -> None:
-    """Let no program watch its own execution: what it leaves watching would break into ours at its end."""
+    """Forbid hooks on execution, since a hook would run within our code when the program ends."""
 
     def forbidden(*_: object) -> None:
         raise PermissionError(1, "a program cannot watch its own execution")
@@ -52,15 +52,13 @@ def forbid_watching() -> None:
     vars(sys).pop("monitoring", None)  # new in Python 3.12
 
 
-class Nowhere(io.BufferedIOBase):
-    """An output that forgets."""
+class _Nowhere(io.BufferedIOBase):
+    """An output that discards everything."""
 
     def writable(self) -> bool:
-        """Accept everything."""
         return True
 
     def write(self, data: Any, /) -> int:  # noqa: ANN401 - any buffer
-        """Forget it."""
         return len(data)
 
 
@@ -84,6 +82,6 @@ def simulate_time(run: ProgramRun) -> None:
     time.clock_gettime = lambda clock: time.time() if clock == time.CLOCK_REALTIME else run.now
     time.clock_gettime_ns = lambda clock: int(time.clock_gettime(clock) * 1e9)
     for name, function in vars(time).items():
-        if isinstance(function, types.FunctionType):  # which would become a method of a class that keeps it
+        if isinstance(function, types.FunctionType):  # a class attribute would make it a method
             function.__name__ = function.__qualname__ = name
             setattr(time, name, staticmethod(function))

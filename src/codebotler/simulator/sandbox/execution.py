@@ -1,4 +1,4 @@
-"""One run of one program inside its process: fuel, a simulated clock, and skills as functions."""
+"""One run of a program inside its process: fuel, a simulated clock, and skills as functions."""
 
 from __future__ import annotations
 
@@ -19,41 +19,43 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, TypeAlias
 
-    Parameter: TypeAlias = tuple[str, str, tuple[Any, ...], str]  # name, kind, choices if any, and words
-    Skills: TypeAlias = tuple[tuple[str, tuple[Parameter, ...]], ...]
-    Settings: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
+    ParameterDescription: TypeAlias = tuple[
+        str, str, tuple[Any, ...], str
+    ]  # name, kind, choices if any, and words
+    SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
+    RunParameters: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
 
-# Functions below look here for `len` and the like, and not where a program can write.
-__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
+# A copy of the builtins, which a program cannot change.
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python accepts a dict, too
 
-# Python 3.11 counts calls into C as well: with one more, a function can call itself as often as under 3.12.
-RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
-HEADROOM = 50  # for what a skill calls, so that the limit is met by the program, not on the way to the robot
+# Python 3.11 counts calls into C as well: one more allows the same recursion as Python 3.12.
+PROGRAM_RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
+HEADROOM = 50  # for the functions that a skill calls, so that only the program meets the limit
 
 COROUTINE = 0x80  # among the flags of code
 UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not async def"
 
 
 class ProgramRun:
-    """One run of one program; all that can be is made before the fork, in the fork server."""
+    """One run of a program, prepared as far as possible in the fork server, before the fork."""
 
-    recursion_limit = RECURSION_LIMIT
+    recursion_limit = PROGRAM_RECURSION_LIMIT
 
     def __init__(self) -> None:
-        self.skills: Skills = ()
-        self.kinds: dict[str, list[str]] = {}  # of the parameters of each skill; `list` is one of options
+        self.skills: SkillDescriptions = ()
+        self.kinds: dict[str, list[str]] = {}  # of the parameters of each skill; `list` means options
         self.now = 0.0
         self.spent = self.entered = False
-        self.refused_at: int | None = None  # the line that asked for what a rule ended the run for
+        self.refused_at: int | None = None  # the line at which a rule ended the run
         self.codes: set[types.CodeType] = set()
         self.fuel = 0
         self.start = self.seconds = 0.0
-        self.is_live = False  # whether time passes by itself
+        self.is_live = False  # whether time is real
         self.namespace = types.ModuleType("__main__")
         vars(builtins).update(self.counters())
 
-    def provide(self, skills: Skills) -> None:
-        """Give the program what it can use without an import: the skills, and `sys` and `time`."""
+    def provide(self, skills: SkillDescriptions) -> None:
+        """Give the program its names without an import: the skills, `sys` and `time`."""
         names = vars(self.namespace)
         for name, _ in self.skills:
             del names[name]
@@ -61,63 +63,63 @@ class ProgramRun:
         names.update((name, self.skill(name, parameters)) for name, parameters in skills)
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
-    def execute(self, code: bytes | types.CodeType, settings: Settings) -> str:
-        """Run the program, marshalled or not, to its end; how it ended, as JSON."""
-        self.fuel, self.seconds, self.start, self.is_live = settings
+    def execute(self, code: bytes | types.CodeType, parameters: RunParameters) -> str:
+        """Run the program, marshalled or not, and return how it ended, as JSON."""
+        self.fuel, self.seconds, self.start, self.is_live = parameters
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
         try:
-            exec(loads(code) if type(code) is bytes else code, names)  # noqa: S102, S302 - this is what the sandbox is for
+            exec(loads(code) if type(code) is bytes else code, names)  # noqa: S102, S302 - the purpose of the sandbox
             task = names.get("task_program")
             if not self.has_entered(task):
                 eval(call_task.__code__, names)  # noqa: S307 - the same
             if self.is_unawaited(task):
-                raise TypeError(UNAWAITED)  # noqa: TRY301 - a function more, and recursion goes less deep
-        except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
+                raise TypeError(UNAWAITED)  # noqa: TRY301 - another function would take from the recursion limit
+        except BaseException as error:  # noqa: BLE001 - any end of a program is an outcome
             setrecursionlimit(self.recursion_limit + HEADROOM)
             return self.ended_by(error)
         return self.ended_by(LimitReachedError()) if self.spent else '{"end":"finished"}'
 
     def forget(self, names: dict[str, Any]) -> None:
-        """Be as before the run of a program, which could use these names."""
+        """Restore the state before the run of a program with these names."""
         self.now = 0.0
         self.spent = self.entered = False
         self.refused_at = None
         self.codes.clear()
-        RAISED.clear()
+        ROBOT_ERROR_CLASSES.clear()
         self.refuel()
         provided = vars(self.namespace)
         provided.clear()
         provided.update(names)
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe what ended the program; the exception's class may be the program's own."""
-        kind, line = type(error), self.refused_at or last_line(error)
-        message = str.__getitem__(message_of(error), slice(1000))  # it may use fuel
+        """Describe the error that ended the program; its class may be the program's own."""
+        kind, line = type(error), self.refused_at or _last_line(error)
+        message = str.__getitem__(_message_of(error), slice(1000))  # a subclass may use fuel
         where = f'"line":{"null" if line is None else line}'
         if self.spent or issubclass(kind, LimitReachedError):
             return f'{{"end":"timeout",{where}}}'
         if issubclass(kind, SystemExit):
-            code = own(SystemExit, "code", error)
+            code = _own(SystemExit, "code", error)
             if code is None or (type(code) is int and code == 0):
                 return '{"end":"finished"}'
         if issubclass(kind, SkillError):
-            number = number_of(error)
+            number = _number_of(error)
             if number is not None:
                 return f'{{"end":"robot-error","number":{number},{where}}}'
         if issubclass(kind, SyntaxError) and line is None:
-            lineno = own(SyntaxError, "lineno", error)
+            lineno = _own(SyntaxError, "lineno", error)
             where = f'"line":{lineno if type(lineno) is int else "null"}'
         name = str.__getitem__(NAME_OF(kind), slice(100))
         return f'{{"end":"python-error","kind":{quoted(name)},"message":{quoted(message)},{where}}}'
 
     def counters(self) -> dict[str, Callable[[], None]]:
-        """The functions that programs call without knowing, by name."""
+        """The functions that compiled programs call in addition, by name."""
         use_fuel = self.fuel_counter()
         return {
             FUEL: use_fuel,
             CAUGHT: self.catcher(use_fuel),
-            # One call deeper than a skill goes before it lifts the recursion limit: this meets it first.
+            # Goes one call deeper than a skill before it lifts the recursion limit, and so meets it first.
             ENTRY: lambda: use_fuel(),  # noqa: PLW0108 - see above
             ENTER: self.enter,
             BY_NAME: self.start_task,
@@ -130,15 +132,15 @@ class ProgramRun:
         self.entered = self.entered or code.co_name == "task_program"
 
     def start_task(self) -> None:
-        """Note that the program calls `task_program` by its name."""
+        """Note that the program calls `task_program` by this name."""
         self.entered = True
 
     def has_entered(self, task: object) -> bool:
-        """Whether the program has run its task by itself, by whatever name."""
+        """Whether the program has run its task itself, by any name."""
         return self.entered or (type(task) is types.FunctionType and task.__code__ in self.codes)
 
     def is_unawaited(self, task: object) -> bool:
-        """Whether the task is a coroutine that was never begun."""
+        """Whether the task is a coroutine that never began."""
         return (
             type(task) is types.FunctionType
             and task.__code__.co_flags & COROUTINE != 0
@@ -146,7 +148,7 @@ class ProgramRun:
         )
 
     def fuel_counter(self) -> Callable[[], None]:
-        """The function that uses one unit of fuel and, once all is spent, raises each time it is called."""
+        """The function that uses one unit of fuel, and raises at each call when all is used."""
         self.refuel()
 
         def use_fuel() -> None:
@@ -157,19 +159,19 @@ class ProgramRun:
         return use_fuel
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """What is called where the program has caught something, and at the head of `finally`."""
+        """The function that is called at the start of each `except` and `finally`."""
         return use_fuel
 
     def refuel(self) -> None:
-        """Count fuel from the start."""
+        """Give back all fuel."""
         self.count = itertools.count(1).__next__
 
-    def skill(self, name: str, parameters: tuple[Parameter, ...]) -> object:
+    def skill(self, name: str, parameters: tuple[ParameterDescription, ...]) -> object:
         """The function that a program calls for a skill."""
         names = ", ".join(parameter[0] for parameter in parameters)
         arguments = "".join(f"{parameter[0]}, " for parameter in parameters)
-        types_: list[tuple[type | str, Parameter]] = [
-            (each[1] if each[2] else USUAL.get(each[1], each[1]), each) for each in parameters
+        types_: list[tuple[type | str, ParameterDescription]] = [
+            (each[1] if each[2] else EXACT_TYPES.get(each[1], each[1]), each) for each in parameters
         ]
         self.kinds[name] = [kind for _, kind, _, _ in parameters]
         scope = {
@@ -186,13 +188,13 @@ class ProgramRun:
         return scope[name]
 
     def perform(
-        self, name: str, parameters: list[tuple[type | str, Parameter]], values: tuple[Any, ...]
+        self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401 - what a skill returns
-        """Carry out a skill; texts must be `str` and options a `list`, exactly."""
+        """Execute a skill; texts must be exactly `str`, and options exactly a `list`."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
-                check_fit(name, parameter, value, given)
+                _check_fit(name, parameter, value, given)
         if self.spent:
             raise LimitReachedError
         arguments = [value.copy() if type(value) is list else value for value in values]
@@ -200,17 +202,19 @@ class ProgramRun:
         if type(result) is int:
             for (kind, _), options in zip(parameters, arguments, strict=True):
                 if kind is list and options:
-                    return options[result]  # the very object that the program gave
+                    return options[result]  # the same object that the program gave
         return result
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Ask the engine for a skill."""
         kinds = self.kinds[name]
-        given = [WRITTEN.get(kind, value_text)(value) for kind, value in zip(kinds, arguments, strict=True)]
+        given = [
+            JSON_WRITERS.get(kind, _value_text)(value) for kind, value in zip(kinds, arguments, strict=True)
+        ]
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
-        """Let time pass; the engine learns of simulated time with the next request, or when it is up."""
+        """Let time pass; the engine learns of simulated time at the next request, or at its limit."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
@@ -223,14 +227,14 @@ class ProgramRun:
             self.request('"sleep",[]')
 
     def wait_for_ever(self) -> None:
-        """End the run: a program is alone, so that nothing can come that it waits for."""
+        """End the run: a program is alone, so that it would wait for ever."""
         self.request('"wait",[]')
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - what a skill returns
         """Send one request, and wait for its reply."""
         if self.spent:
             raise LimitReachedError
-        where = f",{line_at_work()}" if self.is_live else ""
+        where = f",{_line_at_work()}" if self.is_live else ""
         send(f"[{request},{self.now!r}{where}]")
         kind, value, self.now = receive()
         if self.is_live:
@@ -240,58 +244,57 @@ class ProgramRun:
         if kind == "error":
             raise robot_error(*value)
         self.spent = True
-        self.refused_at = (line_at_work() or None) if value else None
+        self.refused_at = (_line_at_work() or None) if value else None
         raise LimitReachedError
 
 
 def call_task() -> object:
-    """Code that is run among the program's names; source text would be compiled anew in each child."""
+    """Code to run with the program's names; source text would be compiled again in each child."""
     return task_program()  # type: ignore[name-defined] # noqa: F821 - the program's
 
 
-def options_text(options: list[Any]) -> str:
-    """Options as JSON: the text of each, and whether it was one."""
+def _options_text(options: list[Any]) -> str:
+    """Options as JSON: the text of each, and whether it is a `str`."""
     texts = [(str(option), issubclass(type(option), str)) for option in options]
     parts = [f"[{quoted(text)},{'true' if is_text else 'false'}]" for text, is_text in texts]
     return f"[{','.join(parts)}]"
 
 
-def check_fit(name: str, parameter: Parameter, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
-    """TypeError or ValueError where a value is none that a parameter takes."""
+def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
     named, kind, choices, words = parameter
     base = kind[5:-1] if kind[:5] == "list[" else ""
     if base and given is list:
         for each in list.__iter__(value):
-            check_fit(name, (named, base, choices, words), each, type(each))
+            _check_fit(name, (named, base, choices, words), each, type(each))
         return
-    if not (given is KINDS.get(kind) or (kind == "float" and given is int)):
+    if not (given is PARAMETER_TYPES.get(kind) or (kind == "float" and given is int)):
         raise TypeError(f"{name}: {named} must be {words}, not {NAME_OF(given)}")
     if choices and value not in choices:
         raise ValueError(f"{name}: {named} must be {words}, not {repr(value)[:100]}")
-    if (given is int and not -LARGEST <= value <= LARGEST) or (given is float and value - value != 0):
+    if (given is int and not -MAX_EXACT_INT <= value <= MAX_EXACT_INT) or (
+        given is float and value - value != 0
+    ):
         raise ValueError(f"{name}: {named} is out of range")
 
 
-def value_text(value: Any) -> str:  # noqa: ANN401 - a text, a number, a truth value, or a list of these
-    """A value that fits its parameter, as JSON."""
+def _value_text(value: Any) -> str:  # noqa: ANN401 - a scalar or a list of them
     if type(value) is list:
-        return f"[{','.join([value_text(each) for each in value])}]"
+        return f"[{','.join([_value_text(each) for each in value])}]"
     if type(value) is str:
         return quoted(value)
     return {True: "true", False: "false"}[value] if type(value) is bool else repr(value)
 
 
-def line_at_work() -> int:
-    """The line of the program that calls us; 0 where none does."""
+def _line_at_work() -> int:
+    """The line of the program that calls us; 0 if none does."""
     frame: types.FrameType | None = getframe(1)
     while frame is not None and frame.f_code.co_filename != PROGRAM:
         frame = frame.f_back
     return 0 if frame is None else frame.f_lineno or 0
 
 
-def last_line(error: BaseException) -> int | None:
-    """The line of the program at which an exception arose."""
-    line, traceback = None, own(BaseException, "__traceback__", error)
+def _last_line(error: BaseException) -> int | None:
+    line, traceback = None, _own(BaseException, "__traceback__", error)
     while traceback is not None:
         if traceback.tb_frame.f_code.co_filename == PROGRAM:
             line = traceback.tb_lineno
@@ -299,55 +302,54 @@ def last_line(error: BaseException) -> int | None:
     return line
 
 
-def own(kind: type[BaseException], name: str, error: BaseException) -> Any:  # noqa: ANN401 - of any type
-    """An attribute of an exception as its base class keeps it, past what a class of the program may say."""
+def _own(kind: type[BaseException], name: str, error: BaseException) -> Any:  # noqa: ANN401 - of any type
+    """An attribute of an exception as its base class has it, whatever a class of the program overrides."""
     return kind.__dict__[name].__get__(error)
 
 
-def message_of(error: BaseException) -> str:
-    """The message of an exception, whose class may be the program's own."""
+def _message_of(error: BaseException) -> str:
     try:
         return str(error)
     except BaseException:  # noqa: BLE001 - the program's own __str__ may raise anything
         return ""
 
 
-USUAL: dict[str, type] = {"str": str, "list": list}
-KINDS: dict[str, type] = {**USUAL, "int": int, "float": float, "bool": bool}
-WRITTEN: dict[str, Callable[[Any], str]] = {"str": quoted, "list": options_text}
-LARGEST = 2**53  # of whole numbers that JSON carries exactly
+EXACT_TYPES: dict[str, type] = {"str": str, "list": list}
+PARAMETER_TYPES: dict[str, type] = {**EXACT_TYPES, "int": int, "float": float, "bool": bool}
+JSON_WRITERS: dict[str, Callable[[Any], str]] = {"str": quoted, "list": _options_text}
+MAX_EXACT_INT = 2**53  # JSON carries integers up to this one exactly
 NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
-"""The name of a class, past what a metaclass of the program may say."""
+"""The name of a class, whatever a metaclass of the program overrides."""
 
 
 class LimitReachedError(BaseException):
-    """The run has reached a limit; any further use of fuel or of a skill raises it again."""
+    """The run has reached a limit; any further use of fuel or a skill raises it again."""
 
 
 class SkillError(Exception):
-    """The robot could not do what the program asked for."""
+    """The robot failed to execute a skill."""
 
-    number = -1  # by which the engine knows it; that of a class is the latest of its kind
+    number = -1  # identifies it to the engine; a class has the latest one of its kind
 
 
 SkillError.__name__ = SkillError.__qualname__ = "RobotError"  # as programs see it
-RAISED: dict[str, type[SkillError]] = {}
+ROBOT_ERROR_CLASSES: dict[str, type[SkillError]] = {}
 
 
 def robot_error(number: int, kind: str, text: str) -> SkillError:
-    """An error of the robot, of one class for each kind."""
-    if kind not in RAISED:
-        RAISED[kind] = type(kind, (SkillError,), {"__module__": "robot"})
-    RAISED[kind].number = number
-    error = RAISED[kind](text)
+    """An error of the robot; there is one class for each kind."""
+    if kind not in ROBOT_ERROR_CLASSES:
+        ROBOT_ERROR_CLASSES[kind] = type(kind, (SkillError,), {"__module__": "robot"})
+    ROBOT_ERROR_CLASSES[kind].number = number
+    error = ROBOT_ERROR_CLASSES[kind](text)
     error.number = number
     return error
 
 
-def number_of(error: BaseException) -> int | None:
-    """The number of a robot's error; None for one that the program has made itself."""
+def _number_of(error: BaseException) -> int | None:
+    """The number of a robot's error; None for an error that the program made itself."""
     try:
-        number = error.number  # type: ignore[attr-defined]  # or whatever the program has made of it
-    except BaseException:  # noqa: BLE001 - the same
+        number = error.number  # type: ignore[attr-defined]  # perhaps overridden by the program
+    except BaseException:  # noqa: BLE001 - see above
         return None
     return number if type(number) is int and number >= 0 else None

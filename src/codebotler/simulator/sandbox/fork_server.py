@@ -25,17 +25,20 @@ if TYPE_CHECKING:
 
     Run = TypeVar("Run", bound=ProgramRun)
 
-DOOR, REPORT = 5, 6  # descriptors: by which runs are asked for, and on which numbers are reported
-PID = 8  # bytes of a process id: as an int, a small one would take no memory and a large one some
-DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
+RUN_DOOR, REPORT_DESCRIPTOR = (
+    5,
+    6,
+)  # descriptors for requests of runs, and for reported numbers
+PID_BYTES = 8  # bytes of a process id; the size of an int in memory would depend on its value
+DESCRIPTOR_BYTES = 4  # bytes of one descriptor in a message
 
 
 def get_ready(
     role: str,
 ) -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
-    """Make all that runs need and share, and return what `serve` takes."""
+    """Prepare everything that runs share, and return the arguments of `serve`."""
     seconds = LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
-    door = socket(fileno=DOOR)
+    door = socket(fileno=RUN_DOOR)
     run = ProgramRun()
     simulate_environment(run)
     skills, lessons = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
@@ -46,33 +49,33 @@ def get_ready(
         del sys.modules[name]
     for module in sys.modules.values():
         if hasattr(module, "__path__"):
-            module.__path__ = [""]  # no folder of this machine, but one, which `logging` takes for granted
+            module.__path__ = [""]  # hides folders of this machine; `logging` needs one
             if module.__spec__ is not None:
                 module.__spec__.submodule_search_locations = module.__path__
-    sys.meta_path[:] = [NothingMore()]
+    sys.meta_path[:] = [_NothingMore()]
     give_up_rights()
     seccomp = usable_filter()
-    warm_up(run, door, lessons)
+    _warm_up(run, door, lessons)
     return door, run, execute, seccomp, seconds
 
 
 def serve(
     door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
 ) -> None:
-    """Fork children that execute what the engine asks for, one at a time, until it closes its end."""
+    """Fork a child for each run that the engine requests, one at a time, until it hangs up."""
     gc.collect()
     gc.freeze()
-    report(0 if seccomp is None else 1)
-    while one_run(door, run, execute, seccomp, seconds):
+    _report(0 if seccomp is None else 1)
+    while _one_run(door, run, execute, seccomp, seconds):
         pass
 
 
-def warm_up(run: ProgramRun, door: socket, lessons: int) -> None:
-    """Run the engine's own program here, and not in a child."""
-    report(lessons)
+def _warm_up(run: ProgramRun, door: socket, lessons: int) -> None:
+    """Run the engine's own program here, so that all children share the specialized bytecode."""
+    _report(lessons)
     names = vars(run.namespace).copy()
     for _ in range(lessons):
-        line = asked_for(door)
+        line = _asked_for(door)
         os.dup2(line, CHANNEL)
         if line != CHANNEL:
             os.close(line)
@@ -81,25 +84,24 @@ def warm_up(run: ProgramRun, door: socket, lessons: int) -> None:
     os.close(CHANNEL)
 
 
-class NothingMore:
-    """An importer that finds nothing: all that a program can import has been imported."""
+class _NothingMore:
+    """An importer that finds nothing: all permitted modules are already imported."""
 
     def find_spec(self, name: str, *_: object) -> NoReturn:
-        """Refuse in Python's words."""
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
-def one_run(
+def _one_run(
     door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
 ) -> bool:
-    """Fork the child of one run and report its process id and, at its end, its wait status.
+    """Fork the child of one run, and report its process id and later its status.
 
-    The dead child is reaped only when the next run is asked for, so that until then its id stays its own.
+    The dead child is reaped at the request of the next run, so that its process id stays its own until then.
     """
-    line = asked_for(door)
+    line = _asked_for(door)
     if line < 0:
         return False
-    parent = getpid().to_bytes(PID, "big")
+    parent = getpid().to_bytes(PID_BYTES, "big")
     pid = os.fork()
     if pid == 0:
         try:
@@ -109,26 +111,26 @@ def one_run(
         finally:
             os._exit(1)
     os.close(line)
-    report(pid)
-    report(end_of(pid))
+    _report(pid)
+    _report(_end_of(pid))
     return True
 
 
-def asked_for(door: socket) -> int:
-    """Wait for the next run, reap the last child, and return the new one's socket; -1 where none comes."""
-    ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR))[1]
+def _asked_for(door: socket) -> int:
+    """Wait for the next request, reap the last child, and return the new one's socket; -1 at the end."""
+    ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR_BYTES))[1]
     if not ancillary:
         return -1
     try:  # noqa: SIM105 - contextlib is large
         os.waitpid(-1, 0)
     except ChildProcessError:
         pass
-    return int.from_bytes(ancillary[0][2][:DESCRIPTOR], sys.byteorder)
+    return int.from_bytes(ancillary[0][2][:DESCRIPTOR_BYTES], sys.byteorder)
 
 
-def end_of(pid: int) -> int:
-    """Wait for the end of a child; its status, or minus the signal."""
-    if sys.platform != "linux":  # where `waitid` is new in Python 3.13
+def _end_of(pid: int) -> int:
+    """Wait for the end of a child, and return its status, or minus the signal."""
+    if sys.platform != "linux":  # which has `waitid` since Python 3.13
         return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     if ended is None:
@@ -137,23 +139,22 @@ def end_of(pid: int) -> int:
 
 
 def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
-    """In the forked child: take the socket as channel, apply limits and seccomp."""
+    """Isolate the forked child: make the socket its channel, and apply limits and seccomp."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
-    if getppid().to_bytes(PID, "big") != parent:  # it died before that: no signal will come
+    if getppid().to_bytes(PID_BYTES, "big") != parent:  # the parent has died, and no signal will come
         os._exit(1)
     enclose(seccomp, seconds)
 
 
 def execute(run: ProgramRun) -> None:
-    """Run the program that the engine sends, and report how it ended."""
-    code, skills, settings = receive()
+    """Run the program that the engine sends, and send how it ended."""
+    code, skills, parameters = receive()
     if skills != run.skills:
         run.provide(skills)
-    send(run.execute(code, settings))
+    send(run.execute(code, parameters))
 
 
-def report(number: int) -> None:
-    """Report a number to the engine."""
-    os.write(REPORT, number.to_bytes(8, sys.byteorder, signed=True))
+def _report(number: int) -> None:
+    os.write(REPORT_DESCRIPTOR, number.to_bytes(8, sys.byteorder, signed=True))

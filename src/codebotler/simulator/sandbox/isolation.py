@@ -17,18 +17,18 @@ if TYPE_CHECKING:
 
 
 def give_up_rights(memory: int = MEMORY) -> None:
-    """Give up for ever what neither this process needs nor any that it forks."""
+    """Drop for ever the rights that neither this process nor its children need."""
     for name in ("CORE", "FSIZE", "MEMLOCK", "MSGQUEUE"):
         set_limit(name, 0)
     set_limit("AS", memory)
     become_nobody()
     die_with_parent()
-    prctl(PR_SET_DUMPABLE, 0)  # others of the same user can neither trace this process nor read its memory
+    prctl(PR_SET_DUMPABLE, 0)  # no process of the same user can trace it or read its memory
     refuse_new_rights()
 
 
 def enclose(seccomp: Filter | None, seconds: int) -> None:
-    """Close everything but the channel, and limit processor time; `give_up_rights` comes before."""
+    """Leave only the channel, and limit processor time; call `give_up_rights` first."""
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
     limit_time(seconds)
@@ -37,7 +37,7 @@ def enclose(seccomp: Filter | None, seconds: int) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Set one limit for ever; systems other than Linux have fewer of them, or take no small one."""
+    """Set one limit for ever; other systems than Linux lack some limits, or refuse small values."""
     kind = getattr(resource, "RLIMIT_" + name, None)
     try:
         if kind is not None:
@@ -48,12 +48,12 @@ def set_limit(name: str, value: int) -> None:
 
 
 def limit_time(seconds: int) -> None:
-    """End this process by SIGXCPU when it has used so much processor time, a second later by SIGKILL."""
+    """Limit processor time: SIGXCPU ends this process then, or SIGKILL a second later."""
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
 
 def become_nobody() -> None:
-    """Give up being root, whom RLIMIT_NPROC does not bind."""
+    """Stop being root, who is exempt from RLIMIT_NPROC."""
     if os.geteuid() != 0:
         return
     os.setgroups([])
@@ -66,12 +66,12 @@ def become_nobody() -> None:
 
 
 def die_with_parent() -> None:
-    """Be killed when the thread ends that has started this process; a change of user undoes this."""
+    """Get killed at the end of the thread that started this process; a change of user undoes this."""
     prctl(PR_SET_PDEATHSIG, SIGKILL)
 
 
 def refuse_new_rights() -> None:
-    """Never get rights from a program that carries them, such as a setuid one."""
+    """Never gain rights by executing a program, such as a setuid one."""
     prctl(PR_SET_NO_NEW_PRIVS, 1)
 
 
@@ -85,11 +85,11 @@ SIGKILL = 9
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 38
 MACHINE = os.uname().machine
 SECCOMP_MODE_FILTER = 2
-LIBC = _ctypes.dlopen(None, 0)  # type: ignore[arg-type]  # of `ctypes`, which would make each fork dearer
+LIBC = _ctypes.dlopen(None, 0)  # type: ignore[arg-type]  # instead of `ctypes`, which is large and would slow each fork down
 
 
 def prctl(option: int, value: int = 0, other: int | bytes = 0) -> None:
-    """Change what this process may do; on Linux only."""
+    """Change an attribute of this process; on Linux only."""
     if sys.platform != "linux":
         return
     if _ctypes.call_function(_ctypes.dlsym(LIBC, "prctl"), (option, value, other, 0, 0)) != 0:
@@ -112,17 +112,17 @@ SYSCALLS = {
 }  # fmt: skip
 LOAD, RETURN, EQUAL, AT_LEAST, ANY_BIT = 0x20, 0x06, 0x15, 0x35, 0x45
 ALLOW, DENY, KILL = 0x7FFF0000, 0x00050001, 0x80000000
-NUMBER, ARCHITECTURE, FIRST_ARGUMENT, SECOND_ARGUMENT, THIRD_ARGUMENT = 0, 4, 16, 24, 32
+SYSCALL_NUMBER, ARCHITECTURE, FIRST_ARGUMENT, SECOND_ARGUMENT, THIRD_ARGUMENT = 0, 4, 16, 24, 32
 X32 = 0x40000000
 PROT_EXEC = 4
 FUTEX_WAKE_PRIVATE = 129
 
 
 def seccomp_filter(machine: str = MACHINE) -> Filter | None:
-    """The system calls that a child may make, as a BPF program; None on an unknown machine.
+    """The allowed system calls of a child, as a BPF program; None on an unknown machine.
 
     Reading and writing go to the channel only, memory is never executable, and a futex wakes but never waits,
-    since nobody else could wake; all else is refused with EPERM.
+    since no other thread could wake it; all other calls fail with EPERM.
     """
     if machine not in SYSCALLS or sys.platform != "linux":
         return None
@@ -136,7 +136,7 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
         (LOAD, 0, 0, ARCHITECTURE),
         (EQUAL, 1, 0, architecture),
         (RETURN, 0, 0, KILL),
-        (LOAD, 0, 0, NUMBER),
+        (LOAD, 0, 0, SYSCALL_NUMBER),
         (AT_LEAST, 0, 1, X32),
         (RETURN, 0, 0, KILL),
     ]
@@ -151,12 +151,12 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
         operation.to_bytes(2, sys.byteorder) + bytes((if_true, if_false)) + operand.to_bytes(4, sys.byteorder)
         for operation, if_true, if_false, operand in code
     )
-    address = id(instructions) + bytes.__basicsize__ - 1  # the content lies behind the head of the object
+    address = id(instructions) + bytes.__basicsize__ - 1  # the content follows the header of the object
     return len(code).to_bytes(8, sys.byteorder) + address.to_bytes(8, sys.byteorder), instructions
 
 
 def usable_filter() -> Filter | None:
-    """The filter for this machine if its kernel takes it, which a container may forbid; tried in a fork."""
+    """The filter for this machine if the kernel accepts it in a fork, which a container may forbid."""
     seccomp = seccomp_filter()
     if seccomp is None:
         return None

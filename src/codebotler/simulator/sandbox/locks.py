@@ -1,4 +1,4 @@
-"""Simulated locks: a program is alone, so that waiting for a lock only lets simulated time pass."""
+"""Simulated locks: a program is alone, so that waiting for a lock only passes simulated time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from codebotler.simulator.sandbox.execution import ProgramRun
 
 
 class Lock:
-    """Takes the place of `_thread.lock`; one that is held stays held, since nobody else could release it."""
+    """Replaces `_thread.lock`; a held lock stays held, since no other thread could release it."""
 
     run: ProgramRun
 
@@ -16,7 +16,7 @@ class Lock:
         self._times = 0
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take it if it is free; otherwise wait, which costs simulated time or, without a limit, the run."""
+        """Take the lock if it is free; else wait for simulated time, or without a timeout end the run."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if self._is_free():
@@ -29,7 +29,7 @@ class Lock:
         return False
 
     def release(self) -> None:
-        """Let it go."""
+        """Release the lock."""
         if not self._times:
             raise RuntimeError("release unlocked lock")
         self._times -= 1
@@ -52,10 +52,10 @@ class Lock:
 
 
 class RLock(Lock):
-    """Takes the place of `_thread.RLock`, with what `threading.Condition` asks of one."""
+    """Replaces `_thread.RLock`, with the methods that `threading.Condition` needs."""
 
     def release(self) -> None:
-        """Let it go once."""
+        """Release the lock once."""
         if not self._times:
             raise RuntimeError("cannot release un-acquired lock")
         self._times -= 1
@@ -78,7 +78,7 @@ class RLock(Lock):
 
 
 def simulate_locks(run: ProgramRun) -> None:
-    """Replace all locks that are made from now on; `threading` must not be imported yet."""
+    """Replace all locks made from now on; `threading` must not be imported yet."""
     Lock.run = run
     for each in (Lock, RLock):
         each.__module__ = "_thread"

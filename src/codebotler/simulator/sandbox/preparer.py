@@ -1,8 +1,7 @@
 """Parses and compiles programs in an isolated process, decides which are tame, and never executes them.
 
-A program runs in several worlds, in one child or in a fresh one each time. Compiled here, once and in a
-process that is warm, it costs each of them next to nothing. Code goes through the engine unopened, to the
-child that runs it.
+A program runs in several worlds; it is compiled once, in a process that is warm. The engine passes the code
+on, unopened, to the child that runs it.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from codebotler.simulator.sandbox import (
     WITHOUT_REFERENCES,
 )
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
-from codebotler.simulator.sandbox.fuel import TOO_LARGE, prepared
+from codebotler.simulator.sandbox.fuel import PROGRAM_TOO_LARGE, prepared
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import NoReturn
 
-DOOR = 5
+PREPARER_DOOR = 5
 REHEARSAL = "def task_program():\n    for room in get_all_rooms():\n        say(f'in {room}')\n"
 
 
@@ -38,7 +37,7 @@ def get_ready(_role: str) -> tuple[()]:
     give_up_rights()
     seccomp = usable_filter()
     answer(REHEARSAL, lowercase=True, skills=("get_all_rooms", "say"))
-    os.dup2(DOOR, CHANNEL)
+    os.dup2(PREPARER_DOOR, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     enclose(seccomp, CPU_SECONDS)
     return ()
@@ -52,14 +51,14 @@ def serve() -> NoReturn:
 
 
 def answer(source: str, *, lowercase: bool, skills: tuple[str, ...] | None = None) -> bytes:
-    """PLAIN or TAME and a program's code, or REFUSED and why there is none, as JSON."""
+    """PLAIN or TAME and a program's code, or REFUSED and the reason as JSON."""
     try:
         names = None if skills is None else frozenset(skills)
         code, tame = prepared(source, lowercase=lowercase, skills=names)
         data = dumps(code, WITHOUT_REFERENCES)
         if len(data) > MAX_CODE:
-            raise MemoryError(TOO_LARGE)  # noqa: TRY301 - the same as if the compiler had
-    except Exception as error:  # noqa: BLE001 - the compiler has many ways to refuse a program
+            raise MemoryError(PROGRAM_TOO_LARGE)  # noqa: TRY301 - as by the compiler
+    except Exception as error:  # noqa: BLE001 - the compiler raises many errors
         line = error.lineno if isinstance(error, SyntaxError) else None
         message = error.msg if isinstance(error, SyntaxError) else str(error)
         kind = quoted(type(error).__name__)

@@ -1,8 +1,8 @@
 """The standard library as programs see it: loaded before isolation, on a simulated clock and fixed seeds.
 
-An isolated process can import nothing, so that what is listed here is what a program can import, the same
-under every version of Python. What tells the time, draws at random or waits is replaced before the modules
-that take it for their own are imported.
+An isolated process can import nothing, so that programs can import the modules listed here, the same under
+every version of Python. Functions that tell the time, draw at random or wait are replaced before other
+modules import them.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ LISTED = """
     sched secrets select selectors shlex shutil signal site socket ssl stat statistics string stringprep
     struct subprocess sys sysconfig tempfile textwrap threading time timeit token tokenize tomllib traceback
     types typing unicodedata unittest unittest.mock urllib.parse uuid warnings weakref zipimport zlib zoneinfo
-""".split()  # noqa: SIM905 - a list of a hundred quoted words is no easier to read
+""".split()  # noqa: SIM905 - easier to read than a hundred quoted words
 
 CODECS = """
     ascii base64_codec charmap cp1252 hex_codec idna latin_1 punycode raw_unicode_escape rot_13 unicode_escape
     utf_16 utf_16_be utf_16_le utf_32 utf_7 utf_8 utf_8_sig
-""".split()  # noqa: SIM905 - the same
+""".split()  # noqa: SIM905 - see above
 
 IMPORTED = (*LISTED, "_strptime", *(f"encodings.{codec}" for codec in CODECS))
 SOME_VERSIONS_HAVE = ("typing.io", "typing.re")
@@ -48,10 +48,9 @@ def load_stdlib(run: ProgramRun) -> None:
     vars(select)["select"] = Select(run)
     simulate_chance()
     vars(_thread)["get_native_id"] = lambda: 1
-    # Whatever runs in the fork server once for each run is adapted by the interpreter after some dozens of
-    # them, and from then on leaves another heap behind.
+    # The interpreter would specialize a hook after some dozens of forks, which changes the heap.
     os.register_at_fork = posix.register_at_fork = lambda **_: None
-    sys.modules["_queue"] = None  # type: ignore[assignment]  # `queue` then takes its own, with simulated locks
+    sys.modules["_queue"] = None  # type: ignore[assignment]  # `queue` then uses its Python code, with simulated locks
     for name in IMPORTED:
         importlib.import_module(name)
     for name in (*SOME_VERSIONS_HAVE, "_queue"):
@@ -64,7 +63,7 @@ def load_stdlib(run: ProgramRun) -> None:
 
 
 def simulate_chance() -> None:
-    """Let random numbers repeat, also where a program asks for an unpredictable seed."""
+    """Make random numbers repeatable, even where a program wants an unpredictable seed."""
 
     class Random(_random.Random):
         def __new__(cls, *_: object, **__: object) -> Self:
@@ -76,7 +75,7 @@ def simulate_chance() -> None:
         def seed(self, a: Any = None, /) -> None:  # noqa: ANN401 - as in _random
             super().seed(0 if a is None else a)
 
-    _random.Random = Random  # type: ignore[misc]  # `random` takes this one
+    _random.Random = Random  # type: ignore[misc]  # `random` uses this one
     source = Random()
 
     def urandom(size: int, /) -> bytes:
@@ -86,9 +85,9 @@ def simulate_chance() -> None:
 
 
 def simulate_identities() -> None:
-    """Let `uuid` take its time from `time`, and let neither it nor `platform` name this machine."""
+    """Let `uuid` use the simulated clock, and hide this machine from it and from `platform`."""
     import platform  # noqa: PLC0415 - see the module's first lines
-    import uuid  # noqa: PLC0415 - the same
+    import uuid  # noqa: PLC0415 - see the module's first lines
 
     vars(platform).update(_uname_cache=platform.uname_result("Linux", "robot", "", "", ""))
     sys.orig_argv, sys.executable = list(sys.argv), ""
@@ -96,7 +95,7 @@ def simulate_identities() -> None:
 
 
 def hide_folders() -> None:
-    """Let modules and tracebacks name no folder of this machine."""
+    """Hide folders of this machine from modules and tracebacks."""
     for name, module in list(sys.modules.items()):
         if getattr(module, "__file__", None):
             module.__file__ = f"{name}.py"
@@ -106,16 +105,16 @@ def hide_folders() -> None:
 
     summarise = traceback.FrameSummary.__init__
 
-    def without_folder(self: traceback.FrameSummary, filename: str, *more: Any, **others: Any) -> None:  # noqa: ANN401 - as theirs
+    def without_folder(self: traceback.FrameSummary, filename: str, *more: Any, **others: Any) -> None:  # noqa: ANN401 - as in `traceback`
         summarise(self, filename.rpartition("/")[2], *more, **others)
 
-    traceback.FrameSummary.__init__ = without_folder  # type: ignore[method-assign]  # that is the point
+    traceback.FrameSummary.__init__ = without_folder  # type: ignore[method-assign]  # on purpose
 
 
 class Select:
-    """Takes the place of `select.select`: a wait for no file is a sleep, and one for a file is forbidden.
+    """Replaces `select.select`: a wait for files is forbidden, and any other is a sleep.
 
-    A function would become a method of the class in `selectors` that keeps it.
+    It is no function, which would become a method of a class in `selectors`.
     """
 
     def __init__(self, run: ProgramRun) -> None:
@@ -124,7 +123,7 @@ class Select:
     def __call__(
         self, read: list[object], write: list[object], other: list[object], timeout: float | None = None, /
     ) -> tuple[list[object], list[object], list[object]]:
-        """Wait, for so many seconds or for ever."""
+        """Wait for some seconds, or for ever."""
         if read or write or other:
             raise PermissionError(1, "Operation not permitted")
         if timeout is None:

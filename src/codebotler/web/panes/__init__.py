@@ -1,1 +1,1 @@
-"""The panes of the page, one a file: instruction, program, robot, its questions, past missions."""
+"""The panes of the page, one per module."""

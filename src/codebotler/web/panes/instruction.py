@@ -1,4 +1,4 @@
-"""The instruction pane: what the robot is to do, and which model writes the program."""
+"""The instruction pane: the instruction and the choice of a model."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.program import called_skills, tree_of
 from codebotler.core.terminal import shortened, visible, visible_lines
-from codebotler.missions.log import Summary
+from codebotler.missions.log import MissionSummary
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import known_instructions
-from codebotler.missions.store import missions
-from codebotler.missions.view import Order, SessionView
+from codebotler.missions.store import read_missions
+from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.models.usable import MODEL_HINT
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
 
-UNKNOWN = "There is no recorded program for this instruction."
-NO_MODEL = (
-    f"For other instructions, {MODEL_HINT}, and add --model NAME to codebotler serve; "
+_NO_RECORDED_PROGRAM = "There is no recorded program for this instruction."
+_HOW_TO_ADD_MODEL = (
+    f"For other instructions, {MODEL_HINT}, and restart codebotler serve with --model NAME; "
     "codebotler models lists the names."
 )
-MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
-ABOUT_RECORDED = (
-    "This is not a language model: its programs were written by people, so you can try everything without an "
-    "API key. It knows only a few instructions, such as the examples below."
+_MAX_EXAMPLES, _MAX_RECENT, _MAX_PICK_CHARACTERS = 4, 6, 400
+_ABOUT_RECORDED = (
+    "This is not a language model: people wrote its programs, so you can try everything without an API key. "
+    "It knows only a few instructions, such as the examples below."
 )
 
 
@@ -54,52 +54,49 @@ class InstructionPane:
                 label="Model",
             )
             self._model.props("outlined dense").on_value_change(self._about_model)
-            self._about = PlainText("p", ABOUT_RECORDED, "quiet")
+            self._about = PlainText("p", _ABOUT_RECORDED, "quiet")
             self._write = Button("Write the program", self._ask, "primary")
-            self._trouble = PlainText("p", "", "trouble").props("role=alert")
-            self._alike = ui.element("div").classes("picks")
+            self._error = PlainText("p", "", "trouble").props("role=alert")
+            self._similar = ui.element("div").classes("picks")
             self._examples = ui.element("div").classes("picks")
-            self._before = ui.element("div").classes("picks")
+            self._recent = ui.element("div").classes("picks")
         self._about_model()
-        self._trouble.say("")
+        self._error.say("")
 
     async def load(self) -> None:
-        """Add the examples and the recent instructions, which are read from files."""
+        """Add the examples and the recent instructions."""
         shown = await asyncio.to_thread(examples, self._console)
-        if not self._examples.is_deleted:  # else the page was closed meanwhile
+        if not self._examples.is_deleted:  # the page may be closed by now
             self._fill(self._examples, "Examples", [(text, "") for text in shown])
         await self._load_recent()
 
     async def follow(self, view: SessionView) -> None:
-        """Read the recent instructions again once a mission has ended."""
+        """Refresh the recent instructions after the end of a mission."""
         if view.is_over and view.id != self._ended:
             self._ended = view.id
             await self._load_recent()
 
     async def _load_recent(self) -> None:
         recent = await asyncio.to_thread(_recent, self._console)
-        if not self._before.is_deleted:
-            self._fill(
-                self._before,
-                "Recent",
-                [(one.instruction, one.state if one.has_ended else "") for one in recent],
-            )
+        if not self._recent.is_deleted:
+            texts = [(one.instruction, one.state if one.has_ended else "") for one in recent]
+            self._fill(self._recent, "Recent", texts)
 
     def show(self, view: SessionView) -> None:
         """Show a view."""
         if view.number != self._number:
             self._number = view.number
-            if (self._text.value or "").strip() in {"", self._asked}:  # nobody is typing another one here
+            if (self._text.value or "").strip() in {"", self._asked}:  # keep text that is being typed
                 self._text.value = visible_lines(view.instruction)
             self._asked = visible_lines(view.instruction)
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
-        self._trouble.say(view.error if view.suggestions is None else self._unknown(view.suggestions))
+        self._error.say(view.error if view.suggestions is None else self._unknown(view.suggestions))
         self._suggest(view.suggestions or ())
 
     def _ask(self) -> None:
         try:
-            self._console.begin(Order(self._text.value or "", self._model.value or ""))
+            self._console.begin(MissionOrder(self._text.value or "", self._model.value or ""))
         except (MissionError, UserError) as error:
             warn(error.sentence)
         else:
@@ -110,14 +107,14 @@ class InstructionPane:
 
     def _unknown(self, known: tuple[str, ...]) -> str:
         choose = "Choose one below. " if known else ""
-        has_other = not all(map(is_recorded, self._console.models))
-        return f"{UNKNOWN} {choose}{'You can also choose another model.' if has_other else NO_MODEL}"
+        has_only_recorded = all(map(is_recorded, self._console.models))
+        how = _HOW_TO_ADD_MODEL if has_only_recorded else "You can also choose another model."
+        return f"{_NO_RECORDED_PROGRAM} {choose}{how}"
 
     def _suggest(self, known: tuple[str, ...]) -> None:
-        """Offer instructions that are alike."""
         if known != self._suggested:
             self._suggested = known
-            self._fill(self._alike, "Similar instructions", [(text, "") for text in known])
+            self._fill(self._similar, "Similar instructions", [(text, "") for text in known])
 
     def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
         where.clear()
@@ -126,31 +123,30 @@ class InstructionPane:
         with where:
             PlainText("h3", title)
             for text, state in texts:
-                with html.button(type="button").classes("pick").on("click", lambda t=text: self._take(t)):
-                    PlainText("span", shortened(text, MOST_TEXT))
+                with html.button(type="button").classes("pick").on("click", lambda t=text: self._copy(t)):
+                    PlainText("span", shortened(text, _MAX_PICK_CHARACTERS))
                     if state:
                         PlainText("small", state, f"state state-{state}")
 
-    def _take(self, text: str) -> None:
+    def _copy(self, text: str) -> None:
         self._text.value = visible_lines(text)
         scroll_to("h-instruct")
 
 
 def examples(console: Console) -> list[str]:
-    """Short instructions that the recorded model knows, of different kinds, for rooms that are there."""
+    """Return short recorded instructions that use different skills and only rooms that exist here."""
     room_map = None if console.world is None else RoomMap.of(console.world)
     known = known_instructions(room_map)
     found: dict[frozenset[str], str] = {}
     for instruction in sorted(known, key=len):
         found.setdefault(frozenset(called_skills(tree_of(known[instruction]))), instruction)
-    return list(found.values())[:MOST_EXAMPLES]
+    return list(found.values())[:_MAX_EXAMPLES]
 
 
-def _recent(console: Console) -> list[Summary]:
-    """The last different instructions."""
+def _recent(console: Console) -> list[MissionSummary]:
     try:
-        known = missions(console.home)
+        known = read_missions(console.home)
     except (UserError, OSError):
         return []
     last = {summary.instruction: summary for summary in known if summary.instruction}
-    return sorted(last.values(), key=lambda summary: -summary.created)[:MOST_BEFORE]
+    return sorted(last.values(), key=lambda summary: -summary.created)[:_MAX_RECENT]

@@ -1,9 +1,9 @@
-"""The page that lists past missions, with filters; it follows what happens."""
+"""The page that lists all missions, with filters and live updates."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Annotated, Any
 from urllib.parse import urlencode
@@ -14,28 +14,22 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
-from codebotler.missions.log import Summary
-from codebotler.missions.store import missions
+from codebotler.missions.log import MissionSummary
+from codebotler.missions.store import read_missions
 from codebotler.missions.wording import reason_text, title
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow
 
-ADDRESS = "/missions"
-MOST = 200
-MOST_TITLE, MOST_REASON = 160, 200
-NONE = "No missions yet."
+_MISSIONS_PATH = "/missions"
+MAX_LISTED_MISSIONS = 200
+_MAX_TITLE, _MAX_LISTED_REASON = 160, 200
+_NO_MISSIONS = "No missions yet."
 
 
 @dataclass(frozen=True)
-class Filter:
-    """Which missions are shown; what is empty leaves nothing out.
-
-    Args:
-        state: in which they are.
-        robot: that carried them out.
-        text: in their instruction, program or reason, whatever its capitals.
-    """
+class MissionFilter:
+    """A filter for missions: by state, by robot, and by text in the instruction, program or reason."""
 
     state: str = ""
     robot: str = ""
@@ -43,23 +37,23 @@ class Filter:
 
     @property
     def query(self) -> str:
-        """How an address says it."""
+        """The filter as a query string."""
         chosen = {name: value for name, value in vars(self).items() if value}
         return f"?{urlencode(chosen)}" if chosen else ""
 
-    def shows(self, summary: Summary) -> bool:
-        """Whether a mission is shown."""
-        is_alike = self.state in {"", summary.state} and self.robot in {"", summary.robot}
+    def shows(self, summary: MissionSummary) -> bool:
+        """Whether the filter shows a mission."""
+        has_state = self.state in {"", summary.state} and self.robot in {"", summary.robot}
         texts = (summary.instruction, summary.program, summary.reason)
-        return is_alike and any(self.text.casefold() in text.casefold() for text in texts)
+        return has_state and any(self.text.casefold() in text.casefold() for text in texts)
 
 
 def add(console: Console, frame: Frame) -> None:
     """Add the page."""
 
-    @ui.page(ADDRESS)
-    async def list_missions(chosen: Annotated[Filter, Depends(Filter)]) -> None:
-        frame("Missions", ADDRESS)
+    @ui.page(_MISSIONS_PATH)
+    async def list_missions(chosen: Annotated[MissionFilter, Depends(MissionFilter)]) -> None:
+        frame("Missions", _MISSIONS_PATH)
         with ui.element("div").classes("past"):
             PlainText("h1", "Missions")
             shown = _MissionList(console, chosen)
@@ -68,69 +62,74 @@ def add(console: Console, frame: Frame) -> None:
 
 
 class _MissionList:
-    """The missions that a filter shows, newest first."""
+    """The filters and the list of missions, newest first."""
 
-    def __init__(self, console: Console, chosen: Filter) -> None:
+    def __init__(self, console: Console, chosen: MissionFilter) -> None:
         self._console, self._chosen = console, chosen
-        self._known: list[Summary] = []
+        self._known: list[MissionSummary] = []
         self._seen: object = None
-        self._rows: dict[str, _Row] = {}
-        with ui.element("div").classes("filters").props('role=search aria-label="Which missions are shown"'):
+        self._rows: dict[str, _MissionRow] = {}
+        with ui.element("div").classes("filters").props('role=search aria-label="Filter missions"'):
             self._text = ui.input("Search", value=chosen.text, on_change=self._choose)
             self._text.props("outlined dense clearable debounce=300 dir=auto maxlength=200")
-            self._state = _choice("State", chosen.state, self._choose)
-            self._robot = _choice("Robot", chosen.robot, self._choose)
+            self._state = _select_box("State", chosen.state, self._choose)
+            self._robot = _select_box("Robot", chosen.robot, self._choose)
         self._count = PlainText("p", "", "quiet").props("role=status")
-        self._trouble = PlainText("p", "", "trouble").props("role=alert")
+        self._error = PlainText("p", "", "trouble").props("role=alert")
         self._list = ui.element("ol").classes("rows")
 
     async def update(self) -> None:
-        """Show the missions as they are now; they are read again only after one has come to another state."""
+        """Read and show the missions again if the current one has changed its state."""
         view = self._console.view
         seen = (view.id, view.state, view.reason)
         if seen == self._seen:
             return
         try:
-            self._known = await asyncio.to_thread(missions, self._console.home)
+            self._known = await asyncio.to_thread(read_missions, self._console.home)
         except UserError as error:
-            self._trouble.say(str(error))
+            self._error.say(str(error))
             return
         self._seen = seen
-        self._trouble.say("")
-        _offer(self._state, "All states", {summary.state for summary in self._known}, self._chosen.state)
-        _offer(self._robot, "All robots", {summary.robot for summary in self._known}, self._chosen.robot)
+        self._error.say("")
+        _set_options(
+            self._state, "All states", {summary.state for summary in self._known}, self._chosen.state
+        )
+        _set_options(
+            self._robot, "All robots", {summary.robot for summary in self._known}, self._chosen.robot
+        )
         self._show()
 
     def _choose(self) -> None:
-        chosen = Filter(self._state.value or "", self._robot.value or "", (self._text.value or "").strip())
+        chosen = MissionFilter(
+            self._state.value or "", self._robot.value or "", (self._text.value or "").strip()
+        )
         if chosen != self._chosen:
             self._chosen = chosen
-            ui.navigate.history.replace(outside(ADDRESS) + chosen.query)
+            ui.navigate.history.replace(outside(_MISSIONS_PATH) + chosen.query)
             self._show()
 
     def _show(self) -> None:
         found = [summary for summary in reversed(self._known) if self._chosen.shows(summary)]
         self._count.say(_count_text(len(found), len(self._known)))
-        found = found[:MOST]
+        found = found[:MAX_LISTED_MISSIONS]
         for gone in self._rows.keys() - {summary.id for summary in found}:
             self._rows.pop(gone).element.delete()
         for position, summary in enumerate(found):
             row = self._rows.get(summary.id)
             if row is None:
                 with self._list:
-                    row = self._rows[summary.id] = _Row(summary.id)
+                    row = self._rows[summary.id] = _MissionRow(summary.id)
                 row.element.move(self._list, position)
             row.show(summary)
 
 
-def _choice(label: str, value: str, chosen: Any) -> ui.select:  # noqa: ANN401 - any handler of NiceGUI's
+def _select_box(label: str, value: str, chosen: Any) -> ui.select:  # noqa: ANN401 - any handler of NiceGUI's
     box = ui.select({value: visible(value)}, value=value, label=label, on_change=chosen)
     box.props("outlined dense")
     return box
 
 
-def _offer(box: ui.select, everything: str, values: set[str], chosen: str) -> None:
-    """Offer what there is, and what is chosen, which may come back."""
+def _set_options(box: ui.select, everything: str, values: set[str], chosen: str) -> None:
     options = {"": everything, **{value: visible(value) for value in sorted(values | {chosen}) if value}}
     if options != box.options:
         box.set_options(options)
@@ -138,31 +137,29 @@ def _offer(box: ui.select, everything: str, values: set[str], chosen: str) -> No
 
 def _count_text(found: int, known: int) -> str:
     if not known:
-        return NONE
-    last = f", the last {MOST:,} are listed" if found > MOST else ""
+        return _NO_MISSIONS
+    last = f"; showing the latest {MAX_LISTED_MISSIONS:,}" if found > MAX_LISTED_MISSIONS else ""
     return f"{counted(known, 'mission') if found == known else f'{found:,} of {known:,} missions'}{last}"
 
 
-class _Row:
-    """A mission in the list."""
+class _MissionRow:
+    """An entry of the list."""
 
     def __init__(self, mission: str) -> None:
-        self._shown: Summary | None = None
-        with ui.element("li") as self.element, html.a(href=outside(f"{ADDRESS}/{mission}")):
+        with ui.element("li") as self.element, html.a(href=outside(f"{_MISSIONS_PATH}/{mission}")):
             self._time = PlainText("time")
             with ui.element("span").classes("about"):
                 self._title = PlainText("span", "", "text")
                 self._outcome = PlainText("span", "", "outcome")
             self._state = PlainText("small")
 
-    def show(self, summary: Summary) -> None:
-        """Show a mission, unless it is shown already."""
-        if summary == self._shown:
-            return
-        self._shown = replace(summary)
+    def show(self, summary: MissionSummary) -> None:
+        """Show a mission."""
         self._time.say(f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
-        self._title.say(shortened(title(summary), MOST_TITLE))
-        reason = shortened(reason_text(summary.reason, summary.line), MOST_REASON) if summary.reason else ""
+        self._title.say(shortened(title(summary), _MAX_TITLE))
+        reason = (
+            shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON) if summary.reason else ""
+        )
         self._outcome.say(" · ".join(filter(None, (f"robot: {summary.robot}", reason))))
         self._state.say(summary.state)
         self._state.classes(replace=f"state state-{summary.state}")

@@ -1,4 +1,4 @@
-"""The page of one mission: how it ended, its timeline, and its program; it follows one that goes on."""
+"""The page of one mission: its outcome, timeline and program, with live updates."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
-from codebotler.missions.log import SKILL_ENDS, Line, State, Summary, events_of
-from codebotler.missions.store import find
+from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, MissionSummary, read_events
+from codebotler.missions.store import find_mission
 from codebotler.missions.wording import activity, event_text, reason_text, stop_text, title
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow
 
-MOST_EVENTS, MOST_CODE = 1_000, 200
-HEADLINES: Mapping[str, str] = {State.DRAFTING: "Program written", State.RUNNING: "Started"}
-"""How the timeline names states of a mission, but for those that speak for themselves."""
+MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
+_STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "Program written", MissionState.RUNNING: "Started"}
+"""Names of states in the timeline; others are used as they are."""
 
-TOLD_BY_STOP = frozenset({State.STOPPING, State.STOPPED})
-"""States that are not shown where a stop is."""
+_STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
+"""States that are not shown after a stop."""
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -47,58 +47,56 @@ def add(console: Console, frame: Frame) -> None:
 
 
 async def _update(console: Console, page: _MissionPage) -> None:
-    """Show what has happened meanwhile; another tool's mission and a past one do not change here."""
+    """Refresh the page, if it shows the current mission of this process."""
     if page.mission == console.view.id and not page.has_ended:
         page.show(*await asyncio.to_thread(_read, console, page.mission))
 
 
-def timeline(events: Sequence[Line]) -> Iterator[tuple[Line, str]]:
-    """The events that are shown, in words; a stop and what it interrupted are one."""
+def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
+    """Yield the visible events in words; a stop includes the activity that it interrupted."""
     doing, is_stopped = "", False
     for number, line in enumerate(events):
         event = line["event"]
         if event == "skill" or (event == "sleep" and line["seconds"]):
             doing = activity(line)
-        elif event in SKILL_ENDS and event != "cancelled":
+        elif event in SKILL_END_EVENTS and event != "cancelled":
             doing = ""
         if event == "stop":
             is_stopped = True
-            yield line, _sentence(stop_text(line["by"], doing))
+            yield line, _capitalize(stop_text(line["by"], doing))
             continue
-        is_told = event == "cancelled" or (is_stopped and line.get("state") in TOLD_BY_STOP)
-        words = "" if is_told else in_words(line, is_first=number == 0)
+        is_hidden = event == "cancelled" or (is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP)
+        words = "" if is_hidden else timeline_text(line, is_first=number == 0)
         if words:
             yield line, words
 
 
-def in_words(line: Line, *, is_first: bool) -> str:
-    """An event in the timeline; empty if it is not shown."""
+def timeline_text(line: LogLine, *, is_first: bool) -> str:
+    """Return the text of an event in the timeline; empty if it is hidden."""
     event = line["event"]
     if event == "state":
         state, reason = line["state"], shortened(line.get("reason", ""))
-        step = "Mission created" if is_first else HEADLINES.get(state, visible(state).capitalize())
-        if state == State.CHECKED:
+        step = "Mission created" if is_first else _STATE_TITLES.get(state, visible(state).capitalize())
+        if state == MissionState.CHECKED:
             problems = len(line.get("problems", ()))
             step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"
         return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
-    return "" if event == "feedback" else _sentence(event_text(line))
+    return "" if event == "feedback" else _capitalize(event_text(line))
 
 
-def _sentence(words: str) -> str:
+def _capitalize(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _read(console: Console, mission: str) -> tuple[Summary, list[Line]]:
-    folder = find(console.home, mission)
-    return Summary.read(folder), events_of(folder)
+def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine]]:
+    folder = find_mission(console.home, mission)
+    return MissionSummary.read(folder), read_events(folder)
 
 
 class _MissionPage:
-    """A mission: how it ended and why, what happened, and the program."""
-
-    def __init__(self, summary: Summary) -> None:
+    def __init__(self, summary: MissionSummary) -> None:
         self.mission, self.has_ended = summary.id, False
-        self._shown: Summary | None = None
+        self._shown: MissionSummary | None = None
         self._count = 0
         self._head = ui.element("div").classes("mission-head")
         PlainText("h2", "What happened")
@@ -107,36 +105,36 @@ class _MissionPage:
         PlainText("h2", "Program")
         self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
 
-    def show(self, summary: Summary, events: Sequence[Line]) -> None:
-        """Show a mission, of which more may have happened."""
+    def show(self, summary: MissionSummary, events: Sequence[LogLine]) -> None:
+        """Show a mission, including new events."""
         self.has_ended = summary.has_ended
         if summary != self._shown:
             self._shown = replace(summary)
             self._head.clear()
             with self._head:
-                _draw_head(summary)
+                _draw_header(summary)
             self._source.clear()
             with self._source:
                 _draw_source(summary)
-        steps = list(timeline(events[:MOST_EVENTS]))
+        steps = list(timeline(events[:MAX_LISTED_EVENTS]))
         with self._timeline:
             for line, words in steps[self._count :]:
                 _draw_event(line, words)
         self._count = len(steps)
-        more = len(events) - MOST_EVENTS
-        self._more.say(f"{more:,} more events are in the downloads above." if more > 0 else "")
+        more = len(events) - MAX_LISTED_EVENTS
+        self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_head(summary: Summary) -> None:
+def _draw_header(summary: MissionSummary) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):
         PlainText("small", summary.state, f"state state-{summary.state}")
         if summary.reason:
             PlainText("span", shortened(reason_text(summary.reason, summary.line)), "reason")
-        if code := _line_of(summary):
-            PlainText("code", shortened(code, MOST_CODE))
-    by_hand = " · program typed or changed by hand" if summary.program else ""
+        if code := _last_line(summary):
+            PlainText("code", shortened(code, _MAX_CODE_CHARACTERS))
+    by_hand = " · program typed or edited by hand" if summary.program else ""
     by = f" · program by {summary.model}" if summary.model else by_hand
     PlainText("p", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}", "facts")
     with ui.element("p").classes("downloads"):
@@ -146,17 +144,15 @@ def _draw_head(summary: Summary) -> None:
         PlainText("p", shortened(problem), "trouble")
 
 
-def _line_of(summary: Summary) -> str:
-    """The line of the program at which the mission ended, without its indentation; empty if it is unknown."""
-    lines = summary.program.split("\n")
-    is_there = summary.line is not None and 0 < summary.line <= len(lines)
-    return lines[summary.line - 1].strip() if summary.line is not None and is_there else ""
+def _last_line(summary: MissionSummary) -> str:
+    """The line of the program at which the mission ended, unindented; empty if unknown."""
+    lines, number = ["", *summary.program.split("\n")], summary.line or 0
+    return lines[number].strip() if 0 < number < len(lines) else ""
 
 
-def _draw_source(summary: Summary) -> None:
-    """The program, in which the line at which the mission ended is marked."""
+def _draw_source(summary: MissionSummary) -> None:
     lines = summary.program.split("\n")
-    at = summary.line if _line_of(summary) else None
+    at = summary.line if _last_line(summary) else None
     if at is None:
         PlainText("span", summary.program)
         return
@@ -165,7 +161,7 @@ def _draw_source(summary: Summary) -> None:
     PlainText("span", "".join(f"\n{line}" for line in lines[at:]))
 
 
-def _draw_event(line: Line, words: str) -> None:
+def _draw_event(line: LogLine, words: str) -> None:
     with ui.element("li").classes(f"event event-{line['event']}"):
         PlainText("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
         PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")

@@ -1,4 +1,4 @@
-"""The program pane: the editor, the problems, what the robot would do, and the approval."""
+"""The program pane: editor, problems, approval and storyboard."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
-from codebotler.web.console import MOST_PROGRAM, Console
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
-from codebotler.web.storyboard import Reached, draw_strips
+from codebotler.web.storyboard import RouteProgress, draw_strips
 
-CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
-MOST_MARKS, MOST_ESCAPES = 400, 2_000
-MOST_PROBLEMS = 20
+_CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
+_MAX_MARKS, _MAX_ESCAPES = 400, 2_000
+_MAX_PROBLEMS = 20
 
 
 class ProgramPane:
-    """Shows the program of the mission at hand; takes edits and the approval."""
+    """Shows the current program; takes edits and the approval."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._heard = 0  # texts from this browser
-        self._told: dict[str, object] = {}
+        self._received = 0  # the number of the last text from this browser
+        self._sent: dict[str, object] = {}
         self._drawn: tuple[object, ...] = ()
         script("editor.js")
         ui.on("program-typed", self._typed)
@@ -46,8 +46,7 @@ class ProgramPane:
                 self._busy = PlainText("span", "", "busy").props("role=status")
             self._reply = ReplyPane()
             self._writer = PlainText("p", "", "quiet")
-            # Its own properties stay as they are: each update of one would bring its text along, over what
-            # is being typed. The script sets what changes.
+            # Only the script changes the editor: updating a property would overwrite text being typed.
             self._editor = ui.codemirror("", language="Python", line_wrapping=False).classes("editor")
             self._editor.on("update:value", js_handler="() => programEditor.typed()")
             self._verdict = PlainText("p", "", "verdict").props("role=status")
@@ -69,40 +68,45 @@ class ProgramPane:
         """Show a view."""
         self._view = view
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
-        self._tell(view, shown)
+        self._send(view, shown)
         self._reply.show(view)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
-        self._writer.say(_written_by(view) if view.program and not view.is_written else "")
+        self._writer.say(_author_text(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
-        self._instruction.say(_made_for(view) if view.program else "")
+        self._instruction.say(_instruction_text(view) if view.program else "")
         self._rules.show(view)
         self._show_approval(view)
-        reached = reached_in(view)
+        reached = route_progress(view)
         drawn = (view.check, view.problems, view.unknown_rooms, shown, reached)
         if drawn != self._drawn:
             self._drawn = drawn
             self._draw(view, reached)
 
-    def _tell(self, view: SessionView, shown: str, *, anyway: bool = False) -> None:
-        """Send the browser a program and its marks; it keeps what was typed there meanwhile."""
-        told: dict[str, object] = {
+    def _send(self, view: SessionView, shown: str, *, force: bool = False) -> None:
+        """Send a program and its marks to the browser, which keeps newer text of its own."""
+        content: dict[str, object] = {
             "program": shown,
-            "marks": [*_skills(shown), *_escapes(shown), *_marks(view.check, shown), *_at_work(view)],
+            "marks": [
+                *_skill_marks(shown),
+                *_escape_marks(shown),
+                *_problem_marks(view.check, shown),
+                *_current_line(view),
+            ],
             "editable": view.may_be_edited,
-            "heard": self._heard,
-            "anyway": anyway,
+            "received": self._received,
+            "force": force,
         }
-        if told != self._told or anyway:
-            self._told = told
-            ui.run_javascript(f"programEditor.show({json.dumps(told)})")
+        if content != self._sent or force:
+            self._sent = content
+            ui.run_javascript(f"programEditor.show({json.dumps(content)})")
 
     def _typed(self, event: GenericEventArguments) -> None:
-        """Have typed text checked, unless another person changed the program first."""
-        typed, self._heard = event.args["text"], int(event.args["number"])
+        """Check typed text, unless another person changed the program first."""
+        typed, self._received = event.args["text"], int(event.args["number"])
         current = _for_editor(self._console.view.program)
         if typed is None:
             self._restore(
-                f"A program can have at most {MOST_PROGRAM:,} characters; your last edit was discarded."
+                f"The limit is {MAX_PROGRAM_CHARACTERS:,} characters; your last edit was discarded."
             )
         elif event.args["base"] != current:
             self._restore("Someone else changed the program; your last edit was discarded.")
@@ -111,9 +115,9 @@ class ProgramPane:
         self.show(self._console.view)
 
     def _restore(self, why: str) -> None:
-        """Have the browser show the console's program, and say why."""
+        """Show the console's program again, and a warning."""
         view = self._console.view
-        self._tell(view, _for_editor(view.program), anyway=True)
+        self._send(view, _for_editor(view.program), force=True)
         warn(why, 10.0)
 
     # --- the approval
@@ -125,10 +129,10 @@ class ProgramPane:
             return
         many = f"{count} problems" if count > 1 else "1 problem"
         self._verdict.classes(add="bad" if count else "good", remove="good" if count else "bad")
-        told = f"{many}. The robot should not run this." if count else "Checked: no problems."
+        verdict = f"{many}. The robot should not run this." if count else "Checked: no problems."
         if view.check.rooms_are_guessed:
-            told += " The robot does not list its rooms; the check used the rooms named in the program."
-        self._verdict.say(told)
+            verdict += " The robot does not list its rooms; the check used the rooms named in the program."
+        self._verdict.say(verdict)
 
     def _show_approval(self, view: SessionView) -> None:
         open_ = view.state is not None and view.state.is_open and not view.is_over and bool(view.program)
@@ -144,7 +148,7 @@ class ProgramPane:
         higher = none.higher_limit if none is not None and may_again else None
         self._raise.say(f"Raise the limit to {higher:,} tokens" if higher else "")
         self._run.set_visibility(open_ or self._may_rerun(view))
-        self._run.text = "Prepare it again" if self._may_rerun(view) else "Run it on the robot"
+        self._run.text = "Prepare another run" if self._may_rerun(view) else "Run it on the robot"
         self._ticked()
 
     def _may_rerun(self, view: SessionView) -> bool:
@@ -170,14 +174,14 @@ class ProgramPane:
                 scroll_up()
 
     async def _is_seen(self, view: SessionView) -> bool:
-        """Whether this browser shows that very program: two people may type at the same time."""
+        """Whether this browser shows exactly that program: two people may type at the same time."""
         seen = await ui.run_javascript("programEditor.settle()", timeout=5.0)
         if seen["text"] == _for_editor(view.program):
             return True
-        if seen["number"] > self._heard or seen["text"] == _for_editor(self._console.view.program):
+        if seen["number"] > self._received or seen["text"] == _for_editor(self._console.view.program):
             ui.notify("Checking your last edit first.", position="top")
         else:
-            self._restore("The program has changed; look at it again.")
+            self._restore("The program has changed; review it again.")
         return False
 
     def _again(self, *, repair: bool, max_tokens: int | None = None) -> None:
@@ -196,12 +200,10 @@ class ProgramPane:
         except (MissionError, UserError) as error:
             warn(error.sentence)
 
-    # --- what was found
-
-    def _draw(self, view: SessionView, reached: Reached) -> None:
+    def _draw(self, view: SessionView, reached: RouteProgress) -> None:
         self._problems.clear()
         with self._problems:
-            for sentence in (*view.problems, *view.unknown_rooms)[:MOST_PROBLEMS]:
+            for sentence in (*view.problems, *view.unknown_rooms)[:_MAX_PROBLEMS]:
                 kind = "problem" if sentence in view.problems else "unsure"
                 PlainText("li", shortened(sentence), kind)
         self._board.clear()
@@ -210,65 +212,65 @@ class ProgramPane:
                 draw_strips(view.check, reached)
 
 
-def reached_in(view: SessionView) -> Reached:
-    """How far the robot has come, with the names of rooms that the check uses."""
+def route_progress(view: SessionView) -> RouteProgress:
+    """Return the robot's progress, with the check's names of rooms."""
     named = view.room_map or (view.check and view.check.room_map)
     if not named:
-        return Reached()
+        return RouteProgress()
     visited = tuple(named.room(words) or words for words in view.progress.visited)
-    return Reached(visited, view.progress.looks, view.progress.answers)
+    return RouteProgress(visited, view.progress.looks, view.progress.answers)
 
 
-def _written_by(view: SessionView) -> str:
+def _author_text(view: SessionView) -> str:
     if not view.author:
-        return "Typed or changed by hand."
+        return "Typed or edited by hand."
     if is_recorded(view.author):
-        return "Recorded program, no language model."
+        return "A recorded program, not written by a language model."
     return f"Written by {view.author}."
 
 
-def _made_for(view: SessionView) -> str:
+def _instruction_text(view: SessionView) -> str:
     if view.instruction:
         return f"Instruction: {shortened(view.instruction, 400)}"
-    return "A program of your own, without an instruction."
+    return "Your own program, without an instruction."
 
 
 def _for_editor(program: str) -> str:
-    """A program as the editor takes it: with one kind of line break, and no half characters."""
+    """Convert a program for the editor, which supports neither CRLF nor lone surrogates."""
     return re.sub("\r\n?", "\n", program).encode(errors="replace").decode()
 
 
-def _skills(program: str) -> list[dict[str, Any]]:
-    calls = (found for found in CALL.finditer(program) if by_name(found[1]) is not None)
-    found = list(islice(calls, MOST_MARKS))
+def _skill_marks(program: str) -> list[dict[str, Any]]:
+    calls = (match for match in _CALL.finditer(program) if by_name(match[1]) is not None)
+    found = islice(calls, _MAX_MARKS)
     return [{"kind": "mark", "from": m.start(), "to": m.end(), "class": "skill"} for m in found]
 
 
-def _escapes(program: str) -> list[dict[str, Any]]:
-    """Characters that are invisible or change the direction of text, written out."""
-    odd = ((at, one) for at, one in enumerate(program) if not (one.isprintable() or one in "\t\n"))
+def _escape_marks(program: str) -> list[dict[str, Any]]:
+    """Marks that escape characters that are invisible or change the direction of text."""
+    hidden = ((at, one) for at, one in enumerate(program) if not (one.isprintable() or one in "\t\n"))
     marks: list[dict[str, Any]] = []
-    for at, one in islice(odd, MOST_ESCAPES):
+    for at, one in islice(hidden, _MAX_ESCAPES):
         marks.append({"kind": "widget", "position": at, "text": visible(one), "class": "escape"})
         marks.append({"kind": "mark", "from": at, "to": at + 1, "class": "escaped"})
     return marks
 
 
-def _at_work(view: SessionView) -> list[dict[str, Any]]:
-    """The line that calls the skill under way, or in which the program failed."""
+def _current_line(view: SessionView) -> list[dict[str, Any]]:
+    """A mark for the line that is running or has failed."""
     line = view.progress.line if view.is_running else view.line
     kind = "running-line" if view.is_running else "failed-line"
     is_there = line is not None and line <= view.program.count("\n") + 1
     return [{"kind": "line", "line": line, "class": kind}] if is_there else []
 
 
-def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
-    """Problems at their lines: the line is coloured, and the message follows it."""
+def _problem_marks(found: Check | None, program: str) -> list[dict[str, Any]]:
+    """Marks for lines with problems, and their messages."""
     if found is None:
         return []
     lines = program.split("\n")
     marks: list[dict[str, Any]] = []
-    for problem in found.problems[:MOST_PROBLEMS]:
+    for problem in found.problems[:_MAX_PROBLEMS]:
         if problem.line is None or problem.line > len(lines):
             continue
         end = sum(len(line) + 1 for line in lines[: problem.line]) - 1

@@ -1,4 +1,4 @@
-"""The question that waits on the robot's face, which an operator can answer too."""
+"""The question on the robot's face, which operators can answer, too."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.frame import Button, PlainText, warn
 
-MOST_OPTIONS, MOST_TEXT = 50, 200
+_MAX_OPTIONS, _MAX_OPTION_CHARACTERS = 50, 200
 
 
 class QuestionPane:
-    """Shows the question, and whether any face is open."""
+    """Shows the question, and the number of open faces."""
 
     def __init__(self, face: Face) -> None:
         self._face = face
@@ -23,7 +23,7 @@ class QuestionPane:
         self._box = ui.element("div").classes("asking").props('role=group aria-label="What the robot asks"')
 
     def show(self, *, is_over: bool) -> None:
-        """Show the face as it is now; without a mission at hand, nobody need open one."""
+        """Show the current question; during a mission, recommend to open the face."""
         screens = self._face.screens
         shown = f"The robot's face is open on {counted(screens, 'screen')}."
         nobody = "" if is_over else "Open the robot's face so people can see what it says and asks."
@@ -39,11 +39,13 @@ class QuestionPane:
                     self._draw(question)
 
     def _draw(self, question: FaceQuestion) -> None:
-        PlainText("p", f"Waiting for an answer from {shortened(question.person, MOST_TEXT)}:", "quiet")
+        PlainText(
+            "p", f"Waiting for an answer from {shortened(question.person, _MAX_OPTION_CHARACTERS)}:", "quiet"
+        )
         PlainText("p", shortened(question.text), "question")
         with ui.element("div").classes("word"):
-            for position, option in enumerate(question.options[:MOST_OPTIONS]):
-                words = shortened(option, MOST_TEXT).strip() or "(blank)"
+            for position, option in enumerate(question.options[:_MAX_OPTIONS]):
+                words = shortened(option, _MAX_OPTION_CHARACTERS).strip() or "(blank)"
                 Button(words, lambda at=position: self._answer(question, at), "plain")
 
     def _answer(self, question: FaceQuestion, position: int) -> None:

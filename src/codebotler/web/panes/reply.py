@@ -1,47 +1,41 @@
-"""The reply of a model, as text: while it arrives, and where it holds no program."""
+"""The text of a model's reply, while it arrives and if it contains no program."""
 
 from __future__ import annotations
 
 from nicegui import html
 
-from codebotler.generation.no_program import ProgramlessReply
 from codebotler.missions.view import SessionView
 from codebotler.web.frame import PlainText
 
-MOST_TEXT = 6_000
-"""Characters of a reply that are shown: the last ones while it arrives, and then the first."""
+_MAX_CHARACTERS = 6_000
+"""The limit for a reply: its end is shown while it arrives, its beginning afterwards."""
 
 
 class ReplyPane:
-    """Shows what a model says besides a program, and why there is no program."""
+    """Shows a model's text, and why there is no program."""
 
     def __init__(self) -> None:
         self._why = PlainText("p", "", "programless").props("role=alert")
-        self._text = _Folded("What the model says", is_open=True)
-        self._reasoning = _Folded("What the model thought before", is_open=False)
+        self._text = _Folded("The model's reply", is_open=True)
+        self._reasoning = _Folded("The model's reasoning", is_open=False)
 
     def show(self, view: SessionView) -> None:
         """Show a view."""
-        waits = (view.may_be_approved or view.waits_for_program) and not view.is_written
-        none = view.programless if waits else None
-        kept = " The program from before is kept." if view.program else ""
-        self._why.say("" if none is None else none.sentence + kept)
-        self._text.say(_end_of(view.arriving.text) if view.is_written else _text_of(none))
-        self._reasoning.say(_reasoning_of(none))
-
-
-def _text_of(none: ProgramlessReply | None) -> str:
-    """The text of a reply, unless the sentence about it has all of it."""
-    return "" if none is None or none.sentence.endswith(none.text.strip()) else _start_of(none.text)
-
-
-def _reasoning_of(none: ProgramlessReply | None) -> str:
-    """The thoughts before a reply, unless they are a part of its text."""
-    return "" if none is None or none.reasoning in none.text else _start_of(none.reasoning)
+        why = text = reasoning = ""
+        none = view.programless
+        if view.is_written:
+            text = view.arriving.text
+        elif none is not None and (view.may_be_approved or view.waits_for_program):
+            why = none.sentence + (" The previous program is kept." if view.program else "")
+            text = "" if none.sentence.endswith(none.text.strip()) else none.text  # else quoted twice
+            reasoning = "" if none.reasoning in none.text else none.reasoning
+        self._why.say(why)
+        self._text.say(text, is_arriving=view.is_written)
+        self._reasoning.say(reasoning)
 
 
 class _Folded:
-    """A text below a line that folds it."""
+    """A text that can be folded."""
 
     def __init__(self, title: str, *, is_open: bool) -> None:
         self._box = html.details().classes("reply").props("open" if is_open else "")
@@ -49,15 +43,9 @@ class _Folded:
             PlainText("summary", title)
             self._text = PlainText("div", "", "text").props("tabindex=0")
 
-    def say(self, text: str) -> None:
-        """Show a text; an empty one hides all."""
+    def say(self, text: str, *, is_arriving: bool = False) -> None:
+        """Show a text; an empty one hides the element."""
         self._box.set_visibility(bool(text.strip()))
+        if len(text) > _MAX_CHARACTERS:
+            text = f"… {text[-_MAX_CHARACTERS:]}" if is_arriving else f"{text[:_MAX_CHARACTERS]} …"
         self._text.say(text.strip())
-
-
-def _start_of(text: str) -> str:
-    return text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]} …"
-
-
-def _end_of(text: str) -> str:
-    return text if len(text) <= MOST_TEXT else f"… {text[-MOST_TEXT:]}"

@@ -1,4 +1,4 @@
-"""The status pane: what the robot does, where it is, what it said and heard."""
+"""The status pane: the robot's activity, position and conversation."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from nicegui import ui
 from codebotler.core.skills.declaration import verb_for
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Room, World, laid_out
-from codebotler.missions.log import State, Summary
-from codebotler.missions.progress import ANSWER, Moment, position
+from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.progress import ANSWER, Moment, position_on_map
 from codebotler.missions.view import Phase, SessionView
 from codebotler.missions.wording import reason_text
 from codebotler.web.console import Console
@@ -19,19 +19,19 @@ from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText, script
 from codebotler.web.panes.question import QuestionPane
 
-HEADLINES: Mapping[Phase, str] = {
+_PHASE_HEADLINES: Mapping[Phase, str] = {
     "": "No mission yet",
-    "writing": "The program is being written",
-    "checking": "The program is being checked",
-    "no-program": "There is no program yet",
-    State.CHECKED: "Ready: waiting for your approval",
-    State.APPROVED: "Starting",
+    "writing": "Writing the program",
+    "checking": "Checking the program",
+    "no-program": "No program yet",
+    MissionState.CHECKED: "Ready: waiting for your approval",
+    MissionState.APPROVED: "Starting",
 }
-MOST_MOMENTS = 60
+_MAX_LISTED_MOMENTS = 60
 
 
 class RobotPane:
-    """Shows how far the mission at hand has come."""
+    """Shows the progress of the current mission."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -42,7 +42,7 @@ class RobotPane:
             with ui.element("div").classes("head"):
                 PlainText("h2", "Status").props("id=h-status")
                 PlainText("span", console.robot.name, "robot-name")
-            self._gone = ui.element("div").classes("interrupted")
+            self._interrupted = ui.element("div").classes("interrupted")
             self._state = PlainText("p", "", "headline").props("role=status aria-live=polite")
             self._doing = PlainText("p", "", "doing")
             self._where = PlainText("p", "", "quiet")
@@ -50,12 +50,12 @@ class RobotPane:
             self._reason = PlainText("p", "", "reason")
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
-        self._told_interrupted: tuple[Summary, ...] = ()
-        self._gone.set_visibility(False)
+        self._shown_interrupted: tuple[MissionSummary, ...] = ()
+        self._interrupted.set_visibility(False)
 
     def show(self, view: SessionView) -> None:
         """Show a view."""
-        self._tell_interrupted(self._console.interrupted)
+        self._show_interrupted(self._console.interrupted)
         progress = view.progress
         self._state.say(_headline(view))
         self._state.classes(replace=f"headline {view.phase or 'none'}")
@@ -63,9 +63,8 @@ class RobotPane:
         self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
         where = [f"line {progress.line}"] if progress.line is not None else []
         where += [f"holding {shortened(progress.held, 60)}"] if progress.held else []
-        where += (
-            [f"{progress.clock:.1f} s on the robot's clock"] if progress.moments and progress.clock else []
-        )
+        if progress.moments and progress.clock:
+            where.append(f"{progress.clock:.1f} s on the robot's clock")
         self._where.say(" · ".join(where))
         self._reason.say(reason_text(view.reason, view.line))
         if self._asking is not None:
@@ -86,13 +85,13 @@ class RobotPane:
             self._map.set_content(floorplan(world, state))
 
     def _draw_moments(self, moments: tuple[Moment, ...]) -> None:
-        """Add new moments below, and follow them; redraw all for another mission."""
+        """Append new moments, and scroll to them; redraw all for another mission."""
         if moments == self._drawn:
             return
         known = len(self._drawn)
-        if moments[:known] != self._drawn or known > MOST_MOMENTS:
+        if moments[:known] != self._drawn or known > _MAX_LISTED_MOMENTS:
             self._log.clear()
-            known = max(0, len(moments) - MOST_MOMENTS)
+            known = max(0, len(moments) - _MAX_LISTED_MOMENTS)
         self._drawn = moments
         with self._log:
             for moment in moments[known:]:
@@ -104,26 +103,26 @@ class RobotPane:
                     PlainText("span", moment.text, "text")
         ui.run_javascript(f"moments.follow({self._log.id})")
 
-    def _tell_interrupted(self, summaries: tuple[Summary, ...]) -> None:
-        if summaries == self._told_interrupted:
+    def _show_interrupted(self, summaries: tuple[MissionSummary, ...]) -> None:
+        if summaries == self._shown_interrupted:
             return
-        self._told_interrupted = summaries
-        self._gone.clear()
-        self._gone.set_visibility(bool(summaries))
-        with self._gone:
+        self._shown_interrupted = summaries
+        self._interrupted.clear()
+        self._interrupted.set_visibility(bool(summaries))
+        with self._interrupted:
             for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
             Button("Dismiss", self._console.dismiss, "plain")
 
 
 def _headline(view: SessionView) -> str:
-    if view.phase == State.CHECKED and view.problems:
+    if view.phase == MissionState.CHECKED and view.problems:
         return "The program has problems" if view.can_run else "The program cannot run"
-    return HEADLINES.get(view.phase) or view.phase.capitalize()
+    return _PHASE_HEADLINES.get(view.phase) or view.phase.capitalize()
 
 
 def map_state(view: SessionView, world: World) -> MapState:
-    """What the map shows of a view; rooms in the program's words become those of the world."""
+    """Return the contents of the map for a view."""
     progress, rooms = view.progress, laid_out(world).rooms
 
     def room_of(words: str) -> str:
@@ -132,7 +131,7 @@ def map_state(view: SessionView, world: World) -> MapState:
     room, finds = room_of(progress.room), defaultdict[str, list[str]](list)
     for find in progress.finds:
         finds[room_of(find.room)].append(find.name)
-    at = position(progress, world, view.room_map)
+    at = position_on_map(progress, world, view.room_map)
     if progress.is_between and not progress.is_driving:
         room = room_at(rooms, at) if at else ""
     return MapState(at, room, progress.is_driving, progress.trail, dict(finds), progress.held)

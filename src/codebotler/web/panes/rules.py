@@ -1,4 +1,4 @@
-"""The house rules that count for a program, and how a person switches one off."""
+"""The house rules, which can be switched off for one program."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, warn
 
-MOST_RULES, MOST_TEXT, MOST_REASON = 100, 300, 500
+_MAX_RULES, _MAX_RULE_CHARACTERS, _MAX_SWITCH_OFF_REASON = 100, 300, 500
 
 
 class RulesPane:
-    """Lists the rules; nothing where there are none."""
+    """Lists the rules, if any."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -26,7 +26,7 @@ class RulesPane:
         self._box.set_visibility(bool(console.rules))
 
     def show(self, view: SessionView) -> None:
-        """Show which rules count in the mission at hand."""
+        """Show which rules are in force."""
         drawn = (view.disabled_rules, view.may_be_approved)
         if self._console.rules and drawn != self._drawn:
             self._drawn = drawn
@@ -37,10 +37,10 @@ class RulesPane:
     def _draw(self, view: SessionView) -> None:
         PlainText("h3", "House rules")
         with ui.element("ul"):
-            for rule in self._console.rules[:MOST_RULES]:
+            for rule in self._console.rules[:_MAX_RULES]:
                 is_off = rule.name in view.disabled_rules
                 with ui.element("li").classes("off" if is_off else ""):
-                    PlainText("span", shortened(rule.says, MOST_TEXT))
+                    PlainText("span", shortened(rule.says, _MAX_RULE_CHARACTERS))
                     if is_off:
                         PlainText("small", "switched off for this program", "quiet")
                     elif view.may_be_approved:
@@ -48,11 +48,14 @@ class RulesPane:
                         off.props(f'aria-label="Switch off the rule {rule.name} for this program"')
 
     def _ask_why(self, rule: Rule) -> None:
-        """Have the person say why the rule does not count for the program that waits."""
         with ui.dialog() as dialog, ui.card().classes("pane"):
-            PlainText("h3", f'Switch off "{shortened(rule.says, MOST_TEXT)}" for this program?')
-            PlainText("p", "The robot may break it while this program runs. The reason is logged.", "quiet")
-            reason = ui.input("Why?").props(f"outlined autofocus maxlength={MOST_REASON}").classes("why")
+            PlainText("h3", f'Switch off "{shortened(rule.says, _MAX_RULE_CHARACTERS)}" for this program?')
+            PlainText("p", "The robot may break it while this program runs. Your reason is logged.", "quiet")
+            reason = (
+                ui.input("Reason")
+                .props(f"outlined autofocus maxlength={_MAX_SWITCH_OFF_REASON}")
+                .classes("why")
+            )
 
             async def switch_off() -> None:
                 session = self._console.session

@@ -1,18 +1,18 @@
-// The program in the editor: sends what is typed, shows what the tool has, and lets neither undo the other.
+// The editor: sends typed text to the server and shows the server's program, without either overwriting the other.
 globalThis.programEditor = (() => {
-  const PAUSE = 300; // milliseconds without a key, after which what was typed is sent
-  const MOST = 200_000; // characters; the tool takes no more, and tells so
+  const PAUSE = 300; // ms without a key press before typed text is sent
+  const MOST = 200_000; // characters that the server accepts
   const PLACEHOLDER = `Or type a program, such as
 
 def task_program():
     for room in get_all_rooms():
         go_to(room)
         say("Hello")`;
-  let editor; // NiceGUI's component, once it is there
-  let latest; // what the tool said last
-  let sent = 0; // how many texts were sent
-  let waiting; // the timer of one that will be
-  let base = ""; // the program that was changed here: what the tool has, unless somebody else changed it too
+  let editor; // NiceGUI's component, once it is loaded
+  let latest; // the latest state from the server
+  let sent = 0; // the number of texts sent
+  let waiting; // the timer for the next one
+  let base = ""; // the server's program on which local edits are based
 
   const text = () => editor.editor.state.doc.toString();
 
@@ -33,8 +33,8 @@ def task_program():
 
   const apply = () => {
     editor.setDisabled(!latest.editable);
-    const isOlder = waiting !== undefined || latest.heard < sent;
-    if (isOlder && !latest.anyway) return; // the tool answers each text, and that answer is newer
+    const isOlder = waiting !== undefined || latest.received < sent;
+    if (isOlder && !latest.force) return; // the server's answer to the newest text is still to come
     clearTimeout(waiting);
     waiting = undefined;
     base = latest.program;
@@ -42,7 +42,7 @@ def task_program():
     editor.setDecorations(latest.marks);
   };
 
-  /** Only what differs, so that cursors stay; and undoing is for what was typed here. */
+  /** Replace only the part that differs, to keep cursors; local undo does not cover it. */
   const put = (program) => {
     const [view, old] = [editor.editor, text()];
     if (old === program) return;
@@ -56,14 +56,14 @@ def task_program():
     editor.emitting = true;
   };
 
-  /** What is shown, and how many texts were sent; what was just typed goes at once. */
+  /** Send pending text at once; return the shown text and the number of texts sent. */
   const settle = () => {
     if (waiting !== undefined) send();
     return { text: text(), number: sent };
   };
 
-  const show = (what) => {
-    latest = what;
+  const show = (state) => {
+    latest = state;
     if (editor) apply();
   };
 
@@ -71,10 +71,10 @@ def task_program():
     while (!getElement(id)?.editor || !latest) await new Promise((later) => setTimeout(later, 20));
     editor = getElement(id);
     const dark = matchMedia("(prefers-color-scheme: dark)");
-    const colour = () => editor.setTheme(dark.matches ? "vscodeDark" : "vscodeLight");
-    dark.addEventListener("change", colour);
-    colour();
-    // What people need who see no screen, or use no mouse, and CodeMirror does not offer.
+    const setTheme = () => editor.setTheme(dark.matches ? "vscodeDark" : "vscodeLight");
+    dark.addEventListener("change", setTheme);
+    setTheme();
+    // Accessibility that CodeMirror lacks: a label for screen readers and scrolling by keyboard.
     editor.$el.querySelector(".cm-content").setAttribute("aria-label", "Program");
     editor.$el.querySelector(".cm-content").setAttribute("aria-placeholder", PLACEHOLDER);
     editor.$el.querySelector(".cm-scroller").setAttribute("tabindex", "0");

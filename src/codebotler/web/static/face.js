@@ -1,18 +1,18 @@
-// The robot's face: shows what /api/face/live tells, and sends back what people choose. Texts are only ever texts.
+// The robot's face: shows the data of /api/face/live and sends answers. Texts are never interpreted as markup.
 import { Speaker } from "./speaker.js";
 import { Listener } from "./listener.js";
 
 const $ = (id) => document.getElementById(id);
 const WELCOME = "Hello. I have nothing to do right now.";
 const LOST = "The robot cannot be reached. Trying again …";
-const API = new URL("../api/face/", import.meta.url); // also behind a proxy, where addresses have a prefix
-const SETTLE = 400; // ms in which a new question takes no touch, which may have been meant for the one before
-const AGAIN = 1000; // ms
+const API = new URL("../api/face/", import.meta.url); // relative, because a proxy may add a prefix
+const SETTLE = 400; // ms during which a new question ignores touches meant for the previous one
+const AGAIN = 1000; // ms before reconnecting
 
-let now = null; // as told last
-let late = 0; // when the question's time is over
-let seen = 0; // the number of what was said or asked last
-let proposed = null; // what was heard, before anybody has confirmed it
+let now = null; // the latest data
+let late = 0; // when the question expires
+let seen = 0; // the number of the latest statement or question
+let proposed = null; // an answer by voice that is not confirmed yet
 
 const speaker = new Speaker((is) => {
   document.body.classList.toggle("speaks", is);
@@ -35,30 +35,30 @@ const sized = (element, text) => {
 const ENDS = { done: "I have finished.", stopped: "I was stopped.", failed: "Something went wrong, and I gave up." };
 const doingWords = ({ doing, to, state, reason }) => {
   const rests = reason || ENDS[state] || WELCOME;
-  return { idle: rests, moving: to ? `On my way: ${to}` : "On my way", working: "Working …", asking: "" }[doing];
+  return { idle: rests, moving: to ? `On my way to ${to}` : "On my way", working: "Working …", asking: "" }[doing];
 };
 
-function show(told) {
+function show(data) {
   const before = now;
-  now = told;
-  document.body.dataset.doing = told.doing;
-  document.body.dataset.ended = (told.is_over && told.state) || "";
-  put("doing", doingWords(told));
-  showSaid(told.said);
-  if (told.question?.number !== before?.question?.number) ask(told.question);
-  late = performance.now() + 1000 * (told.seconds_left ?? Infinity);
-  put("ended", ending(told));
-  const isNew = before !== null; // what was said before this page was opened is not said again
-  for (const { number, text } of told.said) {
+  now = data;
+  document.body.dataset.doing = data.doing;
+  document.body.dataset.ended = (data.is_over && data.state) || "";
+  put("doing", doingWords(data));
+  showSaid(data.said);
+  if (data.question?.number !== before?.question?.number) ask(data.question);
+  late = performance.now() + 1000 * (data.seconds_left ?? Infinity);
+  put("ended", ending(data));
+  const isNew = before !== null; // do not repeat what was said before this page was opened
+  for (const { number, text } of data.said) {
     if (number > seen && isNew) speaker.say(text);
     seen = Math.max(seen, number);
   }
-  if (told.question && told.question.number > seen) {
-    seen = told.question.number;
-    speaker.say(`${told.question.text} ${told.question.options.join(", ")}`);
+  if (data.question && data.question.number > seen) {
+    seen = data.question.number;
+    speaker.say(`${data.question.text} ${data.question.options.join(", ")}`);
   }
-  if (before?.question && !told.question) speaker.hush();
-  if (before && !before.is_over && told.is_over && told.state === "stopped") speaker.hush();
+  if (before?.question && !data.question) speaker.hush();
+  if (before && !before.is_over && data.is_over && data.state === "stopped") speaker.hush();
 }
 
 function showSaid(said) {
@@ -106,17 +106,17 @@ function option(question, text, position) {
 
 async function answer(question, position) {
   for (const button of $("options").children) button.disabled = true;
-  let told = "";
+  let error = "";
   try {
     const body = JSON.stringify({ question: question.number, option: position });
     const headers = { "Content-Type": "application/json" };
     const reply = await fetch(new URL("answer", API), { method: "POST", headers, body });
-    if (!reply.ok) told = `The answer was not accepted: ${(await reply.json()).detail}`;
+    if (!reply.ok) error = `The answer was not accepted: ${(await reply.json()).detail}`;
   } catch {
-    told = LOST;
+    error = LOST;
   }
-  if (told) {
-    put("ended", told);
+  if (error) {
+    put("ended", error);
     for (const button of $("options").children) button.disabled = false;
   }
 }
@@ -141,15 +141,15 @@ function heard(text, position) {
   propose({ question: now.question, text, position });
 }
 
-function propose(what) {
-  proposed = what?.position === undefined || what.position < 0 ? null : what;
-  $("heard").hidden = what === null;
+function propose(answer) {
+  proposed = answer?.position === undefined || answer.position < 0 ? null : answer;
+  $("heard").hidden = answer === null;
   $("take").hidden = $("leave").hidden = proposed === null;
-  if (what === null) return;
-  const option = proposed && what.question.options[what.position];
+  if (answer === null) return;
+  const option = proposed && answer.question.options[answer.position];
   $("heard-text").textContent = proposed
-    ? `I heard “${what.text}”. Is your answer “${option}”?`
-    : `I heard “${what.text}”, which is none of the answers. Please say one of them.`;
+    ? `I heard “${answer.text}”. Is your answer “${option}”?`
+    : `I heard “${answer.text}”, which is not one of the answers. Please try again.`;
   if (proposed) $("take").focus();
 }
 
@@ -209,7 +209,7 @@ function connect() {
     document.body.dataset.ended = "";
     put("doing", LOST);
     ask(null);
-    now = null; // another tool may answer, which counts from 1 again
+    now = null; // a restarted server counts from 1 again
     seen = 0;
     setTimeout(connect, AGAIN);
   });

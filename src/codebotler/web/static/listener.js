@@ -1,13 +1,13 @@
-// Hears an answer with the browser's own speech recognition. The options are the vocabulary; nothing is taken here.
+// Recognizes one of the options by the browser's speech recognition; people confirm it elsewhere.
 const Recognition = window.SpeechRecognition ?? window.webkitSpeechRecognition;
-const TROUBLES = {
-  "not-allowed": "The browser does not let this page listen. Please choose by touch.",
-  "service-not-allowed": "The browser does not let this page listen. Please choose by touch.",
-  "audio-capture": "There is no microphone. Please choose by touch.",
-  network: "The browser cannot understand speech just now. Please choose by touch.",
+const ERRORS = {
+  "not-allowed": "The browser blocks the microphone. Please tap an answer.",
+  "service-not-allowed": "The browser blocks speech recognition. Please tap an answer.",
+  "audio-capture": "There is no microphone. Please tap an answer.",
+  network: "Speech recognition is not available right now. Please tap an answer.",
 };
 
-/** Letters and digits, in one form, with single spaces. */
+/** Normalize to lower-case letters and digits, separated by single spaces. */
 const plain = (text) =>
   text
     .normalize("NFKD")
@@ -16,7 +16,7 @@ const plain = (text) =>
     .replace(/[^\p{L}\p{N}]+/gu, " ")
     .trim();
 
-/** The position of the only option that was said; -1 where none or several were. */
+/** The position of the only matching option; -1 if none or several match. */
 export function match(heard, options) {
   const words = options.map(plain);
   for (const one of heard.map(plain)) {
@@ -35,8 +35,8 @@ export class Listener {
   static exists = Boolean(Recognition);
 
   /**
-   * @param heard told what was heard, and the position of the option that was meant, or -1
-   * @param failed told in a sentence why nothing can be heard
+   * @param heard called with the recognized text and the position of its option, or -1
+   * @param failed called with a sentence if recognition is impossible
    */
   constructor(heard, failed) {
     this.heard = heard;
@@ -54,12 +54,12 @@ export class Listener {
     now.interimResults = false;
     now.addEventListener("result", ({ results }) => this.#take(results[results.length - 1]));
     now.addEventListener("error", ({ error }) => {
-      if (!(error in TROUBLES)) return;
+      if (!(error in ERRORS)) return;
       this.stop();
-      this.failed(TROUBLES[error]);
+      this.failed(ERRORS[error]);
     });
     now.addEventListener("end", () => {
-      if (this.now !== now) return; // it was stopped
+      if (this.now !== now) return; // stopped
       this.now = null;
       setTimeout(() => this.now === null && this.isWanted && this.start(this.options), 250);
     });

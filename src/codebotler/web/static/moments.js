@@ -1,7 +1,7 @@
-// What happened, the newest last: the list follows it, unless somebody has scrolled up to read.
+// The activity list: scrolls to new entries, unless somebody has scrolled up to read.
 globalThis.moments = (() => {
-  const NEAR = 60; // pixels from the end that still count as being there
-  let shown = 0; // the height of the list before
+  const NEAR = 60; // pixels from the end that still count as the end
+  let shown = 0; // the previous height of the list
 
   const follow = (id) => {
     const list = getElement(id)?.$el ?? document.querySelector(".moments");

@@ -1,19 +1,19 @@
-// Says texts aloud with the browser's own speech synthesis, unless somebody has muted it; that is remembered.
+// Speaks texts by the browser's speech synthesis; remembers whether it is muted.
 const KEY = "codebotler-muted";
-const LONGEST = 600; // letters of one text; nobody listens to more
+const LONGEST = 600; // characters of one text
 
 export class Speaker {
   exists = "speechSynthesis" in window && "SpeechSynthesisUtterance" in window;
   isMuted = localStorage.getItem(KEY) === "yes";
   isSpeaking = false;
 
-  /** @param changed told whether it speaks */
+  /** @param changed called with whether it speaks */
   constructor(changed) {
     this.changed = changed;
     this.waiting = 0;
   }
 
-  /** Whether the browser says nothing before somebody has touched the page. */
+  /** Whether the browser stays silent until somebody touches the page. */
   get waitsForTouch() {
     return this.exists && !this.isMuted && navigator.userActivation?.hasBeenActive === false;
   }

@@ -1,9 +1,9 @@
-// STOP: needs nothing of the rest of the page, and works before that is there.
+// STOP: works without the rest of the page, even before it is loaded.
 (() => {
   const button = document.getElementById("stop");
-  const told = document.getElementById("stop-told");
+  const output = document.getElementById("stop-told");
   const { dataset, src } = document.currentScript;
-  const root = new URL("..", src); // also behind a proxy, where addresses have a prefix
+  const root = new URL("..", src); // relative, because a proxy may add a prefix
   const [stopAt, robotAt] = [new URL(dataset.stop ?? "api/stop", root), new URL(dataset.robot ?? "api/robot", root)];
   const LOST = "CodeBotler is not responding. Use the robot's emergency stop.";
   const REFUSED = "CodeBotler refused to stop. Use the robot's emergency stop.";
@@ -17,13 +17,12 @@
   const SHOWN = 8000; // ms
   class Refused extends Error {}
   let pressed = 0;
+  let showsOutcome = false; // whether the text is about a mission that is over
 
-  let tellsEnd = false; // whether the text is about a mission that is over
-
-  const say = (text, kind = "", isEnd = false) => {
-    told.textContent = text;
-    tellsEnd = isEnd;
-    told.className = kind;
+  const say = (text, kind = "", isOutcome = false) => {
+    output.textContent = text;
+    showsOutcome = isOutcome;
+    output.className = kind;
   };
 
   const ask = async (wait) => (await fetch(`${robotAt}?${wait}=true`)).json();
@@ -44,7 +43,7 @@
 
   const stop = async (onlyMoving) => {
     const which = ++pressed;
-    if (!onlyMoving) say("Telling the robot to stop …", "busy");
+    if (!onlyMoving) say("Sending the stop …", "busy");
     try {
       const answer = await fetch(`${stopAt}?only_moving=${onlyMoving}`, { method: "POST" });
       const { stopping, detail } = await answer.json();
@@ -58,19 +57,19 @@
     } catch (error) {
       say(error instanceof Refused ? `${REFUSED} (${error.message})` : LOST, "bad");
     }
-    setTimeout(() => which === pressed && !told.classList.contains("bad") && say(""), SHOWN);
+    setTimeout(() => which === pressed && !output.classList.contains("bad") && say(""), SHOWN);
     await clearOnceBegun(which);
   };
 
-  /** How a mission ended is out of date when the next one begins. */
+  /** Clear the outcome of a mission when the next one begins. */
   const clearOnceBegun = async (which) => {
     try {
-      while (which === pressed && tellsEnd) {
+      while (which === pressed && showsOutcome) {
         const now = await ask("once_begun");
-        if (which === pressed && tellsEnd && !now.is_over) say("");
+        if (which === pressed && showsOutcome && !now.is_over) say("");
       }
     } catch {
-      // Without a connection, no mission can begin; the text stays true.
+      // Without a connection, no mission can begin, so the text stays true.
     }
   };
 

@@ -11,17 +11,23 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.compare import ComparedRun, Comparison, p_text, sample_size_sentences, verdict
-from roboeval.analysis.statistics import FEW
+from roboeval.analysis.compare import (
+    ComparedRun,
+    Comparison,
+    comparison_sentence,
+    p_text,
+    sample_size_sentences,
+)
+from roboeval.analysis.failure_groups import FailureGroup
+from roboeval.analysis.statistics import MIN_CLUSTERS
 from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences
-from roboeval.cli.views.groups import cluster_view
+from roboeval.cli.views.groups import failure_group_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.failures import plural_of, shown_classes
+from roboeval.evaluation.failures import classes_to_show, plural_of
 
 
 def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun]) -> RenderableType:
-    """A comparison as text and tables."""
+    """Show a comparison of two runs."""
     names = runs[0].name, runs[1].name
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
@@ -29,13 +35,13 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
     rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
-    few = "too narrow for so few tasks" * (1 < len(comparison.tasks) < FEW)
-    for name, estimate, told in (
+    few = "too narrow for so few tasks" * (1 < len(comparison.tasks) < MIN_CLUSTERS)
+    for name, estimate, remark in (
         ("over tasks", comparison.over_tasks, p_text(comparison.p_tasks)),
         ("over prompts", comparison.over_prompts, p_text(comparison.p_prompts)),
         ("over tasks, by resampling (bootstrap)", comparison.bootstrap, few),
     ):
-        rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), told)
+        rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), remark)
     table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
         cells = (
@@ -45,7 +51,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
             f"{round(task.share, 9):+.3f}",
         )
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
-    sentence = Text(verdict(comparison, (a, b)), "bold")
+    sentence = Text(comparison_sentence(comparison, (a, b)), "bold")
     warnings = [
         Text(f"{visible(run.name)}: {warning}", "yellow")
         for run in runs
@@ -56,15 +62,14 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
 
 
 def _ends(runs: tuple[ComparedRun, ComparedRun]) -> Table:
-    """How the completions of both runs fail, by class."""
     table = ruled("share that fails", *(visible(run.name) for run in runs))
-    for name in shown_classes([name for run in runs for name, share in run.classes.items() if share]):
+    for name in classes_to_show([name for run in runs for name, share in run.classes.items() if share]):
         table.add_row(plural_of(name), *(f"{run.classes.get(name, 0.0):.1%}" for run in runs))
     return table
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
-    """What a second suite changes, with at most `most` groups of programs for each run and direction."""
+    """Show what a second suite changes, with at most `most` groups for each run and direction."""
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences(found)]
     parts += [Text(), _scores(found)]
     for one in found:
@@ -99,10 +104,10 @@ def _tasks(one: VerdictChanges) -> Table:
     return table
 
 
-def _groups(every: Sequence[Cluster], most: int, what: str) -> list[RenderableType]:
+def _groups(every: Sequence[FailureGroup], most: int, what: str) -> list[RenderableType]:
     if not every:
         return []
     head = f"pass under {what}, in {len(every):,} group{'s' * (len(every) != 1)}:"
     left = len(every) - most
     more = [Text(f"{left:,} more groups; --groups shows more of them", "dim")] if left > 0 else []
-    return [Text(), Text(head, "bold"), Text(), *map(cluster_view, every[:most]), *more]
+    return [Text(), Text(head, "bold"), Text(), *map(failure_group_view, every[:most]), *more]

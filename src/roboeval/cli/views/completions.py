@@ -1,4 +1,4 @@
-"""Views of a prompt's programs, each with the reason why it fails, and of one program with all it did."""
+"""Views of a prompt's programs, with reasons why they fail, and of one completion."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.core.words import counted
 from roboeval.evaluation.explanation import (
-    GONE,
-    LOWERED,
+    LOWERCASED_NOTE,
+    PROGRAM_GONE,
     cut_sentence,
     error_sentence,
     failing_first,
+    first_lines,
     instruction_shown,
-    shown_lines,
 )
 from roboeval.evaluation.failures import label_of, no_program_sentence
-from roboeval.evaluation.runs.completions import by_hand, name_of
+from roboeval.evaluation.runs.completions import name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, world_title
 
-EXPLANATION = 2_000
+MAX_EXPLANATION = 2_000  # characters
 ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
 SHOW_REPLY = "--reply shows them."
-MOST_REPLY = 100_000  # characters of a text of a reply
+SHOWN_REPLY_CHARACTERS = 100_000  # characters of a text of a reply
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
-    """A prompt, program by program; the data is that of `prompt_data`."""
+    """Show the programs of a prompt, given `prompt_data`."""
     table = grid("right", "left")
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _program_line(program))
     lines = prompt_lines(data["task"], data)
-    lines[0].append(by_hand(data["models"]))
+    lines[0].append(recorded_suffix(data["models"]))
     return Group(*lines, Text(), table)
 
 
@@ -48,7 +48,7 @@ def _program_line(program: Mapping[str, Any]) -> Text:
     same = len(program["indices"])
     often = Text(f"x{same:,}  " if same > 1 else "")
     if program["gone"]:
-        often.append(f"{GONE}\n", "yellow")
+        often.append(f"{PROGRAM_GONE}\n", "yellow")
     if program["passed"]:
         return often.append("passed", "green")
     text = Text.assemble(often, kind_view(program["failure"]))
@@ -59,19 +59,16 @@ def _program_line(program: Mapping[str, Any]) -> Text:
         why = shortened(error_sentence(program))
     else:
         label = visible(check_label(program["failure"]["check"]))
-        why = f"{label}: {shortened(program['explanation'], EXPLANATION)}"
+        why = f"{label}: {shortened(program['explanation'], MAX_EXPLANATION)}"
     return text.append(f"\n{why}" if why else "")
 
 
 def completion_view(
     data: Mapping[str, Any], *, in_full: bool = False, with_reply: bool = False
 ) -> RenderableType:
-    """One completion, as `completion_data` says: its program, and what the robot did in each world.
+    """Show a completion, given `completion_data`: its program, and what the robot did in each world.
 
-    Args:
-        data: the completion.
-        in_full: whether satisfied worlds are more than a line each.
-        with_reply: whether to show the reasoning and the reply as they came.
+    `in_full` also shows satisfied worlds in full, `with_reply` the unchanged reasoning and reply.
     """
     failure = data["failure"]
     why_none = None if failure is None else no_program_sentence(failure)
@@ -84,7 +81,7 @@ def completion_view(
         return Group(*parts, Text(), Text(why_none, "red"))
     worlds = data["worlds"]
     if data["lowered"]:
-        parts += [Text(), Text(LOWERED, "dim")]
+        parts += [Text(), Text(LOWERCASED_NOTE, "dim")]
     satisfied = []
     for number, world in failing_first(worlds):
         title = Text(world_title(number, f" of {len(worlds)}", visible(world["world"])), "bold")
@@ -102,9 +99,9 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     why = data["failure"]
     head.append_text(Text("passed", "green") if why is None else kind_view(why))
     if data["model"] is not None:
-        head.append(f"\nwritten by {visible(data['model'])}{by_hand([data['model']])}", "dim")
+        head.append(f"\nwritten by {visible(data['model'])}{recorded_suffix([data['model']])}", "dim")
     if data["program"] is None:
-        return head.append(f"\n{GONE}", "yellow")
+        return head.append(f"\n{PROGRAM_GONE}", "yellow")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
     if origin is not None:
         head.append(f"\n{origin}", "dim")
@@ -112,7 +109,6 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
 
 
 def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[RenderableType]:
-    """How a reply ended, and its texts or how long they are."""
     if reply is None:
         return []
     parts: list[RenderableType] = [Text()]
@@ -122,7 +118,11 @@ def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[Rendera
     there = {name: text for name, text in texts.items() if text}
     if with_texts:
         for name, text in there.items():
-            parts += [Text(), Text(f"{name}:", "bold"), Text(shortened(text, MOST_REPLY, visible_lines))]
+            parts += [
+                Text(),
+                Text(f"{name}:", "bold"),
+                Text(shortened(text, SHOWN_REPLY_CHARACTERS, visible_lines)),
+            ]
     elif there:
         long = " and ".join(f"{name} ({len(text):,} characters)" for name, text in there.items())
         parts.append(Text(f"{long}: {SHOW_REPLY}", "dim"))
@@ -130,7 +130,7 @@ def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[Rendera
 
 
 def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
-    source, left = shown_lines(program)
+    source, left = first_lines(program)
     syntax = Syntax(
         source,
         "python",
@@ -154,15 +154,14 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
         text = Text.assemble(
             ("failed ", "red"),
             visible(check_label(check["check"])),
-            f": {shortened(check['explanation'], EXPLANATION)}",
+            f": {shortened(check['explanation'], MAX_EXPLANATION)}",
         )
         parts.append(Padding(text, (0, 0, 0, 2)))
-    parts += [Padding(Text(shortened(one, EXPLANATION)), (0, 0, 0, 2)) for one in world["remarks"]]
+    parts += [Padding(Text(shortened(one, MAX_EXPLANATION)), (0, 0, 0, 2)) for one in world["remarks"]]
     return parts
 
 
 def _satisfied(world: Mapping[str, Any], title: Text) -> Text:
-    """A world that is satisfied, in one line."""
     ending = f", {world['status']} (allowed here)" if world["error"] else ""
     steps = len(world["steps"]) + world.get("cut", {}).get("events", 0)
     return Text.assemble(title, "  ", ("satisfied", "green"), f"{ending}, {counted(steps, 'step')}")
@@ -174,12 +173,12 @@ def _ending(world: Mapping[str, Any]) -> Text:
     if world["error"] is None:
         return text
     allowed = " (allowed here)" if world["satisfied"] else ""
-    told = ", ".join(filter(None, [visible(world["error"]["kind"]), shortened(error_sentence(world))]))
-    return text.append(f"{allowed}: {told}")
+    error = ", ".join(filter(None, [visible(world["error"]["kind"]), shortened(error_sentence(world))]))
+    return text.append(f"{allowed}: {error}")
 
 
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
-    """The head of a prompt: its score, and its instruction."""
+    """Show the score and the instruction of a prompt."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
     if (prompt["requested"] or 0) > prompt["completions"]:
         score += f"; {prompt['requested']:,} were requested"
@@ -195,5 +194,5 @@ def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
 
 
 def kind_view(failure: Mapping[str, Any]) -> Text:
-    """A failure's class and kind."""
+    """Show the class and the kind of a failure."""
     return Text.assemble((f"{visible(label_of(failure['class']))}: {visible(failure['kind'])}", "red"))

@@ -12,29 +12,29 @@ from rich.text import Text
 
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
-from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resample
 from roboeval.analysis.search import TraceMatch
 from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.explanation import GONE
+from roboeval.evaluation.explanation import PROGRAM_GONE
 from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label
 
-MOST_LINES = 60  # of a difference between programs
+MAX_DIFF_LINES = 60  # of a difference between programs
 
 
 def found_view(
     found: Sequence[TraceMatch],
     counts: pl.DataFrame,
     total: int,
-    told: Sequence[Cluster],
+    told: Sequence[FailureGroup],
     *,
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Some groups of failures; if something was looked for, below the completions found, task by task."""
+    """Show groups of failures, after a search below the completions found in each task."""
     failed = len(found) - int(counts["passed"].sum())
     parts: list[RenderableType] = []
     if is_search:
@@ -45,7 +45,7 @@ def found_view(
         grouped = f", in {counted(groups, 'group')}" * (groups > 0)
         parts.append(Text(f"{how_many(failed)} of {of} failed{grouped}{':' * bool(told)}", "bold"))
     if told:
-        parts += [Text(), *map(cluster_view, told)]
+        parts += [Text(), *map(failure_group_view, told)]
         if groups > len(told):
             parts.append(Text(f"{groups - len(told):,} more groups; --groups shows more of them", "dim"))
     return Group(*parts)
@@ -61,24 +61,24 @@ def _by_task(found: Sequence[TraceMatch], counts: pl.DataFrame) -> Table:
     return table
 
 
-def cluster_view(cluster: Cluster) -> RenderableType:
+def failure_group_view(group: FailureGroup) -> RenderableType:
     """A group of failures: their number, the reason, and the nearest program that passes."""
-    size = how_many(len(cluster.members))
-    name = visible(name_of(cluster.representative))
-    head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
-    world = "" if cluster.has_no_program else f', in "{visible(str(cluster.reason["world"]))}"'
+    size = how_many(len(group.members))
+    name = visible(name_of(group.representative))
+    head = Text.assemble((size, "bold"), f" of {visible(group.task)}, ", kind_view(group.failure))
+    world = "" if group.has_no_program else f', in "{visible(str(group.reason["world"]))}"'
     lines = [Text(f"such as {name}{world}", "dim")]
-    check = cluster.failure["check"]
-    lines.append(Text(shortened(f"{check_label(check)}: {cluster.why}" if check else cluster.why)))
-    if cluster.program is None:
-        lines.append(Text(GONE, "yellow"))
-    if (fix := cluster.fix) is not None:
+    check = group.failure["check"]
+    lines.append(Text(shortened(f"{check_label(check)}: {group.why}" if check else group.why)))
+    if group.program is None:
+        lines.append(Text(PROGRAM_GONE, "yellow"))
+    if (fix := group.fix) is not None:
         changed = f"{fix.changed} line{'s' * (fix.changed != 1)}"
         lines.append(Text(f"{visible(fix.name)} passes, and differs in {changed}:", "dim"))
-        for sign, line in fix.changes[:MOST_LINES]:
+        for sign, line in fix.changes[:MAX_DIFF_LINES]:
             style = {"-": "red", "+": "green"}.get(sign, "dim")
             lines.append(Text(f"{sign} {shortened(line.expandtabs(4))}", style))
-        if (left := len(fix.changes) - MOST_LINES) > 0:
+        if (left := len(fix.changes) - MAX_DIFF_LINES) > 0:
             lines.append(Text(f"... {left} more lines", "dim"))
     return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
 
@@ -86,7 +86,7 @@ def cluster_view(cluster: Cluster) -> RenderableType:
 def resample_view(
     prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str, coverage: Coverage
 ) -> RenderableType:
-    """The results of asking again, by limit of retries."""
+    """Show the results of rejection sampling, by limit of retries."""
     reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
     table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
     for limit in (resample(prompts, retries) for retries in limits):

@@ -18,17 +18,17 @@ from codebotler.core.words import counted
 from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import EvaluationSummary, Failures, Missing
 from roboeval.cli.views.completions import kind_view, prompt_lines
-from roboeval.evaluation.failures import plural_of, shown_classes
-from roboeval.evaluation.runs.completions import by_hand, how_many
+from roboeval.evaluation.failures import classes_to_show, plural_of
+from roboeval.evaluation.runs.completions import how_many, recorded_suffix
 
 if TYPE_CHECKING:
     from roboeval.analysis.broken_rules import BrokenRules
 
-FEW = 3  # tasks that are named; of more, their number is told
+MAX_TASKS_NAMED = 3  # with more tasks, show their number
 
 
 def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
-    """A table with a line below its heads; all columns but perhaps the first are numbers."""
+    """Create a table with a line below its heads; all columns but the first are right-aligned."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for number, head in enumerate(heads):
         table.add_column(Text(head), justify="right" if number else first, overflow="fold")
@@ -36,8 +36,8 @@ def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
 
 
 def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
-    """The tables of an evaluation."""
-    head = Text(visible(title) + by_hand(summary.scope.models), style="bold")
+    """Show the tables of an evaluation."""
+    head = Text(visible(title) + recorded_suffix(summary.scope.models), style="bold")
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
     n, failed = judged_count(summary.prompts), sum(each.count for each in summary.failures)
@@ -46,17 +46,17 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     if (warning := summary.cut_off.warning) is not None:
         parts.append(Text(warning, style="yellow"))
     if failed:
-        told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all judged:"
+        sentence = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all judged:"
         happened = [one.name for one in summary.failures if one.count]
-        shown = happened if n == 1 else {*happened, *shown_classes(happened)}
+        shown = happened if n == 1 else {*happened, *classes_to_show(happened)}
         listed = [_failure_table(one) for one in summary.failures if one.name in shown]
         tables = Columns(listed, padding=(1, 3))
-        parts += [Text(), Text(told), Text(), tables]
+        parts += [Text(), Text(sentence), Text(), tables]
     return Group(*parts)
 
 
 def house_view(found: BrokenRules) -> RenderableType:
-    """How often rules were broken, by which programs, and what that cost."""
+    """Show how often rules were broken, and the effect on pass@1."""
     table = grid("right", "left")
     for rule, count in found.by_rule.items():
         table.add_row(f"{count:,}", Text(visible(rule)))
@@ -78,13 +78,17 @@ def _missed(missing: Missing) -> Iterator[Text]:
         ("not selected:", missing.not_selected),
     ]:
         if tasks:
-            named = ", ".join(map(visible, tasks)) if len(tasks) <= FEW else counted(len(tasks), "task")
+            named = (
+                ", ".join(map(visible, tasks))
+                if len(tasks) <= MAX_TASKS_NAMED
+                else counted(len(tasks), "task")
+            )
             yield Text(f"{reason} {named}", style="dim")
 
 
 @dataclass(frozen=True)
 class _TaskTable:
-    """The scores of tasks, with fewer columns where names of tasks would be broken otherwise."""
+    """The scores of tasks, with fewer columns if the names of tasks would not fit otherwise."""
 
     summary: EvaluationSummary
 
@@ -138,10 +142,10 @@ def _failure_table(failures: Failures) -> Table:
 
 
 def task_view(data: Mapping[str, Any]) -> RenderableType:
-    """A task, prompt by prompt; the data is that of `task_data`."""
+    """Show a task by prompts, given `task_data`."""
     task = data["task"]
     models = {model for prompt in data["prompts"] for model in prompt["models"]}
-    parts: list[RenderableType] = [Text(visible(task) + by_hand(models), style="bold")]
+    parts: list[RenderableType] = [Text(visible(task) + recorded_suffix(models), style="bold")]
     if data["summary"]:
         parts.append(Text(visible(data["summary"])))
     for prompt in data["prompts"]:

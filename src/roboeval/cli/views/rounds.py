@@ -1,4 +1,4 @@
-"""A table of the rounds of a run: what requesting rejected programs again brings, and what it costs."""
+"""A table of the rounds of a run: the effect and the cost of requesting rejected programs again."""
 
 from __future__ import annotations
 
@@ -18,25 +18,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Round:
-    """How a round of a run did.
+    """The result of a round of a run."""
 
-    Args:
-        number: from 0, for the first programs.
-        summary: the verdicts on all programs after it.
-        requests: how many programs were requested in it.
-        accepted: how many programs the check accepts after it.
-        tokens: the tokens of its requests, as far as the model counts them.
-    """
-
-    number: int
-    summary: EvaluationSummary
-    requests: int
-    accepted: int
-    tokens: int
+    number: int  # from 0, for the first programs
+    summary: EvaluationSummary  # of all programs after the round
+    requests: int  # programs requested in the round
+    accepted: int  # programs that the check accepts after the round
+    tokens: int  # of the requests of the round, if the model counts tokens
 
 
 def rounds_view(rounds: Sequence[Round], *, repairs: bool) -> RenderableType:
-    """The rounds of a run, one or more, in a table; numbers of tokens are those up to then."""
+    """Show the rounds of a run in a table, with cumulative requests and tokens."""
     table = ruled("programs", "pass@1", "95% over tasks", "judged", "accepted", "requests", "tokens")
     requests = tokens = 0
     for one in rounds:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
-from rich.console import Console, ConsoleOptions, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -18,7 +16,7 @@ from roboeval.suites.task import describe_person, world_title
 
 
 def suite_view(suite: Suite) -> RenderableType:
-    """All tasks, one a row."""
+    """Show all tasks, one per row."""
     table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
     table.add_column("task", no_wrap=True)
     table.add_column("worlds", justify="right")
@@ -31,7 +29,7 @@ def suite_view(suite: Suite) -> RenderableType:
 
 
 def suite_task_view(task: Task) -> RenderableType:
-    """One task: its prompts, its checks, and the requirements of each world."""
+    """Show a task: its prompts, its checks, and the requirements of each world."""
     parts: list[RenderableType] = [
         Text.assemble((task.name, "bold"), f"  {task.summary}"),
         Text(f"takes {', '.join(task.abilities)}", "dim"),
@@ -48,7 +46,7 @@ def suite_task_view(task: Task) -> RenderableType:
 
 
 def clauses_view(tasks: Iterable[Task]) -> RenderableType:
-    """The clauses of each prompt, with the checks that cover each, or the reason why none does."""
+    """Show the clauses of each prompt, with the checks that cover each or the reason why none does."""
     parts: list[RenderableType] = []
     for task in tasks:
         table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
@@ -75,7 +73,7 @@ def _section(title: str, lines: Iterable[RenderableType]) -> list[RenderableType
 
 def _check_view(check: TaskCheck) -> RenderableType:
     head = check.name + (f"({', '.join(check.parameters)})" if check.parameters else "")
-    formula = _Formula(" ".join(check.rtl.split()), "dim")
+    formula = Text(" ".join(check.rtl.split()), "dim")
     return Group(Text.assemble((head, "bold"), f"  {check.category}"), Padding(formula, (0, 0, 0, 2)))
 
 
@@ -89,24 +87,4 @@ def _world_lines(scenario: Scenario) -> Iterator[RenderableType]:
         yield Text("a program may wait here for ever", "italic")
     for requirement in scenario.require:
         asked = listed([str(prompt) for prompt, _ in requirement.words], "or")
-        yield _Formula(f"requires {requirement.text}{asked and f' for prompt {asked}'}")
-
-
-@dataclass(frozen=True)
-class _Formula:
-    """A formula that wraps between its words, but never within a quoted text."""
-
-    text: str
-    style: str = ""
-
-    def __rich_console__(self, _: Console, options: ConsoleOptions) -> Iterator[Text]:
-        line = ""
-        for part in _UNTORN.findall(self.text):
-            if line and len((line + part).rstrip()) > options.max_width:
-                yield Text(line.rstrip(), self.style)
-                line = ""
-            line += part
-        yield Text(line, self.style)
-
-
-_UNTORN = re.compile(r"""(?:r?"(?:\\.|[^"\\])*"|r?'(?:\\.|[^'\\])*'|[^\s"'(]+|\S)[(),]*\s*""")
+        yield Text(f"requires {requirement.text}{asked and f' for prompt {asked}'}")

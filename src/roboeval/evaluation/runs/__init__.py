@@ -1,4 +1,4 @@
-"""What lies in the folder of a run: completions, rows of evaluations, and all of it as one table.
+"""The folder of a run: completions, rows of evaluations, and the table of both.
 
-Start with `results.py`; `rows.py` describes a row, `folder.py` which file is what.
+Start with `results.py`; `rows.py` describes a row, `folder.py` the files.
 """

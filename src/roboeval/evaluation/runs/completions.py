@@ -1,4 +1,4 @@
-"""Rows of completions: read with line numbers, and named."""
+"""Completions, and the files of JSON lines that hold them."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from roboeval.suites.load import Suite
 COMPLETIONS = "completions.jsonl"
 EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
 
-MOST = 1_000_000_000
-Key: TypeAlias = tuple[str, int, int]
+NUMBER_LIMIT = 1_000_000_000
+CompletionKey: TypeAlias = tuple[str, int, int]
 KEY = ("task", "prompt", "index")  # as columns of tables and names in rows
 REQUIRED = (*KEY, "program")
 FIELDS = (*REQUIRED, "instruction", "model")
-NO_PROGRAM = "no_program"  # its column
+NO_PROGRAM_COLUMN = "no_program"  # its column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,13 +37,13 @@ class Completion:
         task: the task's name.
         prompt: which phrasing, counted from 0, below a billion.
         index: which sample, counted from 0, below a billion.
-        program: the cleaned source; judged exactly as it stands.
-        instruction: the sentence that the model was asked for; None where nobody recorded it.
-        model: who wrote it.
-        more: what else its row says, such as `usage`, `raw_reply` and `finish_reason`.
+        program: the cleaned source, which is judged unchanged.
+        instruction: the instruction of the prompt; None if it was not recorded.
+        model: the name of the model.
+        more: other entries of the row, such as `usage`, `raw_reply` and `finish_reason`.
 
     Raises:
-        UserError: one of them is not of its kind or range.
+        UserError: an argument has a wrong type or is out of range.
     """
 
     task: str
@@ -56,24 +56,22 @@ class Completion:
 
     def __post_init__(self) -> None:
         for name, number in (("prompt", self.prompt), ("index", self.index)):
-            if type(number) is not int or not 0 <= number < MOST:
+            if type(number) is not int or not 0 <= number < NUMBER_LIMIT:
                 raise UserError(
-                    f"the {name} is {number!r}, but must be a whole number from 0 to {MOST - 1:,}"
+                    f"the {name} is {number!r}, but must be a whole number from 0 to {NUMBER_LIMIT - 1:,}"
                 )
         for name in ("task", "program", "instruction", "model"):
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
-                raise UserError(f"the {name} is {text!r}, not a text")
-        if (kind := self.more.get(NO_PROGRAM)) not in (None, *NO_PROGRAM_KINDS):
-            raise UserError(f'"{NO_PROGRAM}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}')
+                raise UserError(f"the {name} is {text!r}, not a string")
+        if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
+            raise UserError(
+                f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}'
+            )
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:
-        """The completion that a row of completions.jsonl says.
-
-        Raises:
-            UserError: something is missing in it, or not of its kind or range.
-        """
+        """Read a row of completions.jsonl; raise UserError if an entry is missing or invalid."""
         more = dict(row)
         known = {name: more.pop(name) for name in FIELDS if name in more}
         for name in REQUIRED:
@@ -83,37 +81,35 @@ class Completion:
 
     @property
     def row(self) -> dict[str, Any]:
-        """The row of completions.jsonl that says it."""
+        """Its row of completions.jsonl."""
         known = {name: getattr(self, name) for name in FIELDS}
         return {name: value for name, value in known.items() if value is not None} | dict(self.more)
 
     @property
-    def key(self) -> Key:
-        """What no other row of a run shares."""
+    def key(self) -> CompletionKey:
+        """Its unique key in a run."""
         return self.task, self.prompt, self.index
 
     @property
     def finish_reason(self) -> str | None:
-        """Why the reply ended, as the server said it; None if nobody recorded it."""
+        """Why the reply ended, in the server's words; None if it was not recorded."""
         reason = self.more.get("finish_reason")
         return reason if isinstance(reason, str) else None
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether the reply ended at the limit of tokens, whether or not the program is whole."""
+        """Whether the reply ended at the limit of tokens, even if the program is complete."""
         return is_cut_off(self.finish_reason)
 
     @property
     def no_program(self) -> NoProgram | None:
-        """Why the reply held no program; None if it held one, or if the row leaves that open.
+        """Why the reply held no program; None if it held one, or if that is unknown.
 
-        Rows of earlier versions and of other tools are read as if the reply had just arrived.
-
-        Raises:
-            EngineError: no isolated process can be started.
+        Rows of other tools are classified like new replies. Raises EngineError if no isolated process can
+        be started for that.
         """
-        if NO_PROGRAM in self.more:
-            kind: NoProgram | None = self.more[NO_PROGRAM]
+        if NO_PROGRAM_COLUMN in self.more:
+            kind: NoProgram | None = self.more[NO_PROGRAM_COLUMN]
             return kind
         reply = self.more.get("raw_reply")
         is_chat = isinstance(reply, str) and not (self.model or "").startswith("completions:")
@@ -123,14 +119,14 @@ class Completion:
 
     @property
     def program_sha256(self) -> str:
-        """The hash of the program, half surrogate pairs included, in 64 hexadecimal digits."""
+        """The SHA-256 of the program, lone surrogates included, in hexadecimal digits."""
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
 
 
-def reply_row(key: Key, instruction: str, model: str, reply: Reply) -> dict[str, Any]:
-    """The row of completions.jsonl for a model's reply to the instruction of a key."""
-    of_whom = {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model}
-    return {**of_whom, **reply.data()}
+def reply_row(key: CompletionKey, instruction: str, model: str, reply: Reply) -> dict[str, Any]:
+    """Return the row of completions.jsonl for a model's reply."""
+    identity = {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model}
+    return {**identity, **reply.data()}
 
 
 def read_completions(
@@ -145,17 +141,17 @@ def read_completions(
 
     Args:
         path: the file.
-        suite: whose tasks and prompts they must be of; any by default.
-        growing: whether it stands in a run, where a torn last line is passed over.
-        name: what sentences call the file; its path by default.
-        faults: gets what is wrong with lines, which are then left out, rather than that it is raised.
+        suite: the suite of their tasks and prompts; any by default.
+        growing: whether to ignore a torn last line, as in a run.
+        name: the name of the file in error messages; its path by default.
+        faults: collects errors, whose lines are left out; by default they are raised.
 
     Raises:
-        UserError: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
+        UserError: the file is missing or empty, or a row is invalid, unknown to the suite, or repeated.
     """
     path = Path(path)
     name = name or path
-    seen: dict[Key, int] = {}  # the lines
+    seen: dict[CompletionKey, int] = {}  # the lines
     try:
         for number, line in read_lines(path, name=name):
             try:
@@ -167,26 +163,27 @@ def read_completions(
     except UserError as error:
         add_or_raise(error, faults)
     if not seen and faults is None:
-        raise UserError("there is no completion in it", file=name)
+        raise UserError("contains no completion", file=name)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
-    """The completion that a line says; None where the line is torn."""
     row = parsed_row(line, EXAMPLE)
     if row is None:
         if growing and not line.endswith(b"\n"):
             return None
         raise UserError(f"this line is not JSON; a row looks like {EXAMPLE}")
     completion = Completion.of(row)
-    if 2 * len(line) > MAX_ROW:  # else it stays short enough, however it is written
+    if 2 * len(line) > MAX_ROW:  # shorter rows cannot become too long
         check_length(row, None)
-    if suite is not None and (problem := unknown(completion.key, suite) or _is_of_other(completion, suite)):
+    if suite is not None and (
+        problem := find_key_fault(completion.key, suite) or _is_of_other(completion, suite)
+    ):
         raise UserError(problem)
     return completion
 
 
 def _is_of_other(completion: Completion, suite: Suite) -> str | None:
-    """What is wrong with a completion for another seed or version of families; None if nothing."""
+    """Return an error if a completion is for another seed or version of families."""
     if suite.families is None or completion.instruction is None:
         return None
     if completion.instruction == suite.tasks[completion.task].prompts[completion.prompt]:
@@ -197,43 +194,43 @@ def _is_of_other(completion: Completion, suite: Suite) -> str | None:
     )
 
 
-def _expect_new(key: Key, seen: dict[Key, int], number: int) -> None:
+def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int) -> None:
     first_line = seen.setdefault(key, number)
     if first_line != number:
-        raise UserError(f"{name_of(key)} is here again; it was already in line {first_line}")
+        raise UserError(f"repeats {name_of(key)} of line {first_line}; remove one")
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
-    """Raise UserError if a row would be too long to be read again once it is copied into a run."""
+    """Raise UserError if a row is too long to be copied into a run."""
     if len(to_line(row)) > MAX_ROW:
         sentence = f"this row is longer than {MAX_ROW:,} bytes; shorten the program"
         raise UserError(sentence, file=str(file), line=line)
 
 
-def unknown(key: Key, suite: Suite) -> str | None:
-    """What is wrong with a completion's task or prompt, as a user of Python may give it; None if nothing."""
+def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:
+    """Return an error if a task or prompt, perhaps of a wrong type, is unknown to a suite."""
     task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
     there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
     prompt: object = key[1]
-    if isinstance(prompt, bool) or not hasattr(prompt, "__index__"):  # numbers of NumPy are right
+    if isinstance(prompt, bool) or not hasattr(prompt, "__index__"):  # NumPy integers are fine
         return f"the prompt is {prompt!r}, not a whole number; {there_are}"
     return None if 0 <= key[1] < len(task.prompts) else f"{name_of(key)}: {there_are}"
 
 
-def name_of(key: Key) -> str:
-    """How a person names a row: TASK/PROMPT/INDEX."""
+def name_of(key: CompletionKey) -> str:
+    """Format a key as TASK/PROMPT/INDEX."""
     return "/".join(map(str, key))
 
 
 def how_many(count: int) -> str:
-    """A number of completions: `1 completion`, `2,000 completions`."""
+    """Format a number of completions, such as `2,000 completions`."""
     return counted(count, "completion")
 
 
-def by_hand(models: Collection[str | None]) -> str:
-    """What a title adds if some models are recorded programs, which stand for no real model."""
+def recorded_suffix(models: Collection[str | None]) -> str:
+    """Return a suffix for titles if models are recorded programs rather than language models."""
     recorded = [model for model in models if model is not None and model.startswith("recorded:")]
     if not recorded:
         return ""

@@ -1,4 +1,4 @@
-"""A run: a folder with a model's completions and their evaluations, which survives every interruption."""
+"""The folder of a run, with completions and evaluations that survive every interruption."""
 
 from __future__ import annotations
 
@@ -18,63 +18,63 @@ from codebotler.core.files import read_text, sync_folder, to_line, to_text, writ
 from roboeval.evaluation.runs.completions import COMPLETIONS, Completion, read_completions
 from roboeval.suites.load import ABLATED, Suite
 
-RULES = "-rules-"  # between a suite and house rules, in the name of an evaluation
+RULES_INFIX = "-rules-"  # between the suite and house rules in the name of an evaluation
 
 
 @dataclass(frozen=True)
-class Run:
+class RunFolder:
     """The folder of a run."""
 
     path: Path
 
     @property
     def completions(self) -> Path:
-        """The programs, a row each."""
+        """The file of completions."""
         return self.path / COMPLETIONS
 
     @property
     def about(self) -> Path:
-        """Who wrote the completions, and how they were asked for."""
+        """The file with the model and how it was prompted."""
         return self.path / "run.json"
 
     @property
     def in_flight(self) -> Path:
-        """Requests that are under way."""
+        """The log of pending requests."""
         return self.path / "inflight.jsonl"
 
     def rows(self, key: str) -> Path:
-        """The rows of an evaluation, by its `evaluation_key`."""
+        """Return the file of rows of an evaluation, by its `evaluation_key`."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
-    def head(self, key: str) -> Path:
-        """By what the rows of an evaluation were judged."""
+    def manifest(self, key: str) -> Path:
+        """Return the file that names the suite and tool of an evaluation."""
         return self.path / "evaluations" / f"{key}.json"
 
     def checks(self, key: str) -> Path:
-        """The problems of its programs; `key` is that of their evaluation."""
+        """Return the file of problems that the check found, by the key of the evaluation."""
         return self.path / "checks" / f"{key}.jsonl"
 
-    def checks_head(self, key: str) -> Path:
-        """How they were checked."""
+    def checks_manifest(self, key: str) -> Path:
+        """Return the file that names the suite and settings of the check."""
         return self.path / "checks" / f"{key}.json"
 
     def judged_by(self) -> list[str]:
-        """The names of the suites by which it was judged, sorted."""
+        """Return the sorted names of the evaluations, without ablations."""
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
         return sorted({key.removesuffix(ABLATED) for key in keys})
 
     def houses(self, suite: str) -> list[str]:
-        """The names of the house rules by which a suite has judged it, but for the suite's own, sorted."""
-        before = f"{suite}{RULES}"
+        """Return the sorted names of house rules with which a suite judged it."""
+        before = f"{suite}{RULES_INFIX}"
         return [key.removeprefix(before) for key in self.judged_by() if key.startswith(before)]
 
     def read(self, suite: Suite | None = None) -> Iterator[Completion]:
-        """Its completions; with a suite, all must be of tasks and prompts of it."""
+        """Read its completions, which must be of the suite if there is one."""
         return read_completions(self.completions, suite, growing=True)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Keep other processes from writing this run; raises UserError if one is writing it."""
+        """Lock this run against other processes; raise UserError if one is writing it."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
@@ -104,7 +104,7 @@ class Run:
 
     @property
     def is_being_written(self) -> bool:
-        """Whether a process writes it. Our hold lasts a moment, for which a writer has patience."""
+        """Whether a process is writing it. This locks it for a moment, which writers wait out."""
         flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
             descriptor = os.open(self.path / ".lock", flags)
@@ -119,7 +119,7 @@ class Run:
         return False
 
     def _expect_no_others(self) -> None:
-        """Refuse a folder that holds something, and is no run."""
+        """Raise UserError if the folder holds files but is not a run."""
         if self.completions.exists() or self.about.exists() or not self.path.is_dir():
             return
         others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
@@ -130,7 +130,7 @@ class Run:
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
-        """Copy completions into this run; raises UserError if it holds others. An error changes nothing."""
+        """Copy completions into this run; raise UserError, and change nothing, if it holds others."""
         models = {completion.model for completion in completions}
         lines = (to_line(completion.row) for completion in completions)
         with self.writing():
@@ -154,23 +154,23 @@ class Run:
                 raise
 
 
-PATIENCE = 20  # times that a lock is tried
-PAUSE = 0.05  # seconds between two
+LOCK_ATTEMPTS = 20
+LOCK_PAUSE_SECONDS = 0.05
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock a file; children of a process that was killed may hold it for a moment longer."""
-    for _ in range(PATIENCE):
+    """Lock a file; children of a killed process may hold the lock for a moment."""
+    for _ in range(LOCK_ATTEMPTS):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            time.sleep(PAUSE)
+            time.sleep(LOCK_PAUSE_SECONDS)
         else:
             return True
     return False
 
 
-def load_head(path: Path) -> dict[str, Any]:
+def load_json_object(path: Path) -> dict[str, Any]:
     """Read a KEY.json or run.json."""
     text = read_text(path)
     try:
@@ -182,28 +182,28 @@ def load_head(path: Path) -> dict[str, Any]:
     return data
 
 
-def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
-    """The tasks that a KEY.json names; None for all."""
-    tasks = head.get("tasks")
+def selected_tasks(manifest: Mapping[str, Any]) -> frozenset[str] | None:
+    """Return the tasks of a KEY.json; None for all."""
+    tasks = manifest.get("tasks")
     return None if tasks is None else frozenset(tasks)
 
 
-def about_of(run: Run) -> dict[str, Any]:
-    """The content of a run's run.json; nothing if there is none."""
-    return load_head(run.about) if run.about.exists() else {}
+def about_of(run: RunFolder) -> dict[str, Any]:
+    """Return the content of a run's run.json, which is empty if there is none."""
+    return load_json_object(run.about) if run.about.exists() else {}
 
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
-    """The name of an evaluation's files."""
+    """Return the name of an evaluation's files."""
     named = suite.house is not None and suite.house.name
-    rules = f"{RULES}{named}" if named else ""
+    rules = f"{RULES_INFIX}{named}" if named else ""
     return suite.name + rules + ABLATED * ablated
 
 
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """The tasks of a list with commas, None for all, and those left out as they have no ablation."""
+    """Return the tasks of a comma-separated list, None for all, and those that lack an ablation."""
     wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()
@@ -214,13 +214,13 @@ def tasks_to_judge(
     return kept, left
 
 
-def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
-    """The suite with the worlds in which a run was judged, if other ones were drawn then."""
-    path = run.head(evaluation_key(suite, ablated=ablated))
+def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
+    """Return the suite with the drawn worlds in which a run was judged."""
+    path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():
         return suite
-    match load_head(path):
+    match load_json_object(path):
         case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0 and (worlds, seed) != drawn:
             return suite.with_worlds(worlds, seed).with_house_rules(suite.house)
     return suite
@@ -228,13 +228,13 @@ def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
 
 def evaluation_of(
     path: Path, suite: Suite, *, ablated: bool, again: str = "roboeval evaluate"
-) -> tuple[Run, str, Suite]:
-    """A run, the name of its evaluation by a suite, and the suite with the worlds that it had then.
+) -> tuple[RunFolder, str, Suite]:
+    """Return a run, the key of its evaluation by a suite, and the suite with the worlds of that evaluation.
 
-    Raises UserError if the suite has not judged it; the command `again` does.
+    Raises UserError if the suite has not judged the run, and names `again` as the command for that.
     """
-    run = Run(path)
-    suite = as_judged(run, suite, ablated=ablated)
+    run = RunFolder(path)
+    suite = with_judged_worlds(run, suite, ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not run.completions.is_file():
         raise UserError("is not a run: it has no completions.jsonl", file=path)

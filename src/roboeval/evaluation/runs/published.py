@@ -1,4 +1,4 @@
-"""Completions as the paper's authors published theirs: a folder or zip of small Python files."""
+"""Completions in the format of the paper's authors: a folder or zip of small Python files."""
 
 from __future__ import annotations
 
@@ -15,26 +15,33 @@ from typing import TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, read_text, text_of
 from codebotler.core.program import parse
-from roboeval.evaluation.runs.completions import KEY, Completion, Key, check_length, name_of, unknown
+from roboeval.evaluation.runs.completions import (
+    KEY,
+    Completion,
+    CompletionKey,
+    check_length,
+    find_key_fault,
+    name_of,
+)
 from roboeval.suites.load import Suite
 
 MAX_UNPACKED = 1_000_000_000
-NAME = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
+PROGRAM_FILE_NAME = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
 NAMED = "TASK_PROMPT_INDEX.py, such as LunchTime_0_1.py"
-UNREADABLE = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError)
+UNREADABLE_ZIP = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError)
 
-File: TypeAlias = tuple[str, Callable[[], str]]  # its name, and what reads its text
+File: TypeAlias = tuple[str, Callable[[], str]]  # the name of a file, and a function that reads it
 
 
 def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Completion]:
-    """The completions in a folder or zip of `TASK_PROMPT_INDEX.py`, of prompts that a suite knows.
+    """Read the completions in a folder or zip of `TASK_PROMPT_INDEX.py`.
 
-    The files assign texts to `prompt` and `completion`; they are parsed and never imported. Raises UserError
-    if there is none, one is wrong or unknown to the suite, or a zip is damaged, encrypted or too large.
+    The files assign strings to `prompt` and `completion`; they are parsed and never imported. Raises
+    UserError if there is none, one is invalid or unknown to the suite, or a zip is damaged or too large.
     """
     with _files(path) as files:
         for key, (name, read) in sorted(_by_key(files, path).items()):
-            if suite is not None and (problem := unknown(key, suite)):
+            if suite is not None and (problem := find_key_fault(key, suite)):
                 raise UserError(problem, file=name)
             texts = _assigned(read(), name)
             row = dict(zip(KEY, key, strict=True))
@@ -44,32 +51,20 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
             yield completion
 
 
-def passed_over(path: Path) -> str | None:
-    """A warning about Python files in a folder or zip that are not named as completions are, if any."""
-    with _files(path) as files:
-        names = [name for name, _ in files if name.endswith(".py") and not _match(name)]
-    if not names:
-        return None
-    they = "file was" if len(names) == 1 else "files were"
-    which = names[0] if len(names) == 1 else f"{names[0]} the first"
-    return f"{len(names):,} {they} left aside, {which}; a completion is named {NAMED}"
-
-
-def _match(name: str) -> re.Match[str] | None:
-    return NAME.fullmatch(PurePosixPath(name).name)
-
-
-def _by_key(files: Iterator[File], path: Path) -> dict[Key, File]:
-    by_key: dict[Key, File] = {}
+def _by_key(files: Iterator[File], path: Path) -> dict[CompletionKey, File]:
+    by_key: dict[CompletionKey, File] = {}
     for file in files:
-        if match := _match(file[0]):
-            key = match["task"], int(match["prompt"]), int(match["index"])
-            if key in by_key:
-                sentence = f"{name_of(key)} is here again; it was already in {by_key[key][0]}"
-                raise UserError(sentence, file=file[0])
-            by_key[key] = file
+        name = PurePosixPath(file[0]).name
+        if name.startswith("."):  # macOS adds such files to zips
+            continue
+        if (match := PROGRAM_FILE_NAME.fullmatch(name)) is None:
+            raise UserError(f"a completion is named {NAMED}; rename or remove this file", file=file[0])
+        key = match["task"], int(match["prompt"]), int(match["index"])
+        if key in by_key:
+            raise UserError(f"repeats {name_of(key)} of {by_key[key][0]}; remove one", file=file[0])
+        by_key[key] = file
     if not by_key:
-        raise UserError(f"there is no file named {NAMED}, in it", file=path)
+        raise UserError(f"contains no file named {NAMED}", file=path)
     return by_key
 
 
@@ -81,7 +76,7 @@ def _files(path: Path) -> Iterator[Iterator[File]]:
         return
     try:
         archive = zipfile.ZipFile(path)
-    except UNREADABLE as error:
+    except UNREADABLE_ZIP as error:
         raise UserError(f"is not a readable zip ({error})", file=path) from None
     with archive:
         yield _members(path, archive)
@@ -91,15 +86,15 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
     unpacked = 0
 
     def read(member: zipfile.ZipInfo, name: str) -> str:
-        """Its text, unpacked no further than it may be long: a zip may lie about its sizes."""
+        # A zip may lie about sizes, so unpack no more than the longest text.
         nonlocal unpacked
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            # Others are unpacked in pieces that may be of any size.
-            raise UserError('is packed in an unusual way; pack it with "deflate"', file=name)
+            # Other methods may unpack pieces of any size.
+            raise UserError('uses an unusual compression; use "deflate"', file=name)
         try:
             with archive.open(member) as file:
                 data = file.read(MAX_ROW + 1)
-        except UNREADABLE as error:
+        except UNREADABLE_ZIP as error:
             raise UserError(f"is not a readable zip ({error})", file=path) from None
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:
@@ -107,13 +102,12 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
         return text_of(data, name, limit=MAX_ROW)
 
     for member in archive.infolist():
-        if not member.is_dir():
+        if member.filename.endswith(".py"):
             name = f"{path}/{member.filename}"
             yield name, partial(read, member, name)
 
 
 def _assigned(text: str, name: str) -> dict[str, str]:
-    """The texts that a file assigns to `prompt` and `completion`."""
     try:
         statements = parse(text).body
     except SyntaxError as error:
@@ -128,14 +122,13 @@ def _assigned(text: str, name: str) -> dict[str, str]:
         if isinstance(target, ast.Name) and target.id in ("prompt", "completion")
     }
     if "completion" not in texts:
-        raise UserError("does not assign a text to `completion`", file=name)
+        raise UserError("does not assign a string to `completion`", file=name)
     return texts
 
 
 def _text(written: ast.expr, what: str, name: str) -> str:
     match written:
         case ast.Constant(str(text)):
-            # As JSON will hold it, in which both halves of a surrogate pair are one character.
+            # Join surrogate pairs, as JSON does.
             return text.encode("utf-16", errors="surrogatepass").decode("utf-16", errors="surrogatepass")
-    sentence = f"`{what}` is not a plain string; write the text out"
-    raise UserError(sentence, file=name, line=written.lineno)
+    raise UserError(f"`{what}` is not a plain string; write it out", file=name, line=written.lineno)

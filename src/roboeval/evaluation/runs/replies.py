@@ -1,4 +1,4 @@
-"""What a row of completions.jsonl says of the reply in which the program was found."""
+"""The replies recorded in rows of completions.jsonl."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from roboeval.evaluation.runs.completions import Completion
 
 TOKENS = ("input_tokens", "output_tokens", "reasoning_tokens")
 REPLY_TEXTS = ("reasoning", "raw_reply")
-MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
+MAX_RECORDED = 10**12  # tokens or seconds; larger numbers are not measurements
 
 
 def reply_data(completion: Completion | None) -> dict[str, Any] | None:
-    """What was recorded of a completion's reply; None for rows of earlier versions, which have none of it.
+    """Return what was recorded of a completion's reply; None if nothing was.
 
-    `finish_reason` as the server said it, `cut_off`, tokens (`input_tokens`, `output_tokens`,
-    `reasoning_tokens`), `latency_s`, `reasoning` and `raw_reply`; each may be None.
+    It has `finish_reason` in the server's words, `cut_off`, `input_tokens`, `output_tokens`,
+    `reasoning_tokens`, `latency_s`, `reasoning` and `raw_reply`; each may be None.
     """
     more = {} if completion is None else completion.more
     if completion is None or not any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning")):
@@ -37,7 +37,7 @@ def reply_data(completion: Completion | None) -> dict[str, Any] | None:
 
 
 def reply_facts(reply: Mapping[str, Any]) -> list[str]:
-    """How a reply ended, its tokens and its latency, each in a few words."""
+    """Describe how a reply ended, its tokens and its latency."""
     named = zip(TOKENS, ("of the prompt", "of the reply", "of its reasoning"), strict=True)
     tokens = [f"{reply[name]:,} {of}" for name, of in named if reply[name] is not None]
     facts = []
@@ -49,6 +49,6 @@ def reply_facts(reply: Mapping[str, Any]) -> list[str]:
 
 
 def number_or_none(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
-    """A number of a row, from 0; None for anything else."""
+    """Return a nonnegative number of a row; None for anything else."""
     is_number = isinstance(value, kind) and not isinstance(value, bool)
-    return value if is_number and 0 <= value <= MOST else None
+    return value if is_number and 0 <= value <= MAX_RECORDED else None

@@ -15,8 +15,8 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from roboeval.evaluation.requests import requested_tasks
-from roboeval.evaluation.runs.completions import Completion, Key, read_completions
-from roboeval.evaluation.runs.folder import Run, evaluation_of, load_head, selected_tasks
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, read_completions
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
 from roboeval.evaluation.runs.scope import JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
@@ -31,24 +31,23 @@ def load_results(
     ablation: bool = False,
     price: tuple[float, float] | None = None,
 ) -> pl.DataFrame:
-    """The verdicts of a judged run as one table, with a row for each completion and world.
+    """Read the verdicts of a judged run as one table, with a row for each completion and world.
 
     Args:
         run: the folder of the run.
-        suite: by which it was judged: a name, or a folder.
-        ablation: whether to take the verdicts on common sense only.
-        price: of a million tokens of input and of output, from which `cost` is reckoned.
+        suite: the name or folder of the suite that judged it.
+        ablation: whether to read the verdicts on common sense only.
+        price: the cost of a million tokens of input and of output, for the column `cost`.
 
     Returns:
-        a table in the order of the completions and of the worlds of their tasks. `task`, `prompt`, `index`,
-        `model`, `program_sha256`, `passed`, the failure (`failure_class`, `failure_kind`, `failure_world`,
-        `failure_check`: the first failure of the completion), `stale` (whether another program stands in the
-        run by now; then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
+        a table in the order of completions and worlds. These columns are the same for all worlds: `task`,
+        `prompt`, `index`, `model`, `program_sha256`, `passed`, the first failure (`failure_class`,
+        `failure_kind`, `failure_world`, `failure_check`), `stale` (whether the run now has another program;
+        then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
         `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost` and `accepted` (whether the
-        check found no problem; null where nobody checked) are the same in all rows of a completion;
-        `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`,
-        `failed_checks` (joined by "; "), `category` (of the first failed check) and `events` are about the
-        world. Numbers count from 0.
+        check found no problem; null if it was not checked). `world_number`, `world`, `satisfied`, `status`,
+        `error_kind`, `error_message`, `line`, `failed_checks` (joined by "; "), `category` (of the first
+        failed check) and `events` are about the world. Numbers count from 0.
 
     Raises:
         UserError: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
@@ -62,51 +61,53 @@ def load_results(
 class Results:
     """One evaluation of a run, with its table."""
 
-    run: Run
+    run: RunFolder
     key: str | None
-    suite: Suite | None  # None if it is not at hand
-    head: Mapping[str, Any]  # KEY.json: by what was judged
-    about: Mapping[str, Any]  # run.json: how the completions were asked for
-    completions: Mapping[Key, Completion]  # those in the run now, in order
-    places: Mapping[Key, tuple[int, int]] = field(repr=False)  # first byte and size of each row in the file
-    passed: Sequence[Key] = field(repr=False)
-    stale: Sequence[Key]  # whose verdicts are on other programs than stand in the run now
+    suite: Suite | None  # None if it is not available
+    manifest: Mapping[str, Any]  # KEY.json
+    about: Mapping[str, Any]  # run.json
+    completions: Mapping[CompletionKey, Completion]  # those in the run now, in order
+    places: Mapping[CompletionKey, tuple[int, int]] = field(
+        repr=False
+    )  # first byte and size of each row in the file
+    passed: Sequence[CompletionKey] = field(repr=False)
+    stale: Sequence[CompletionKey]  # their programs have changed since
     table: pl.DataFrame  # as `load_results` gives it
-    failed: Mapping[Key, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
+    failed: Mapping[CompletionKey, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
     faults: tuple[UserError, ...] = ()
 
     @property
     def known_suite(self) -> Suite:
-        """Its suite, where it was read with one."""
-        assert self.suite is not None, "only pages show runs whose suite is not at hand"
+        """Its suite, if it was read with one."""
+        assert self.suite is not None, "only pages show runs without their suite"
         return self.suite
 
     @property
     def tasks(self) -> frozenset[str] | None:
-        """The tasks that were selected, and those that were requested since; None for all."""
-        selected, requested = selected_tasks(self.head), requested_tasks(self.about)
+        """The tasks that were selected or requested since; None for all."""
+        selected, requested = selected_tasks(self.manifest), requested_tasks(self.about)
         if self.is_ablated or selected is None:
             return selected
         return None if requested is None else selected | requested
 
     @property
     def scope(self) -> JudgingScope:
-        """What there is to judge."""
+        """The completions to judge."""
         return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
 
     @property
     def is_ablated(self) -> bool:
-        """Whether common sense only was required."""
+        """Whether it required common sense only."""
         return (self.key or "").endswith(ABLATED)
 
     @property
-    def programs(self) -> Mapping[Key, str]:
-        """The programs that were judged, but those that have changed or are gone since."""
+    def programs(self) -> Mapping[CompletionKey, str]:
+        """The judged programs that are still in the run."""
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
-    def row(self, key: Key) -> Row:
-        """Read a row again, with all its traces; raises UserError if the file was written anew."""
+    def row(self, key: CompletionKey) -> Row:
+        """Read a row again, with all its traces; raise UserError if the file was replaced."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
         try:
@@ -119,52 +120,67 @@ class Results:
             pass
         raise UserError("was replaced meanwhile; try again", file=path)
 
-    def failed_row(self, key: Key) -> Row:
-        """The row of a completion that failed, without traces of worlds that did not decide."""
+    def failed_row(self, key: CompletionKey) -> Row:
+        """Return the row of a completion that failed, with the trace of the deciding world only."""
         row: Row = json.loads(self.failed[key])
         return row
 
 
-ShowProgress: TypeAlias = Callable[
-    [Iterator[LocatedRow], int], Iterable[LocatedRow]
-]  # passes rows on; gets their number
-
-
-def no_progress(lines: Iterator[LocatedRow], _total: int) -> Iterable[LocatedRow]:
-    """Pass lines on."""
-    return lines
+ShowProgress: TypeAlias = Callable[[Iterator[LocatedRow], int], Iterable[LocatedRow]]
+"""Passes rows on; the second argument is their number."""
 
 
 def read_results(
-    run: Run,
+    run: RunFolder,
     key: str | None,
     suite: Suite | None = None,
     *,
-    reuse_from: Results | None = None,  # another evaluation of the same run, whose completions are taken over
-    keep_failed: bool = True,  # may take much memory
+    task: str | None = None,
+    reuse_from: Results | None = None,
+    keep_failed: bool = True,
     faults: list[UserError] | None = None,
-    on_line: Callable[[bytes], None] | None = None,  # gets the line of each row
-    progress: ShowProgress = no_progress,
+    on_line: Callable[[bytes], None] | None = None,
+    progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
-    """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
-    about, completions = (
-        (reuse_from.about, reuse_from.completions) if reuse_from else read_written(run, faults)
-    )
-    builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
-    failed: dict[Key, bytes] = {}
+    """Read an evaluation of a run, each file once.
 
-    def add(row: Row) -> None:
+    Args:
+        run: the run.
+        key: the name of the evaluation; None if there is none.
+        suite: the suite that judged it; None if it is not at hand.
+        task: the task whose rows to read; by default all.
+        reuse_from: another evaluation of the run, whose completions are not read again.
+        keep_failed: whether to keep the rows that failed, which may take much memory.
+        faults: collects errors in files, which are raised otherwise.
+        on_line: called with the line of each row.
+        progress: passes rows on and shows progress.
+    """
+    if reuse_from:
+        about, completions = reuse_from.about, reuse_from.completions
+    else:
+        about, completions = read_written(run, faults)
+    manifest = {} if key is None else _load_or_add_fault(run.manifest(key), faults)
+    selected = selected_tasks(manifest) if task is None else {task}
+    total = sum(selected is None or name in selected for name, _, _ in completions)
+    builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
+    failed: dict[CompletionKey, bytes] = {}
+    places: dict[CompletionKey, tuple[int, int]] = {}
+    rows = run.rows(key or "")
+    lines = (
+        iter(()) if key is None else read_lines_of(rows, manifest, task=task, on_line=on_line, faults=faults)
+    )
+    for line in progress(lines, total):
+        row = line.row
         builder.add(row)
         if keep_failed and row["failure"] is not None:
             failed[key_of(row)] = without_other_traces(row, row["failure"]["world"])
-
-    head, places = read_rows(run, key, completions, add, faults=faults, on_line=on_line, progress=progress)
+        places[key_of(row)] = line.at, line.size
     table = builder.table()
     return Results(
         run=run,
         key=key,
         suite=suite,
-        head=head,
+        manifest=manifest,
         about=about,
         completions=completions,
         places=places,
@@ -177,7 +193,7 @@ def read_results(
 
 
 def without_other_traces(row: Row, world: int) -> bytes:
-    """A row as JSON, with the trace of one world only: a run may fail often, with long traces."""
+    """Encode a row with the trace of one world only, to save memory."""
     verdicts = [
         verdict if number == world else without_trace(verdict)
         for number, verdict in enumerate(row["verdicts"])
@@ -186,7 +202,6 @@ def without_other_traces(row: Row, world: int) -> bytes:
 
 
 def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
-    """The category of each requirement, by its task and its text."""
     tasks = () if suite is None else suite.tasks.values()
     return {
         (task.name, requirement.text): requirement.category
@@ -196,8 +211,9 @@ def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
     }
 
 
-def _accepted(run: Run, key: str | None, faults: list[UserError] | None) -> Mapping[tuple[str, str], bool]:
-    """Whether the check found no problem, by task and hash of the program, where it was asked."""
+def _accepted(
+    run: RunFolder, key: str | None, faults: list[UserError] | None
+) -> Mapping[tuple[str, str], bool]:
     path = run.checks((key or "").removesuffix(ABLATED))
     accepted: dict[tuple[str, str], bool] = {}
     if not path.is_file():
@@ -209,40 +225,18 @@ def _accepted(run: Run, key: str | None, faults: list[UserError] | None) -> Mapp
     return accepted
 
 
-def read_rows(
-    run: Run,
-    key: str | None,
-    completions: Iterable[Key],
-    add: Callable[[Row], None],
-    *,
-    faults: list[UserError] | None = None,
-    on_line: Callable[[bytes], None] | None = None,
-    progress: ShowProgress = no_progress,
-) -> tuple[Mapping[str, Any], Mapping[Key, tuple[int, int]]]:
-    """Add each row of an evaluation; return its head, and where each row is in the file."""
-    head = {} if key is None else _head(run.head(key), faults)
-    tasks = selected_tasks(head)
-    total = sum(tasks is None or task in tasks for task, _, _ in completions)
-    places: dict[Key, tuple[int, int]] = {}
-    lines = iter(()) if key is None else read_lines_of(run.rows(key), head, on_line=on_line, faults=faults)
-    for line in progress(lines, total):
-        add(line.row)
-        places[key_of(line.row)] = line.at, line.size
-    return head, places
-
-
 def read_written(
-    run: Run, faults: list[UserError] | None
-) -> tuple[Mapping[str, Any], Mapping[Key, Completion]]:
-    """How a run's completions were asked for, and they themselves."""
-    about = _head(run.about, faults) if run.about.exists() else {}
+    run: RunFolder, faults: list[UserError] | None
+) -> tuple[Mapping[str, Any], Mapping[CompletionKey, Completion]]:
+    """Read the run.json and the completions of a run."""
+    about = _load_or_add_fault(run.about, faults) if run.about.exists() else {}
     completions = read_completions(run.completions, growing=True, faults=faults)
     return about, {(sys.intern(one.task), one.prompt, one.index): one for one in completions}
 
 
-def _head(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
+def _load_or_add_fault(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
     try:
-        return load_head(path)
+        return load_json_object(path)
     except UserError as error:
         add_or_raise(error, faults)
         return {}

@@ -1,4 +1,4 @@
-"""The rows of an evaluation: what one holds, how large it may be, and the seal of a finished file."""
+"""The rows of an evaluation, and the seal of a finished file."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Annotated, Any, NotRequired, TypeAlias, TypedDict
 import msgspec
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import read_lines, read_rows
+from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
 
-LONGEST_LINE = 1_000_000_000  # bytes of a row that was written before rows were bounded
-KINDS = frozenset(SKILLS.recordings)
+MAX_LINE_BYTES = 1_000_000_000  # more than any row of many worlds
+EVENT_KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is not a row of an evaluation"
 BROKEN = "was damaged or changed after the evaluation was finished"
-# The group is an escape of half a surrogate pair; the rest is what looks like one.
+# The group matches escapes of lone surrogates; the rest matches similar text.
 ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
 
 
@@ -40,7 +40,7 @@ class ErrorOfRun(TypedDict):
 
 
 class CutTrace(TypedDict):
-    """How many events of a trace did not fit into its row, and the hash of the JSON of the whole trace."""
+    """The number of events that did not fit into a row, and the hash of the JSON of the whole trace."""
 
     events: int
     sha256: str
@@ -50,9 +50,9 @@ Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_le
 
 
 class WorldVerdict(TypedDict):
-    """What a row says of one world; the last five entries are about the events of `trace`.
+    """The judgement in one world; the last five entries are about the events of `trace`.
 
-    Rows of earlier versions have no `places`. A trace too long for its row ends early, with a `cut`.
+    A trace too long for its row ends early, with a `cut`.
     """
 
     world: str
@@ -62,7 +62,7 @@ class WorldVerdict(TypedDict):
     line: int | None
     failed_checks: list[str]
     trace: list[list[Any]]
-    places: NotRequired[Numbered]
+    places: Numbered
     holding: NotRequired[Numbered]
     to: NotRequired[Numbered]
     destinations: NotRequired[Numbered]
@@ -77,9 +77,9 @@ class Row(TypedDict):
         prompt: which phrasing, counted from 0.
         index: which sample, counted from 0.
         program_sha256: the hash of the program that was judged.
-        passed: whether the program does what is required in all worlds.
-        failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
-        verdicts: for each world, in order, what happened there.
+        passed: whether the program satisfies the requirements in all worlds.
+        failure: the first failure; None if it passed.
+        verdicts: the judgement in each world, in order.
     """
 
     task: str
@@ -92,28 +92,28 @@ class Row(TypedDict):
 
 
 def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
-    """Add a fault to those that are collected; raise it where none are."""
+    """Add a fault to a list; raise it if there is no list."""
     if faults is None:
         raise fault from None
     faults.append(fault)
 
 
 def key_of(row: Mapping[str, Any]) -> tuple[str, int, int]:
-    """The task, prompt and index of a row."""
+    """Return the task, prompt and index of a row."""
     return row["task"], row["prompt"], row["index"]
 
 
 def failure_of(row: Row) -> Failure:
-    """The failure of a row whose program did not pass."""
+    """Return the failure of a row whose program did not pass."""
     assert row["failure"] is not None, "this program passed"
     return row["failure"]
 
 
-# --- rows as they are read
+# --- reading
 
 
 def decode_row(line: bytes, *, check_kinds: bool = False) -> Row:
-    """Decode and check a row of an evaluation; with `check_kinds` look into each event, too."""
+    """Decode and check a row of an evaluation, with `check_kinds` also the kinds of events."""
     try:
         data = _decoded(line)
         row = msgspec.convert(data, Row)
@@ -129,7 +129,7 @@ def _decoded(line: bytes) -> object:
     try:
         return msgspec.json.decode(line)
     except msgspec.DecodeError:
-        # UTF-8 cannot hold half of a surrogate pair: it is kept as the text of its escape.
+        # UTF-8 cannot hold lone surrogates, so keep their escapes as text.
         return msgspec.json.decode(ESCAPES.sub(lambda found: (b"\\" if found[1] else b"") + found[0], line))
 
 
@@ -148,14 +148,14 @@ def _expect_consistent(row: Row, data: object) -> None:
 def _expect_known_kinds(row: Row) -> None:
     for verdict in row["verdicts"]:
         for event in verdict["trace"]:
-            if event[0] not in KINDS and by_event(event[0]) is None:
+            if event[0] not in EVENT_KINDS and by_event(event[0]) is None:
                 raise ValueError(
                     f'"{event[0]}" is not a kind of event; name the file of its skill with --skills'
                 )
 
 
 def event_count(verdict: WorldVerdict) -> int:
-    """How many events a trace had when it was judged."""
+    """Return how many events a trace had when it was judged."""
     return len(verdict["trace"]) + (verdict["cut"]["events"] if "cut" in verdict else 0)
 
 
@@ -171,20 +171,22 @@ class LocatedRow:
 
 def read_lines_of(
     path: Path,
-    head: Mapping[str, Any],
+    manifest: Mapping[str, Any],
     *,
     seal: Seal | None = None,
+    task: str | None = None,
     on_line: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
 ) -> Iterator[LocatedRow]:
-    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
+    """Read an evaluation, or its rows on one task, and ignore a torn last line; add or raise faults."""
+    name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
     at, is_reported = 0, False
-    for number, line in read_lines(path, limit=LONGEST_LINE):
+    for number, line in read_lines(path, limit=MAX_LINE_BYTES):
         seal.add(line)
         try:
-            if line.strip():
-                row = decode_row(line, check_kinds=not is_sealed(head))
+            if name in line and line.strip():
+                row = decode_row(line, check_kinds=not is_sealed(manifest))
                 if on_line is not None:
                     on_line(line)
                 yield LocatedRow(number, at, len(line), row)
@@ -194,43 +196,43 @@ def read_lines_of(
             add_or_raise(UserError(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
             is_reported = True
         at += len(line)
-    if seal.is_broken(head) and not is_reported:
+    if seal.is_broken(manifest) and not is_reported:
         add_or_raise(UserError(f"{BROKEN}; --redo starts over", file=path), faults)
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """The task and the hash of each program that was checked, and its problems."""
+    """Yield the task, hash and problems of each checked program."""
     for number, row in read_rows(path, growing=True):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
                 yield (task, program), problems
             case _:
-                raise UserError("this line is not a check; delete the file", file=path, line=number)
+                raise UserError("this line is not a check result; delete the file", file=path, line=number)
 
 
 # --- the seal of a finished file
 
 
 class Seal:
-    """How many rows a file holds, and the hash of its bytes: what KEY.json says of a finished evaluation."""
+    """The number of rows and the hash of a file, which KEY.json records of a finished evaluation."""
 
     def __init__(self) -> None:
         self._count, self._hash = 0, hashlib.sha256()
 
     def add(self, line: bytes) -> None:
-        """Count a line that was read or written."""
+        """Add a line that was read or written."""
         self._count += bool(line.strip())
         self._hash.update(line)
 
     def data(self) -> dict[str, Any]:
-        """As KEY.json writes it."""
+        """Return the entries of KEY.json."""
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
-    def is_broken(self, head: Mapping[str, Any]) -> bool:
-        """Whether these are other rows than when the evaluation was finished."""
-        return is_sealed(head) and any(head.get(name) != value for name, value in self.data().items())
+    def is_broken(self, manifest: Mapping[str, Any]) -> bool:
+        """Whether the rows have changed since the evaluation was finished."""
+        return is_sealed(manifest) and any(manifest.get(name) != value for name, value in self.data().items())
 
 
-def is_sealed(head: Mapping[str, Any]) -> bool:
-    """Whether a KEY.json is that of a finished evaluation; that of an earlier version never is."""
-    return "rows" in head or "sha256" in head
+def is_sealed(manifest: Mapping[str, Any]) -> bool:
+    """Whether a KEY.json is of a finished evaluation."""
+    return "rows" in manifest or "sha256" in manifest

@@ -1,4 +1,4 @@
-"""What there is to judge in a run, and what was requested of its model, beside what has been judged."""
+"""The completions of a run that were requested, exist and were judged."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Coverage:
-    """Of how many completions a number speaks, and of how many it should."""
+    """How many completions a result covers, and how many it should."""
 
     judged: int
     there: int  # in the run now
-    requested: int | None = None  # of the model; None where nobody recorded that
+    requested: int | None = None  # None if it was not recorded
 
     @property
     def total(self) -> int:
-        """How many completions the number should speak of."""
+        """How many completions the result should cover."""
         return max(self.there, self.requested or 0)
 
     @property
     def is_whole(self) -> bool:
-        """Whether it speaks of all of them."""
+        """Whether it covers all of them."""
         return self.judged == self.total
 
     def __str__(self) -> str:
-        """It for people, such as `3,900 of 4,000 completions (50 missing, 50 not judged)`."""
+        """Format it, such as `3,900 of 4,000 completions (50 missing, 50 not judged)`."""
         if self.judged > self.total:
-            return f"{how_many(self.judged)}, of which only {self.there:,} are there now"
+            return f"{how_many(self.judged)}, of which only {self.there:,} are still in the run"
         lacks = {"missing": self.total - self.there, "not judged": self.there - self.judged}
         said = ", ".join(f"{count:,} {what}" for what, count in lacks.items() if count > 0)
         return f"{self.judged:,} of {how_many(self.total)}{f' ({said})' if said else ''}"
@@ -41,14 +41,14 @@ class Coverage:
 
 @dataclass(frozen=True)
 class JudgingScope:
-    """What there is to judge."""
+    """The completions to judge."""
 
-    completions: Mapping[str, int]  # by task, also of tasks that were not selected
-    tasks: frozenset[str] | None = None  # those selected; None for all
-    models: frozenset[str | None] = frozenset()  # of the selected; None: not recorded
-    requested: Mapping[str, int] | None = None  # by task, as run.json records it
-    cut_off: int = 0  # replies of the selected that ended at the limit of tokens
-    limit: int | None = None  # that limit, in tokens, where it was set
+    completions: Mapping[str, int]  # by task, also of tasks that are not selected
+    tasks: frozenset[str] | None = None  # selected tasks; None for all
+    models: frozenset[str | None] = frozenset()  # of selected tasks; None: not recorded
+    requested: Mapping[str, int] | None = None  # by task, from run.json
+    cut_off: int = 0  # replies for selected tasks that ended at the limit of tokens
+    limit: int | None = None  # this limit, in tokens, if it was set
 
     @classmethod
     def of(
@@ -58,14 +58,7 @@ class JudgingScope:
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
     ) -> JudgingScope:
-        """Count completions, in one pass.
-
-        Args:
-            completions: those that are there.
-            tasks: those selected; None for all.
-            about: the content of run.json.
-            suite: whose prompts were requested.
-        """
+        """Count completions of selected tasks, None for all, given run.json and the suite."""
         counts: Counter[str] = Counter()
         models: set[str | None] = set()
         cut_off = 0
@@ -79,15 +72,15 @@ class JudgingScope:
 
     @property
     def total(self) -> int:
-        """How many completions there are to judge."""
+        """The number of completions to judge."""
         return sum(n for task, n in self.completions.items() if self.selects(task))
 
     def selects(self, task: str) -> bool:
-        """Whether to judge a task."""
+        """Whether a task is selected."""
         return self.tasks is None or task in self.tasks
 
     def coverage(self, judged: int, task: str | None = None) -> Coverage:
-        """The coverage of so many judged completions, of all selected tasks or of one."""
+        """Return the coverage for a number of judged completions, of all selected tasks or of one."""
         if task is not None:
             requested = None if self.requested is None else self.requested.get(task, 0)
             return Coverage(judged, self.completions.get(task, 0), requested)
@@ -97,7 +90,7 @@ class JudgingScope:
 
 
 def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
-    """How many completions of each task a run.json says were requested; None where nobody recorded that."""
+    """Return how many completions of each task were requested; None if it was not recorded."""
     each = requested_of_prompts(about, suite)
     if each is None or suite is None:
         return None
@@ -105,7 +98,7 @@ def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int
 
 
 def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
-    """How many completions of each prompt of a task were requested; None where nobody recorded that."""
+    """Return how many completions of each prompt of a task were requested; None if it was not recorded."""
     found = batches(about)
     if not found or suite is None:
         return None
@@ -119,22 +112,22 @@ def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[
 
 
 def limit_of(about: Mapping[str, Any]) -> int | None:
-    """The limit of tokens that a run.json records; None where none was set, or recorded."""
+    """Return the limit of tokens in a run.json; None if it has none."""
     settings = about.get("settings")
     limit = settings.get("max_tokens") if isinstance(settings, dict) else None
     return limit if type(limit) is int else None
 
 
-# --- replies that were cut off
+# --- cut-off replies
 
-TOLERATED = 0.02  # share of replies that may be cut off without a warning
+MAX_CUT_OFF_SHARE = 0.02  # share of replies that may be cut off without a warning
 
 
 @dataclass(frozen=True)
 class CutOff:
-    """How many replies of a run ended at the limit of tokens."""
+    """The replies of a run that ended at the limit of tokens."""
 
-    replies: int  # also those whose program is whole
+    replies: int  # also with a complete program
     without_program: int  # of these
     of: int
     limit: int | None
@@ -146,8 +139,8 @@ class CutOff:
 
     @property
     def warning(self) -> str | None:
-        """A sentence for people with what mends it; None where few replies were cut off."""
-        if self.share <= TOLERATED:
+        """A warning with a remedy; None if few replies were cut off."""
+        if self.share <= MAX_CUT_OFF_SHARE:
             return None
         at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"
         how = "set" if self.limit is None else "raise or leave out"

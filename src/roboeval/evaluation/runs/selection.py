@@ -1,4 +1,4 @@
-"""The part of a run that a user names: a task, a prompt or one completion."""
+"""Selections of a part of a run: a task, a prompt or one completion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.suites.load import Suite
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Selection:
-    """A part of a run: all of it, a task, a prompt or one completion; what is None is not narrowed."""
+    """A part of a run: a task, a prompt or one completion; all of it if everything is None."""
 
     task: str | None = None
     prompt: int | None = None
@@ -26,8 +26,8 @@ class Selection:
         return "/".join(str(part) for part in (self.task, self.prompt, self.index) if part is not None)
 
     @property
-    def key(self) -> Key:
-        """The completion that it is, where it has all three parts."""
+    def key(self) -> CompletionKey:
+        """The key of the selected completion, if it is one."""
         assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - one thing
         return self.task, self.prompt, self.index
 

@@ -1,4 +1,4 @@
-"""Completions that somebody names: a run, a file, published programs, or recorded ones."""
+"""Sources of completions: a run, a file, published programs or recorded models."""
 
 from __future__ import annotations
 
@@ -7,29 +7,28 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import MAX_ROW, parsed_row, read_lines
+from codebotler.core.files import MAX_ROW, read_lines
 from codebotler.models.recorded import RECORDED_NAMES, RecordedModel, open_recorded
 from roboeval.evaluation.runs.completions import COMPLETIONS, EXAMPLE, Completion, read_completions
-from roboeval.evaluation.runs.folder import Run
-from roboeval.evaluation.runs.published import passed_over, published_completions
+from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.evaluation.runs.published import published_completions
 from roboeval.suites.load import Suite
 
 
 @dataclass(frozen=True)
 class Source:
-    """Completions that somebody names."""
+    """Completions, and the run that holds them if there is one."""
 
-    completions: Sequence[Completion]  # each known to the suite
-    run: Run | None = None  # in which they stand
-    left_aside: str | None = None  # a warning about files that are none
+    completions: Sequence[Completion]  # all of tasks of the suite
+    run: RunFolder | None = None
 
     def of(self, tasks: frozenset[str] | None) -> list[Completion]:
-        """Those of some tasks, or all."""
+        """Return the completions of some tasks, or all."""
         return [one for one in self.completions if tasks is None or one.task in tasks]
 
 
 def open_source(text: str, suite: Suite) -> Source:
-    """Read a run folder, a .jsonl file or pipe, a folder or zip of published .py, or `recorded:NAME`."""
+    """Read completions from a run folder, a .jsonl, a folder or zip of .py, or `recorded:NAME`."""
     if not text:
         raise UserError("the argument is empty; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
@@ -40,35 +39,27 @@ def open_source(text: str, suite: Suite) -> Source:
             "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
         )
     if (path / COMPLETIONS).is_file():
-        return Source([*Run(path).read(suite)], Run(path))
+        return Source([*RunFolder(path).read(suite)], RunFolder(path))
     if path.is_dir() or path.suffix == ".zip":
-        return Source([*published_completions(path, suite)], left_aside=passed_over(path))
+        return Source([*published_completions(path, suite)])
     if path.suffix == ".py":
         raise UserError(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
     return Source([*read_completions(path, suite)])
 
 
-LONGEST_ANSWER = 10 * MAX_ROW  # bytes; it may say more than we keep
+MAX_ANSWER_BYTES = 10 * MAX_ROW  # bytes; an answer may hold more than we keep
 
 
 def is_answers(path: Path) -> bool:
-    """Whether a file begins like one of requests to a batch endpoint, or of its answers."""
+    """Whether a file begins like requests to a batch endpoint, or its answers."""
     if not path.is_file():
         return False
-    _, line = next(read_lines(path, limit=LONGEST_ANSWER), (0, b""))
-    try:
-        row = parsed_row(line)
-    except UserError:
-        return False
-    return row is not None and "custom_id" in row
+    _, line = next(read_lines(path, limit=MAX_ANSWER_BYTES), (0, b""))
+    return b'"custom_id"' in line
 
 
 def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
-    """A recorded model that also knows the solutions of a suite.
-
-    Raises:
-        UserError: there is no such model.
-    """
+    """Open a recorded model with the solutions of a suite; raise UserError if there is none."""
     model = open_recorded(name, None if suite.folder is None else suite.folder / "solutions")
     short = model.name.removeprefix("recorded:")
     if short not in RECORDED_NAMES:
@@ -78,10 +69,9 @@ def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
 
 
 def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
-    """Every reply that a recorded model has for a suite's prompts, as completions.
+    """Yield all replies of a recorded model to a suite's prompts.
 
-    Raises:
-        UserError: there is no such model or suite, or the model knows none of its instructions.
+    Raises UserError if there is no such model, or it knows none of the prompts.
     """
     model = recorded_model_for(name, suite)
     found = False

@@ -1,4 +1,4 @@
-"""The one table of a judged run: its columns, how rows of an evaluation become its rows, tables as files."""
+"""The table of a judged run: its columns, its construction from rows, and its files."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
-from roboeval.evaluation.runs.completions import KEY, NO_PROGRAM, Completion, Key
+from roboeval.evaluation.runs.completions import KEY, NO_PROGRAM_COLUMN, Completion, CompletionKey
 from roboeval.evaluation.runs.replies import TOKENS, number_or_none
 from roboeval.evaluation.runs.rows import Row, event_count, key_of
 
 Tokens = TypeVar("Tokens", float, pl.Expr)
 MILLION = 1_000_000
-CHUNK = 10_000  # rows of the table that are held as Python objects at one time
+CHUNK_ROWS = 10_000  # Python objects at a time
 
 COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "task": pl.String,
@@ -43,7 +43,7 @@ COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "cost": pl.Float64,
     "accepted": pl.Boolean,
 }
-"""What a row says of its completion; see docs/results.md."""
+"""The columns about the completion; see docs/results.md."""
 
 WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "world_number": pl.Int64,
@@ -57,11 +57,11 @@ WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "category": pl.String,
     "events": pl.Int64,
 }
-"""What a row says of one world."""
+"""The columns about one world."""
 
 
 class Price(NamedTuple):
-    """What a million tokens of input and of output cost."""
+    """The price of a million tokens of input and of output."""
 
     input: float
     output: float
@@ -78,22 +78,22 @@ class Price(NamedTuple):
         return price
 
     def of(self, input_tokens: Tokens, output_tokens: Tokens) -> Tokens:
-        """What so many tokens cost, as a number or as a column of the table."""
+        """Compute the cost of tokens, as a number or as a column."""
         return (input_tokens * self.input + output_tokens * self.output) / MILLION
 
 
 def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
-    """A table whose `cost` is what the tokens of a completion cost at a price."""
+    """Set the column `cost` of a table."""
     return table.with_columns(cost=price.of(pl.col("input_tokens"), pl.col("output_tokens")))
 
 
-def keys_where(table: pl.DataFrame, column: str) -> list[Key]:
-    """The completions for which a column about them is true."""
+def keys_where(table: pl.DataFrame, column: str) -> list[CompletionKey]:
+    """Return the completions for which a column is true."""
     return [*table.filter(pl.col(column), pl.col("world_number") == 0).select(KEY).iter_rows()]
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """A table whose `accepted` is whether the check found no problem in a program, by task and hash."""
+    """Set the column `accepted` of a table to whether the check found no problem in a program."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -108,7 +108,7 @@ class TableBuilder:
 
     def __init__(
         self,
-        completions: Mapping[Key, Completion] = {},  # those in the run now
+        completions: Mapping[CompletionKey, Completion] = {},  # of the run now
         categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and text
         accepted: Mapping[tuple[str, str], bool] = {},  # by task and hash of the program
     ) -> None:
@@ -123,7 +123,7 @@ class TableBuilder:
 
     def add(self, row: Row) -> None:
         """Add a completion with its verdicts."""
-        if len(self._worlds) >= CHUNK:
+        if len(self._worlds) >= CHUNK_ROWS:
             self._store()
         written = self._completions.get(key_of(row))
         is_stale = written is None or written.program_sha256 != row["program_sha256"]
@@ -164,7 +164,7 @@ class TableBuilder:
             )
 
     def table(self) -> pl.DataFrame:
-        """All that was added."""
+        """Return the table."""
         self._store()
         return self._frame.rechunk()
 
@@ -177,14 +177,12 @@ class TableBuilder:
 
 
 def _texts(written: Completion) -> tuple[str | bool | None, ...]:
-    """The instruction, the program, and how its reply ended, where that was recorded."""
-    said = written.instruction, written.program, written.more.get(NO_PROGRAM), written.finish_reason
+    said = written.instruction, written.program, written.more.get(NO_PROGRAM_COLUMN), written.finish_reason
     is_cut_off = None if written.finish_reason is None else written.is_cut_off
     return *(None if text is None else storable(text) for text in said), is_cut_off
 
 
 def _usage(written: Completion | None) -> tuple[float | None, ...]:
-    """The tokens and the seconds that a completion took, where they were recorded."""
     more = {} if written is None else written.more
     usage = more.get("usage")
     usage = usage if isinstance(usage, dict) else {}
@@ -193,36 +191,36 @@ def _usage(written: Completion | None) -> tuple[float | None, ...]:
 
 
 def storable(text: str) -> str:
-    """A text that UTF-8 can hold, with halves of surrogate pairs as escapes."""
+    """Escape the lone surrogates of a text, which UTF-8 cannot hold."""
     return text.encode(errors="backslashreplace").decode()
 
 
-# --- as a file
+# --- files
 
 
-FORMATS = ("csv", "parquet")
-BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # of files in these formats
+TABLE_FORMATS = ("csv", "parquet")
+TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # of files in these formats
 
 
 def kind_of(path: Path | None) -> str:
-    """The format of a file's ending; csv if it has none of them."""
+    """Return the format by a file's ending; csv by default."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
-    return ending if ending in FORMATS else FORMATS[0]
+    return ending if ending in TABLE_FORMATS else TABLE_FORMATS[0]
 
 
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
-    """Write a table to a file as csv or parquet; the same table gives the same bytes."""
-    if kind not in FORMATS:
-        raise UserError(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
+    """Write a table to a file as csv or parquet; equal tables give equal bytes."""
+    if kind not in TABLE_FORMATS:
+        raise UserError(f'there is no format "{kind}"; choose one of {", ".join(TABLE_FORMATS)}')
     if not path.parent.is_dir():
         raise UserError("there is no such folder", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
-        # A spreadsheet takes a cell that begins so for a formula; OWASP advises the ' in front.
+        # Spreadsheets take such cells for formulas; OWASP advises to prepend an apostrophe.
         frame.with_columns(pl.col(pl.String).str.replace(r"^([=+\-@\t\r\n])", "'${1}")).write_csv(content)
     else:
         frame.write_parquet(content)
-    if path.exists() and not path.is_file():  # such as /dev/stdout, which nothing may take the place of
+    if path.exists() and not path.is_file():  # /dev/stdout, for example, must not be replaced
         path.write_bytes(content.getvalue())
     else:
         write_whole(path.resolve() if path.is_symlink() else path, content.getvalue())

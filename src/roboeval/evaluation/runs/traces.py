@@ -1,4 +1,4 @@
-"""Under which circumstances events happened: how rows keep that beside a trace, and how it is read back."""
+"""The circumstances of events, such as the room, which rows store separately from a trace."""
 
 from __future__ import annotations
 
@@ -7,27 +7,24 @@ from typing import Any
 
 from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Trace, trace_from
-from codebotler.rtl import Formula
-from codebotler.rtl.reasoning.alphabet import elements
 
 CIRCUMSTANCES = ("places", "holding", "to", "destinations")
 
 
 def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
-    """Where events happened and what else formulas compare, as far as it changes; numbers count from 1.
+    """Return the changes of the circumstances that formulas compare; events count from 1.
 
-    `places` is always there, the others only where they hold something:
+    `places` is always present, the others only if they are not empty:
 
-    - `places`: `[number, room]`, from which event on the robot is in which room; the number of the last entry
-      may be one more than there are events.
-    - `holding`: `[number, thing]`, from which event on it holds what; nothing at first, and where the thing
-      is empty.
-    - `to`: `[number, person]`, whom a question is for, and those of its kind from then on; null for nobody.
-    - `destinations`: `[number, room]`, where a drive led, if not to the place of the next event; null if it
-      failed.
+    - `places`: `[number, room]`, the room from that event on; the last number may be one more than there
+      are events.
+    - `holding`: `[number, thing]`, what the robot holds from that event on; empty for nothing, as at first.
+    - `to`: `[number, person]`, who is asked by events of this kind from that one on; null for nobody.
+    - `destinations`: `[number, room]`, the goal of a drive, if it is not the place of the next event; null
+      if the drive failed.
     """
     places = [event.place for event in trace]
-    places += [event.destination or event.place for event in trace[-1:]]  # where the robot is at the end
+    places += [event.destination or event.place for event in trace[-1:]]  # the robot's last room
     drives = [number for number, event in enumerate(trace, 1) if event.kind == GOTO]
     led = [(number, trace[number - 1].destination) for number in drives]
     found = {
@@ -40,13 +37,11 @@ def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
 
 
 def _changes(values: Sequence[str], first: str | None) -> list[list[Any]]:
-    """The values that are others than the one before, with their numbers."""
     changes = enumerate(zip([first, *values], values, strict=False), 1)
     return [[number, new] for number, (old, new) in changes if new != old]
 
 
 def _changes_by_kind(trace: Trace) -> list[list[Any]]:
-    """Whom questions are for, where it is somebody else than for the last event of the same kind."""
     kinds = {event.kind for event in trace if event.to is not None}
     last: dict[str, str | None] = {}
     changes: list[list[Any]] = []
@@ -58,7 +53,7 @@ def _changes_by_kind(trace: Trace) -> list[list[Any]]:
 
 
 def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
-    """The data of a verdict with so many events; of the places, those after the last of them are kept."""
+    """Cut the data of a verdict to a number of events, but keep the place after the last one."""
     known = {name: verdict[name] for name in CIRCUMSTANCES if name in verdict}
     kept = {
         name: [entry for entry in entries if entry[0] <= count + (name == "places")]
@@ -68,19 +63,16 @@ def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
 
 
 def without_trace(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """The data of a verdict with no events."""
+    """Remove the events from the data of a verdict."""
     return {name: value for name, value in verdict.items() if name not in CIRCUMSTANCES} | {"trace": []}
 
 
 def trace_of(verdict: Mapping[str, Any]) -> Trace:
-    """The trace of a verdict as a row has it, with all that formulas compare, if the row keeps that."""
-    trace = trace_from(verdict["trace"])
-    if not has_circumstances(verdict):
-        return trace
+    """Restore the trace of a verdict in a row, with all that formulas compare."""
     places, holding, to, destinations = (dict(verdict.get(name, ())) for name in CIRCUMSTANCES)
     here, held, events = "", "", []
     asked: dict[str, str | None] = {}  # by the kind of event
-    for number, event in enumerate(trace, 1):
+    for number, event in enumerate(trace_from(verdict["trace"]), 1):
         here, held = places.get(number, here), holding.get(number, held)
         if number in to:
             asked[event.kind] = to[number]
@@ -90,15 +82,3 @@ def trace_of(verdict: Mapping[str, Any]) -> Trace:
             led = destinations.get(number, places.get(number + 1, here))
         events.append(Event(*seen, here, 0.0, held, asked.get(event.kind), event.more, led))
     return tuple(events)
-
-
-def has_circumstances(verdict: Mapping[str, Any]) -> bool:
-    """Whether a row says where events happened; those of earlier versions do not."""
-    return "places" in verdict
-
-
-def can_judge(formula: Formula, verdict: Mapping[str, Any]) -> bool:
-    """Whether the row of a verdict keeps all that a formula compares."""
-    return has_circumstances(verdict) or all(
-        (one.place, one.holding, one.to) == (None, None, None) for one in elements(formula)
-    )

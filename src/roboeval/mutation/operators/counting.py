@@ -11,7 +11,7 @@ BOUNDARIES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt
 
 
 def off_by_one(program: ProgramTree, _: Context) -> Edits:
-    """Writes a number that is off by one."""
+    """Uses a number that is off by one."""
     exact = {inner for node in program.nodes if _is_exact(node) for inner in ast.walk(node)}
     pauses = {inner for node in program.nodes if is_pause(node) for inner in ast.walk(node)}
     for node in program.nodes:
@@ -43,7 +43,7 @@ def wrong_boundary(program: ProgramTree, _: Context) -> Edits:
 
 
 def miscount(program: ProgramTree, _: Context) -> Edits:
-    """Takes a number for one more or one less than it is."""
+    """Counts one too many or one too few."""
     for node in program.nodes:
         match node:
             case ast.Call(ast.Name("len" | "sum") | ast.Attribute(_, "count"), [_, *_]):
@@ -52,7 +52,7 @@ def miscount(program: ProgramTree, _: Context) -> Edits:
 
 
 def forget_to_count(program: ProgramTree, _: Context) -> Edits:
-    """Does not remember what it was to remember."""
+    """Does not update a counter or a list."""
     return ({node: []} for node in program.nodes if _remembers(node))
 
 
@@ -68,7 +68,7 @@ def _remembers(node: ast.AST) -> bool:
 
 
 def only_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Remembers only what came last."""
+    """Remembers only the last item."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), value):
@@ -82,7 +82,7 @@ def only_the_last(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_sign(program: ProgramTree, _: Context) -> Edits:
-    """Takes away instead of adding, or adds instead of taking away."""
+    """Subtracts instead of adding, or adds instead of subtracting."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), ast.Constant(int()) as value):
@@ -96,7 +96,7 @@ def wrong_sign(program: ProgramTree, _: Context) -> Edits:
 
 
 def add_as_texts(program: ProgramTree, _: Context) -> Edits:
-    """Puts digits together instead of adding numbers."""
+    """Concatenates digits instead of adding numbers."""
     edit: dict[ast.AST, ast.AST] = {}
     names: set[str] = set()
     for node in program.nodes:
@@ -113,7 +113,7 @@ def add_as_texts(program: ProgramTree, _: Context) -> Edits:
 
 
 def reset_in_the_loop(program: ProgramTree, _: Context) -> Edits:
-    """Begins to count anew with each turn of a loop."""
+    """Resets a counter or a list in each turn of a loop."""
     for block in program.blocks:
         for at, loop in enumerate(block):
             if isinstance(loop, ast.For | ast.While):
@@ -123,7 +123,6 @@ def reset_in_the_loop(program: ProgramTree, _: Context) -> Edits:
 
 
 def _is_start(node: ast.stmt) -> bool:
-    """Whether a statement sets a variable to what counting begins with."""
     match node:
         case ast.Assign(_, ast.Constant() | ast.List() | ast.Dict() | ast.Tuple()):
             return True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 
-from roboeval.mutation.operator import Context, Edits, others, where
+from roboeval.mutation.operator import Context, Edits, next_names, only_if
 from roboeval.mutation.program_tree import ProgramTree, argument, statement, text_of
 
 BRINGING_HERE = re.compile(
@@ -21,36 +21,36 @@ def _is_put_down(context: Context) -> bool:
     return not any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in context.prompts)
 
 
-@where(_is_put_down)
+@only_if(_is_put_down)
 def forget_to_place(program: ProgramTree, _: Context) -> Edits:
-    """Does not put down what it brings."""
+    """Does not put down the thing that it brings."""
     return ({step: []} for step, _call in program.steps("place"))
 
 
 def forget_to_pick(program: ProgramTree, _: Context) -> Edits:
-    """Does not pick up what it should bring."""
+    """Does not pick up the thing that it should bring."""
     return ({step: []} for step, _call in program.steps("pick"))
 
 
 def bring_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Drives about without picking up or putting down anything."""
+    """Drives without picking up or putting down anything."""
     steps = [step for step, _ in program.steps("pick", "place")]
     if len(steps) > 1:
         yield {step: [] for step in steps}
 
 
-@where(_is_put_down)
+@only_if(_is_put_down)
 def place_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Says that it brings something, and keeps it."""
+    """Says that it brings a thing, but does not put it down."""
     return ({step: statement('say("Here it is.")')} for step, _call in program.steps("place"))
 
 
 def wrong_thing(program: ProgramTree, context: Context) -> Edits:
-    """Brings another thing."""
+    """Brings the wrong thing."""
     things = [argument(call, 0) for _, call in program.steps("pick", "place")]
     named = next((name for thing in things if (name := text_of(thing))), "")
     if len(context.things) > 1 and things:
-        for other in others(context.things, named):
+        for other in next_names(context.things, named):
             if other.lower() not in named.lower():
                 yield {thing: ast.Constant(other) for thing in things if thing is not None}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from roboeval.mutation.operator import Context, Edits, asks, others, where
+from roboeval.mutation.operator import Context, Edits, next_names, only_if, prompt_matches
 from roboeval.mutation.program_tree import (
     ProgramTree,
     argument,
@@ -16,10 +16,10 @@ from roboeval.mutation.program_tree import (
     text_of,
 )
 
-COMING_BACK = asks(
+COMING_BACK = prompt_matches(
     r"\b(come|came|coming|are) back\b|\bback (here|with me|to me)\b|\breturn (here|to me|to where)\b"
 )
-STAYING_OUT = asks(
+STAYING_OUT = prompt_matches(
     r"\b(no other room|nowhere else|no place besides|(other|remaining) rooms|just the labs|straight|directly)"
 )
 
@@ -35,12 +35,12 @@ def _sequences(program: ProgramTree) -> Iterator[ast.expr]:
 
 
 def skip_the_first(program: ProgramTree, _: Context) -> Edits:
-    """Goes through all but the first: room, person or report."""
+    """Skips the first item of a sequence: a room, a person or a report."""
     return ({items: expression("list(items)[1:]", items=items)} for items in _sequences(program))
 
 
 def skip_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Goes through all but the last."""
+    """Skips the last item of a sequence."""
     return ({items: expression("list(items)[:-1]", items=items)} for items in _sequences(program))
 
 
@@ -55,7 +55,7 @@ def _return_places(program: ProgramTree) -> dict[ast.Call, ast.expr]:
     return {call: place for call, place in places if isinstance(place, ast.Name) and place.id in kept}
 
 
-@where(COMING_BACK)
+@only_if(COMING_BACK)
 def drop_the_return(program: ProgramTree, _: Context) -> Edits:
     """Does not come back."""
     returns = _return_places(program)
@@ -63,41 +63,41 @@ def drop_the_return(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_drive(program: ProgramTree, _: Context) -> Edits:
-    """Leaves out a drive."""
+    """Omits a drive."""
     returns = _return_places(program)
     return ({step: []} for step, call in program.steps("go_to") if call not in returns)
 
 
 def wrong_room(program: ProgramTree, context: Context) -> Edits:
-    """Names another room than the instruction."""
+    """Uses a room other than the instructed one."""
     for node in program.nodes:
         room = (text_of(node) or "").lower().removeprefix("the ")
         if room in {one.lower() for one in context.rooms}:
-            yield from ({node: ast.Constant(other)} for other in others(context.rooms, room))
+            yield from ({node: ast.Constant(other)} for other in next_names(context.rooms, room))
 
 
-@where(COMING_BACK)
+@only_if(COMING_BACK)
 def return_elsewhere(program: ProgramTree, context: Context) -> Edits:
-    """Comes back to another place than it started from."""
+    """Returns to a place other than its start."""
     rooms = dict.fromkeys((*context.rooms[:1], *context.idle_rooms(program)[-1:]))
     return ({place: ast.Constant(room)} for place in _return_places(program).values() for room in rooms)
 
 
-@where(COMING_BACK)
+@only_if(COMING_BACK)
 def return_to_here(program: ProgramTree, _: Context) -> Edits:
-    """Takes the place where it is for the place to come back to."""
+    """Returns to where it already is."""
     return ({place: expression("get_current_location()")} for place in _return_places(program).values())
 
 
 def drive_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Says that it goes somewhere, and stays."""
+    """Announces a drive but stays."""
     for step, call in program.steps("go_to"):
         if (place := argument(call, 0)) is not None:
             yield {step: statement('say(f"I am going to {place}")', place=place)}
 
 
 def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
-    """Names all rooms in one drive, which leads to one of them."""
+    """Passes all rooms to a single drive, which reaches only one."""
     for loop in program.loops:
         if not isinstance(loop, ast.For) or not isinstance(loop.target, ast.Name):
             continue
@@ -108,16 +108,16 @@ def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
                     yield {loop: [together, rewrite(loop, {step: []})]}
 
 
-@where(STAYING_OUT)
+@only_if(STAYING_OUT)
 def detour(program: ProgramTree, context: Context) -> Edits:
-    """Drives through a room that nobody named."""
+    """Drives through a room that the instruction does not mention."""
     last = [step for step, _ in program.steps("go_to")][-1:]
     for room in context.idle_rooms(program)[:1]:
         yield from ({step: [statement(f"go_to({room!r})"), step]} for step in last)
 
 
 def plural_rooms(program: ProgramTree, _: Context) -> Edits:
-    """Looks for a plural in the names of rooms."""
+    """Searches room names for a plural."""
     for node in program.nodes:
         match node:
             case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]):
@@ -147,17 +147,17 @@ def _looks_in_loops(program: ProgramTree) -> Iterator[tuple[ast.For | ast.While,
 
 
 def drop_the_look(program: ProgramTree, _: Context) -> Edits:
-    """Does not look, and assumes that somebody or something is there."""
+    """Assumes without looking that somebody or something is there."""
     return ({call: expression("True")} for call in _looks(program))
 
 
 def see_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Does not look, and assumes that nobody and nothing is there."""
+    """Assumes without looking that nobody and nothing is there."""
     return ({call: expression("False")} for call in _looks(program))
 
 
 def look_once(program: ProgramTree, _: Context) -> Edits:
-    """Looks once, before a loop, and relies on it."""
+    """Looks only once, before a loop."""
     for loop, look in _looks_in_loops(program):
         if text_of(argument(look, 0)) is not None:
             first = statement("seen_once = look", look=look)
@@ -165,7 +165,7 @@ def look_once(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
-    """Looks twice, and takes it for granted from then on."""
+    """Looks twice, then assumes success."""
     for loop, look in _looks_in_loops(program):
         after = rewrite(loop, {look: expression("turns > 2 or look", look=look)})
         after.body.insert(0, statement("turns += 1"))
@@ -173,7 +173,7 @@ def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_afterwards(program: ProgramTree, _: Context) -> Edits:
-    """Acts first, and looks then."""
+    """Acts before looking."""
     looks = set(_looks(program))
     for node in program.nodes:
         match node:
@@ -184,19 +184,19 @@ def look_afterwards(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_for_another(program: ProgramTree, context: Context) -> Edits:
-    """Looks for something or somebody else."""
+    """Looks for another person or thing."""
     for look in _looks(program):
         wanted = argument(look, 0)
         if (name := text_of(wanted)) is None:
             continue
         for known in (context.things, context.people):
             if name.lower() in {one.lower() for one in known}:
-                yield from ({wanted: ast.Constant(other)} for other in others(known, name, most=1))
+                yield from ({wanted: ast.Constant(other)} for other in next_names(known, name, most=1))
         yield {wanted: ast.Constant("unicorn")}
 
 
 def look_at_the_name(program: ProgramTree, _: Context) -> Edits:
-    """Looks for a word in the name of the room and not into the room."""
+    """Searches the room's name instead of the room."""
     for loop, look in _looks_in_loops(program):
         wanted = argument(look, 0)
         if isinstance(loop, ast.For) and isinstance(loop.target, ast.Name) and wanted is not None:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from itertools import pairwise
 
-from roboeval.mutation.operator import Context, Edits, asks, others, where
+from roboeval.mutation.operator import Context, Edits, next_names, only_if, prompt_matches
 from roboeval.mutation.program_tree import (
     ProgramTree,
     argument,
@@ -19,7 +19,7 @@ from roboeval.mutation.program_tree import (
     text_of,
 )
 
-TELLING = asks(r"\b(tell|say|speak|report|inform|hear|know|announce|suggest)\b")
+TELLING = prompt_matches(r"\b(tell|say|speak|report|inform|hear|know|announce|suggest)\b")
 OPPOSITES = {
     "yes": "no",
     "no one": "everyone",
@@ -54,7 +54,6 @@ SILENT = re.compile(r"\b(yes|no|ok|done|\d+|zero|one|two|three|four)\b", re.IGNO
 
 
 def _answers(call: ast.Call) -> Iterator[ast.expr]:
-    """The first and the last option of a question."""
     options = argument(call, 2)
     if isinstance(options, ast.List) and options.elts:
         yield from dict.fromkeys((options.elts[0], options.elts[-1]))
@@ -71,7 +70,7 @@ def _used(program: ProgramTree) -> Iterator[tuple[ast.Call, ast.expr]]:
 
 
 def ignore_the_answer(program: ProgramTree, _: Context) -> Edits:
-    """Asks, and goes on as if a certain option were the answer."""
+    """Asks, but assumes a fixed answer."""
     return (
         {call: expression("(question, answer)[1]", question=call, answer=answer)}
         for call, answer in _used(program)
@@ -79,7 +78,7 @@ def ignore_the_answer(program: ProgramTree, _: Context) -> Edits:
 
 
 def assume_the_answer(program: ProgramTree, _: Context) -> Edits:
-    """Does not ask, and goes on as if a certain option were the answer."""
+    """Assumes an answer without asking."""
     return ({call: answer} for call, answer in _used(program))
 
 
@@ -92,12 +91,12 @@ def ask_by_saying(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_question(program: ProgramTree, _: Context) -> Edits:
-    """Leaves out a request that needs no answer."""
+    """Omits a request that needs no answer."""
     return ({step: []} for step, _call in program.steps("ask"))
 
 
 def forget_an_option(program: ProgramTree, _: Context) -> Edits:
-    """Does not offer one of the options."""
+    """Omits one of the options."""
     for call in program.calls("ask"):
         options = argument(call, 2)
         if isinstance(options, ast.List) and len(options.elts) > 1:
@@ -106,7 +105,7 @@ def forget_an_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def vague_question(program: ProgramTree, _: Context) -> Edits:
-    """Asks without saying what about."""
+    """Asks without naming the subject."""
     for call in program.calls("ask"):
         question, options = argument(call, 1), argument(call, 2)
         offered = [text for node in ast.walk(options) if (text := text_of(node))] if options else []
@@ -115,14 +114,14 @@ def vague_question(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_person(program: ProgramTree, context: Context) -> Edits:
-    """Takes one person for another."""
+    """Confuses two people."""
     for node in program.nodes:
         text = text_of(node) or ""
         for name in context.people:
             found = re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)
             if found is None:
                 continue
-            for other in others(context.people, name, most=1):
+            for other in next_names(context.people, name, most=1):
                 put = other.capitalize() if found[0][:1].isupper() else other
                 yield {node: ast.Constant(text[: found.start()] + put + text[found.end() :])}
 
@@ -135,13 +134,13 @@ def _compared(program: ProgramTree) -> Iterator[tuple[ast.expr, str]]:
 
 
 def other_spelling(program: ProgramTree, _: Context) -> Edits:
-    """Compares the answer with another spelling of it."""
+    """Compares the answer with another spelling."""
     for node, text in _compared(program):
         yield {node: ast.Constant(text.lower() if text[0].isupper() else text.capitalize())}
 
 
 def unknown_option(program: ProgramTree, _: Context) -> Edits:
-    """Compares the answer with what nobody offered."""
+    """Compares the answer with an option that it did not offer."""
     return ({node: ast.Constant("maybe")} for node, _text in _compared(program))
 
 
@@ -170,33 +169,33 @@ def _in_place_of(reported: ast.AST, value: str | float) -> ast.expr:
     return ast.Constant(str(value))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def forget_to_say(program: ProgramTree, _: Context) -> Edits:
-    """Does not say something."""
+    """Omits a message."""
     return ({step: []} for step, _call in program.steps("say"))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def say_nothing_of_it(program: ProgramTree, _: Context) -> Edits:
-    """Says something that tells nothing."""
+    """Replaces a message by one without information."""
     return ({step: statement('say("Done.")')} for step, _call in program.steps("say"))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def constant_for_a_value(program: ProgramTree, _: Context) -> Edits:
-    """Reports a constant instead of what it counted or heard."""
+    """Reports a constant instead of a counted or received value."""
     return ({node: _in_place_of(node, value)} for node in _reported(program) for value in (1, 2, 12))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def hedge(program: ProgramTree, _: Context) -> Edits:
-    """Reports all numbers, of which one is right."""
+    """Reports several numbers, one of them right."""
     return ({node: _in_place_of(node, "0, 1, 2, 3 or 4")} for node in _reported(program))
 
 
-@where(TELLING)
+@only_if(TELLING)
 def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
-    """Says only a part of a sentence."""
+    """Omits a clause of a message."""
     asked = {inner for call in program.calls("ask") for inner in ast.walk(call)}
     for node in _messages(program):
         clauses = CLAUSES.findall(text_of(node) or "")
@@ -205,9 +204,9 @@ def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
                 yield {node: ast.Constant("".join(one for one in clauses if one is not left).strip(" ,;"))}
 
 
-@where(TELLING)
+@only_if(TELLING)
 def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
-    """Leaves a value out of a message."""
+    """Omits a value of a message."""
     for node in _messages(program):
         match node:
             case ast.JoinedStr(parts) if len(parts) > 1:
@@ -220,9 +219,9 @@ def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
                         yield {node: rest}
 
 
-@where(TELLING)
+@only_if(TELLING)
 def swap_values(program: ProgramTree, _: Context) -> Edits:
-    """Mixes up two values in a message."""
+    """Swaps two values in a message."""
     targets = (node.target for node in program.nodes if isinstance(node, ast.For | ast.comprehension))
     gone_through = {name for target in targets for name in names_in(target, ast.Store)}  # has no place
     for a, b in _neighbours(program):
@@ -238,7 +237,6 @@ def _variable(value: ast.expr) -> str | None:
 
 
 def _neighbours(program: ProgramTree) -> Iterator[tuple[ast.expr, ast.expr]]:
-    """Pairs of neighbouring values in a message."""
     for node in _messages(program):
         match node:
             case ast.JoinedStr(parts):
@@ -277,7 +275,7 @@ def _opposite(found: re.Match[str]) -> str:
 
 
 def say_before_asking(program: ProgramTree, _: Context) -> Edits:
-    """Says before a question what should come after it."""
+    """Reports before asking instead of afterwards."""
     for block in program.blocks:
         for at, saying in enumerate(block):
             if "say" not in skills_in(saying) or "ask" in skills_in(saying):

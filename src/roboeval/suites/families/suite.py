@@ -18,12 +18,12 @@ from roboeval.suites.families.tasks import TrainedTask, family_names, suite_file
 from roboeval.suites.suite import Suite
 from roboeval.suites.task import Task
 
-SIZE = 1_000_000_000
-SPLITS = {"train": 0, "validation": SIZE, "test": 2 * SIZE}
-"""The first seed of each split; a split has SIZE seeds."""
+SEEDS_PER_SPLIT = 1_000_000_000
+FIRST_SEEDS = {"train": 0, "validation": SEEDS_PER_SPLIT, "test": 2 * SEEDS_PER_SPLIT}
+"""The first seed of each split; a split has SEEDS_PER_SPLIT seeds."""
 
-MOST_TASKS = 100
-NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
+MAX_FAMILY_TASKS = 100
+FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
 
 
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
@@ -31,14 +31,14 @@ def first_seed(split: str, seed: int, count: int, what: str) -> int:
 
     Raises UserError if the split does not exist or a number is out of range; `what` names the counted things.
     """
-    if split not in SPLITS:
-        raise UserError(f'there is no split "{split}"; use {listed(list(SPLITS))}')
+    if split not in FIRST_SEEDS:
+        raise UserError(f'there is no split "{split}"; use {listed(list(FIRST_SEEDS))}')
     if count < 1:
         raise UserError(f"the number of {what}s is {count}, but it must be at least 1")
-    if not 0 <= seed * count <= SIZE - count:
-        most = SIZE // count - 1
+    if not 0 <= seed * count <= SEEDS_PER_SPLIT - count:
+        most = SEEDS_PER_SPLIT // count - 1
         raise UserError(f"the seed is {seed}, but with {counted(count, what)} it must be from 0 to {most:,}")
-    return SPLITS[split] + seed * count
+    return FIRST_SEEDS[split] + seed * count
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class FamilyTasks:
     count: int = len(family_names())
 
     def __post_init__(self) -> None:
-        if self.count > MOST_TASKS:
-            raise UserError(f"the number of tasks is {self.count}, but it must be at most {MOST_TASKS}")
+        if self.count > MAX_FAMILY_TASKS:
+            raise UserError(f"the number of tasks is {self.count}, but it must be at most {MAX_FAMILY_TASKS}")
         first_seed(self.split, self.seed, self.count, "task")
 
     @property
@@ -86,7 +86,7 @@ class FamilyTasks:
 
 def family_tasks_named(name: str) -> FamilyTasks | None:
     """Parse the name of a suite of families; None for other names."""
-    match = NAME.fullmatch(name)
+    match = FAMILY_SUITE_NAME.fullmatch(name)
     if match is None:
         return None
     split, seed, count = match.groups()
@@ -103,7 +103,7 @@ def _build_suite(which: FamilyTasks, skills: SkillTable) -> Suite:
         name=which.name,
         version=head.version,
         about=f"{counted(which.count, 'task')} of families: split {which.split}, seed {which.seed}",
-        rules=head.rules.rules(),
+        settings=head.rules.settings(),
         tasks={name: _named(name, one) for name, one in made.items()},
         digest=hashlib.sha256("\n".join([str(head.version), *digests]).encode()).hexdigest(),
         skills=skills,

@@ -12,7 +12,7 @@ from random import Random
 from string import Template
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
@@ -23,18 +23,18 @@ from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.formulas import And
 from codebotler.rtl.syntax import parse
-from roboeval.suites.schema import MOST_WORLDS, SuiteFile
+from roboeval.suites.schema import MAX_WORLDS, StrictForm, SuiteFile
 from roboeval.suites.suite import Suite
 from roboeval.suites.task import Requirement, Task
 from roboeval.suites.taskfile import read_task
 
-FOLDER = Path(__file__).parent
-SUITE, WORLDS = "training", 8
-NUMBERS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-SOME = re.compile(r"(\d+) (\w+)")  # several distinct words of a pool
-MARKS = frozenset("${}|")
-RANGE = re.compile(r"(\d+) to (\d+)")
-EITHER = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several synonyms
+FAMILY_FOLDER = Path(__file__).parent
+TRAINING_SUITE, TRAINING_WORLDS = "training", 8
+NUMBER_WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+SEVERAL_WORDS = re.compile(r"(\d+) (\w+)")  # several distinct words of a pool
+RESERVED_MARKS = frozenset("${}|")
+NUMBER_RANGE = re.compile(r"(\d+) to (\d+)")
+SYNONYMS = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several synonyms
 
 # A robot that retracts its report has not reported.
 RETRACTION = (
@@ -52,18 +52,14 @@ RETRACTION = (
 Choice: TypeAlias = Name | Annotated[list[Name], Field(min_length=1)]
 
 
-class _Form(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class WrongProgram(_Form):
+class WrongProgram(StrictForm):
     """A program that does not do all of what was asked."""
 
     about: Name
     program: YamlText
 
 
-class FamilyFile(_Form):
+class FamilyFile(StrictForm):
     """The template of a family; `$name` is replaced by a value chosen for each seed.
 
     Args:
@@ -105,7 +101,7 @@ class TrainedTask:
 @cache
 def family_names() -> tuple[str, ...]:
     """The sorted names of all families that ship with RoboEval."""
-    return tuple(sorted(path.stem for path in (FOLDER / "templates").glob("*.yaml")))
+    return tuple(sorted(path.stem for path in (FAMILY_FOLDER / "templates").glob("*.yaml")))
 
 
 def family_file(family: str) -> Path:
@@ -114,10 +110,10 @@ def family_file(family: str) -> Path:
         return Path(family)
     if family not in family_names():
         raise UserError(f'there is no family "{family}"; use {listed(family_names())}, or a .yaml file')
-    return FOLDER / "templates" / f"{family}.yaml"
+    return FAMILY_FOLDER / "templates" / f"{family}.yaml"
 
 
-def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask:
+def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> TrainedTask:
     """Generate the task of a family for a seed; the result is reproducible.
 
     Args:
@@ -128,8 +124,8 @@ def trained_task(family: str, seed: int, *, worlds: int = WORLDS) -> TrainedTask
     Raises:
         UserError: the family does not exist, its file is not valid, or a number is out of range.
     """
-    if not 1 <= worlds <= MOST_WORLDS:
-        raise UserError(f"the number of worlds is {worlds}, but it must be from 1 to {MOST_WORLDS:,}")
+    if not 1 <= worlds <= MAX_WORLDS:
+        raise UserError(f"the number of worlds is {worlds}, but it must be from 1 to {MAX_WORLDS:,}")
     if type(seed) is not int or seed < 0:
         raise UserError(f"the seed is {seed!r}, but it must be a whole number from 0")
     return _generate(family, seed, worlds)
@@ -189,7 +185,7 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
         )
     )
     digest = hashlib.sha256(f"{head.version} {worlds} {seed} {task_file.data}".encode()).hexdigest()
-    suite = Suite(SUITE, head.version, head.about, rules.rules(), {name: task}, digest)
+    suite = Suite(TRAINING_SUITE, head.version, head.about, rules.settings(), {name: task}, digest)
     return TrainedTask(suite, name, form.solution, form.wrong)
 
 
@@ -211,7 +207,6 @@ def _forbid_retraction(task: Task) -> Task:
 
 
 def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[str, str]]:
-    """Choose the value of each name in a template."""
     used: set[str] = set()
 
     def sample(words: Sequence[str], count: int) -> list[str]:
@@ -219,7 +214,7 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
         if len(left) < count:
             raise file.wrong(f"only {len(left)} words are left, but {count} are needed", "choose", name)
         some = random.sample(left, count)
-        if any(MARKS.intersection(word) for word in some):
+        if any(RESERVED_MARKS.intersection(word) for word in some):
             raise file.wrong("a word contains $, {, } or |, which are reserved; replace them", "choose", name)
         used.update(some)
         return some
@@ -227,15 +222,15 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
     for name, choice in form.choose.items():
         if isinstance(choice, list):
             yield from _scalar(name, *sample(choice, 1))
-        elif match := RANGE.fullmatch(choice):
+        elif match := NUMBER_RANGE.fullmatch(choice):
             least, most = int(match[1]), int(match[2])
-            if not least <= most < len(NUMBERS):
+            if not least <= most < len(NUMBER_WORDS):
                 raise file.wrong(
                     "the range is not valid; write two ascending numbers up to 10", "choose", name
                 )
             number = random.randint(least, most)
-            yield from ((name, str(number)), (f"{name}_word", NUMBERS[number]))
-        elif match := SOME.fullmatch(choice):
+            yield from ((name, str(number)), (f"{name}_word", NUMBER_WORDS[number]))
+        elif match := SEVERAL_WORDS.fullmatch(choice):
             yield from _list(name, sample(_pool(match[2], file, name), int(match[1])))
         else:
             yield from _scalar(name, *sample(_pool(choice, file, name), 1))
@@ -265,7 +260,6 @@ def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def _fill(text: str, chosen: Mapping[str, str], path: Path) -> str:
-    """Replace the names in a template by their values."""
     for match in Template.pattern.finditer(text):
         name = match["named"] or match["braced"]
         if match["escaped"] is None and name not in chosen:
@@ -276,7 +270,6 @@ def _fill(text: str, chosen: Mapping[str, str], path: Path) -> str:
 
 
 def _expect_python(form: FamilyFile, file: YamlFile) -> None:
-    """Raise a UserError if one of the programs does not parse."""
     wrong = [(one.program, ("wrong", number, "program")) for number, one in enumerate(form.wrong)]
     for program, place in ((form.solution, ("solution",)), *wrong):
         if isinstance(flaw := parsed(program), Flaw):
@@ -284,13 +277,12 @@ def _expect_python(form: FamilyFile, file: YamlFile) -> None:
 
 
 def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -> Iterator[Any]:
-    """The prompts with all choices made."""
     for number, prompt in enumerate(template.form.task["prompts"]):
         if not isinstance(prompt, str):  # `read_task` reports the error
             yield prompt
             continue
         filled = _fill(prompt, chosen, template.path)
-        text = " ".join(EITHER.sub(lambda match: random.choice(match[1].split("|")), filled).split())
+        text = " ".join(SYNONYMS.sub(lambda match: random.choice(match[1].split("|")), filled).split())
         if "{" in text or "}" in text:
             raise template.file.wrong(
                 "braces are not balanced; write synonyms as {go|drive}", "task", "prompts", number
@@ -310,7 +302,7 @@ def _template(path: Path) -> _Template:
 
 @cache
 def _words() -> Mapping[str, list[str]]:
-    data = YamlFile.read(FOLDER / "words.yaml").data
+    data = YamlFile.read(FAMILY_FOLDER / "words.yaml").data
     assert isinstance(data, dict)
     return data
 
@@ -318,4 +310,4 @@ def _words() -> Mapping[str, list[str]]:
 @cache
 def suite_file() -> SuiteFile:
     """The version and the simulation settings of all families."""
-    return YamlFile.read(FOLDER / "training.yaml").validate(SuiteFile)
+    return YamlFile.read(FAMILY_FOLDER / "training.yaml").validate(SuiteFile)

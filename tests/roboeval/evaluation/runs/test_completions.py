@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, Appender, to_line, write_whole
 from roboeval.evaluation.runs.completions import read_completions
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.source import open_source
 from roboeval.suites.load import Suite
 
@@ -68,7 +68,7 @@ def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
     path = tmp_path / "a.jsonl"
     row = ROW | {"program": program}
     path.write_text(json.dumps(row, ensure_ascii=False).replace("\ud800", "\\ud800"))
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     run.keep(open_source(str(path), paper).completions)
     assert [c.program for c in read_completions(run.completions)] == [program]
 
@@ -82,7 +82,7 @@ def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
     assert len(line) < MAX_ROW
     assert "5,000,000 bytes" in error_about(path, line).sentence
     with pytest.raises(UserError, match="5,000,000 bytes"):
-        Run(tmp_path / "run").keep(open_source(str(path), paper).completions)
+        RunFolder(tmp_path / "run").keep(open_source(str(path), paper).completions)
     assert not (tmp_path / "run").exists()
 
 
@@ -139,7 +139,7 @@ def test_a_file_that_is_written_whole_is_in_its_folder_on_the_disk(
 def test_a_new_folder_of_a_run_is_on_the_disk(
     tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
 ) -> None:
-    with Run(tmp_path / "runs" / "one").writing():
+    with RunFolder(tmp_path / "runs" / "one").writing():
         pass
     assert synced == [
         (tmp_path / "runs", frozenset({"one"})),

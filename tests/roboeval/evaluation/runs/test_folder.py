@@ -20,7 +20,7 @@ from codebotler.core.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.completions import Completion, read_completions
-from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+from roboeval.evaluation.runs.folder import RunFolder, tasks_to_judge
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import open_source, recorded_completions
 from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
@@ -31,23 +31,23 @@ GREETS = 'def task_program():\n    say("good day")\n'
 ADDRESS = "def task_program():\n    say(str(object()))\n    say(str(id([])))\n    say(str({'a', 'b', 'c'}))\n"
 
 
-def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> Run:
+def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> RunFolder:
     path.mkdir(parents=True)
     rows = [
         {"task": task, "prompt": 0, "index": index, "program": program}
         for index, program in enumerate(programs)
     ]
-    run = Run(path)
+    run = RunFolder(path)
     run.completions.write_bytes(b"".join(map(to_line, rows)))
     return run
 
 
-def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[Row]:
+def judged(run: RunFolder, suite: Suite, *, redo: bool = False) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
 
 
-def careful_run(path: Path, suite: Suite) -> Run:
-    run = Run(path)
+def careful_run(path: Path, suite: Suite) -> RunFolder:
+    run = RunFolder(path)
     run.keep([*recorded_completions("recorded:careful", suite)])
     return run
 
@@ -55,7 +55,7 @@ def careful_run(path: Path, suite: Suite) -> Run:
 def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS, "go_to('nowhere')\n"])
     judged(run, paper)
-    about = json.loads(run.head("paper").read_text())
+    about = json.loads(run.manifest("paper").read_text())
     assert about["suite"] == "paper"
     assert about["digest"] == paper.digest
     assert about["rules"]["literals"] == "lowercase"
@@ -106,9 +106,9 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
         script = (
             "import sys, pathlib\n"
             "from roboeval.evaluation.evaluate import evaluate_run\n"
-            "from roboeval.evaluation.runs.folder import Run\n"
+            "from roboeval.evaluation.runs.folder import RunFolder\n"
             "from roboeval.suites.load import load_suite\n"
-            f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+            f"run = RunFolder(pathlib.Path({str(run.path)!r}))\n"
             "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, "
             f"workers={workers}): pass\n"
         )
@@ -127,9 +127,9 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     script = (
         "import pathlib\n"
         "from roboeval.evaluation.evaluate import evaluate_run\n"
-        "from roboeval.evaluation.runs.folder import Run\n"
+        "from roboeval.evaluation.runs.folder import RunFolder\n"
         "from roboeval.suites.load import load_suite\n"
-        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        f"run = RunFolder(pathlib.Path({str(run.path)!r}))\n"
         "print('on', flush=True)\n"
         "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=2): pass\n"
     )
@@ -146,7 +146,7 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     assert kills >= 3
     rows = judged(run, paper)
     assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
-    assert run.head("paper").read_bytes() == whole.head("paper").read_bytes()
+    assert run.manifest("paper").read_bytes() == whole.manifest("paper").read_bytes()
     assert len(rows) == sum(1 for _ in read_completions(run.completions))
 
 
@@ -213,8 +213,8 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
     run = a_run(tmp_path / "run", [GREETS])
     script = (
         "import pathlib, sys, time\n"
-        "from roboeval.evaluation.runs.folder import Run\n"
-        f"with Run(pathlib.Path({str(run.path)!r})).writing():\n"
+        "from roboeval.evaluation.runs.folder import RunFolder\n"
+        f"with RunFolder(pathlib.Path({str(run.path)!r})).writing():\n"
         "    print('on', flush=True)\n"
         "    sys.stdin.read()\n"
     )
@@ -243,12 +243,12 @@ def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
 ) -> None:
     run = a_run(tmp_path / "run", [GREETS])
     judged(run, paper)
-    about = json.loads(run.head("paper").read_text())
-    run.head("paper").write_text(json.dumps(about | {name: value}))
+    about = json.loads(run.manifest("paper").read_text())
+    run.manifest("paper").write_text(json.dumps(about | {name: value}))
     with pytest.raises(UserError, match=rf"{re.escape(what)}.* --redo"):
         judged(run, paper)
     assert len(judged(run, paper, redo=True)) == 1
-    assert json.loads(run.head("paper").read_text()) == about
+    assert json.loads(run.manifest("paper").read_text()) == about
 
 
 def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, paper: Suite) -> None:
@@ -295,12 +295,12 @@ def test_further_tasks_are_judged_beside_those_that_were(tmp_path: Path, paper: 
     before = run.rows("paper").read_bytes()
     assert judged_tasks("LunchTime", "SayGoodDay") == ["SayGoodDay", "SayGoodDay", "LunchTime"]
     assert run.rows("paper").read_bytes().startswith(before)
-    whole = run.rows("paper").read_bytes(), run.head("paper").read_bytes()
+    whole = run.rows("paper").read_bytes(), run.manifest("paper").read_bytes()
     assert json.loads(whole[1])["tasks"] == ["LunchTime", "SayGoodDay"]
     assert judged_tasks("LunchTime") == ["LunchTime"]
-    assert (run.rows("paper").read_bytes(), run.head("paper").read_bytes()) == whole
+    assert (run.rows("paper").read_bytes(), run.manifest("paper").read_bytes()) == whole
     assert len(judged_tasks()) == 3
-    assert json.loads(run.head("paper").read_text())["tasks"] is None
+    assert json.loads(run.manifest("paper").read_text())["tasks"] is None
 
 
 def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
@@ -334,7 +334,7 @@ def test_a_run_that_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
     for path in (tmp_path / "there" / "run", tmp_path / "new" / "run", tmp_path / "there"):
         one = Completion(task="SayGoodDay", prompt=0, index=0, program=GREETS)
         with pytest.raises(KeyboardInterrupt):
-            Run(path).keep(Interrupted([one]))
+            RunFolder(path).keep(Interrupted([one]))
     assert sorted(path.name for path in tmp_path.rglob("*")) == [".lock", "there"]
 
 
@@ -368,9 +368,9 @@ def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> Non
     script = (
         "import pathlib, resource, signal\n"
         "from roboeval.evaluation.evaluate import evaluate_run\n"
-        "from roboeval.evaluation.runs.folder import Run\n"
+        "from roboeval.evaluation.runs.folder import RunFolder\n"
         "from roboeval.suites.load import load_suite\n"
-        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        f"run = RunFolder(pathlib.Path({str(run.path)!r}))\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "rows = evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=1)\n"
         "next(rows)\n"
@@ -387,7 +387,7 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     row = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": GREETS, "usage": {"output": 7}}
     path = tmp_path / "rows.jsonl"
     path.write_bytes(to_line(row))
-    run = Run(tmp_path / "run")
+    run = RunFolder(tmp_path / "run")
     run.keep(open_source(str(path), paper).completions)
     assert [c.row for c in read_completions(run.completions)] == [row]
     assert Completion.of(row).key == ("SayGoodDay", 0, 0)
@@ -396,10 +396,10 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
 def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", ["def task_program(): pass\n"])
     judged(run, paper)
-    run.head("paper").unlink()
+    run.manifest("paper").unlink()
     with pytest.raises(UserError, match="--redo") as error:
         judged(run, paper)
-    assert error.value.file == run.head("paper")
+    assert error.value.file == run.manifest("paper")
 
 
 def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(

@@ -40,7 +40,7 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
         "a/T_0_10.py": FILE,
         "b/T_0_9.py": FILE,
         "B_1_0.py": FILE,
-        "notes.py": b"\xff\xfe",
+        "__MACOSX/a/._T_0_10.py": b"\xff\xfe",
         "T_0_1.txt": b"\xff",
         "README": "x" * 6_000_000,
         "T_0_0.py/": "",
@@ -94,8 +94,16 @@ def test_two_files_of_one_completion(tmp_path: Path) -> None:
     assert "T/0/1" in error_about(tmp_path / "b.zip").sentence
 
 
+@pytest.mark.parametrize("name", ["notes.py", "T_0_9999999999.py"])
+def test_a_misnamed_program_is_refused(tmp_path: Path, name: str) -> None:
+    path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE, name: FILE})
+    error = error_about(path)
+    assert str(error.file) == f"{path}/{name}"
+    assert "TASK_PROMPT_INDEX.py" in error.sentence
+
+
 def test_nothing_that_is_no_completion(tmp_path: Path) -> None:
-    path = zipped(tmp_path / "a.zip", {"notes.py": FILE, "T_0_0.py/": "", "T_0_9999999999.py": FILE})
+    path = zipped(tmp_path / "a.zip", {"notes.txt": FILE, "T_0_0.py/": ""})
     error = error_about(path)
     assert error.file == path
     assert "TASK_PROMPT_INDEX.py" in error.sentence

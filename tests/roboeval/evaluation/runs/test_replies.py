@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
-from roboeval.cli.views.completions import MOST_REPLY, completion_view
+from roboeval.cli.views.completions import SHOWN_REPLY_CHARACTERS, completion_view
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.replies import reply_data, reply_facts
@@ -83,7 +83,7 @@ def test_replies_are_text_and_bounded() -> None:
     more = {
         **WRITTEN.more,
         "reasoning": HOSTILE,
-        "raw_reply": "x" * (MOST_REPLY + 7),
+        "raw_reply": "x" * (SHOWN_REPLY_CHARACTERS + 7),
         "finish_reason": HOSTILE,
     }
     text = view(replace(WRITTEN, more=more), with_reply=True)

@@ -13,7 +13,7 @@ import pytest
 from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite
@@ -23,7 +23,7 @@ PLACES = 60
 Parts = tuple[Any, ...]
 
 
-def completions(run: Run, count: int) -> None:
+def completions(run: RunFolder, count: int) -> None:
     rows = (
         {"task": "LunchTime", "prompt": 0, "index": n, "program": f"go_to('office {n}')\nsay('Hi!')\n"}
         for n in range(count)
@@ -31,25 +31,25 @@ def completions(run: Run, count: int) -> None:
     run.completions.write_bytes(b"".join(map(to_line, rows)))
 
 
-def judged(run: Run, suite: Suite) -> list[Row]:
+def judged(run: RunFolder, suite: Suite) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=False))
 
 
-def read(run: Run, **how: Any) -> Results:  # noqa: ANN401 - as read_results takes it
+def read(run: RunFolder, **how: Any) -> Results:  # noqa: ANN401 - as read_results takes it
     return read_results(run, "paper", **how)
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory, paper: Suite) -> Run:
-    run = Run(tmp_path_factory.mktemp("run"))
+def finished(tmp_path_factory: pytest.TempPathFactory, paper: Suite) -> RunFolder:
+    run = RunFolder(tmp_path_factory.mktemp("run"))
     completions(run, 3)
     judged(run, paper)
     return run
 
 
 @pytest.fixture
-def run(finished: Run, tmp_path: Path) -> Run:
-    again = Run(tmp_path / "run")
+def run(finished: RunFolder, tmp_path: Path) -> RunFolder:
+    again = RunFolder(tmp_path / "run")
     for path in (finished.completions, *finished.rows("").parent.iterdir()):
         copy = again.path / path.relative_to(finished.path)
         copy.parent.mkdir(parents=True, exist_ok=True)
@@ -57,21 +57,29 @@ def run(finished: Run, tmp_path: Path) -> Run:
     return again
 
 
-def head(run: Run) -> dict[str, Any]:
-    return json.loads(run.head("paper").read_text())  # type: ignore[no-any-return]  # JSON
+def head(run: RunFolder) -> dict[str, Any]:
+    return json.loads(run.manifest("paper").read_text())  # type: ignore[no-any-return]  # JSON
 
 
-def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: Run) -> None:
+def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: RunFolder) -> None:
     content = run.rows("paper").read_bytes()
     assert (head(run)["rows"], head(run)["sha256"]) == (3, hashlib.sha256(content).hexdigest())
     assert len(read(run).places) == 3
 
 
-def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
+def test_only_the_rows_of_a_named_task_are_read(run: RunFolder) -> None:
+    lines: list[bytes] = []
+    assert (len(read(run, task="LunchTime", on_line=lines.append).places), len(lines)) == (3, 3)
+    assert len(read(run, task="SayGoodDay", on_line=lines.append).table) == 0
+    assert len(lines) == 3
+
+
+def test_no_flipped_bit_is_overlooked(run: RunFolder, paper: Suite) -> None:
     path = run.rows("paper")
     content = path.read_bytes()
     readers: dict[str, Callable[[], object]] = {
         "results": lambda: read(run),
+        "another task": lambda: read(run, task="SayGoodDay"),
         "find": lambda: read(run, on_line=len),
         "evaluate": lambda: judged(run, paper),
     }
@@ -88,7 +96,7 @@ def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
         assert read(run, faults=[]).faults, number
 
 
-def test_a_fault_of_another_file_hides_no_broken_seal(run: Run) -> None:
+def test_a_fault_of_another_file_hides_no_broken_seal(run: RunFolder) -> None:
     path = run.rows("paper")
     path.write_bytes(path.read_bytes().replace(b"office 1", b"office 7", 1))
     run.completions.write_bytes(run.completions.read_bytes().replace(b'"prompt"', b'"promt"', 1))
@@ -98,7 +106,7 @@ def test_a_fault_of_another_file_hides_no_broken_seal(run: Run) -> None:
 @pytest.mark.parametrize(
     "damaged", ['{"tosk": "LunchTime"}', '{"task": "LunchTime", "program_sha256": 1}', "{"]
 )
-def test_a_damaged_check_is_said_with_its_line(run: Run, damaged: str) -> None:
+def test_a_damaged_check_is_said_with_its_line(run: RunFolder, damaged: str) -> None:
     checks = run.checks("paper")
     checks.parent.mkdir()
     row = {"task": "LunchTime", "program_sha256": "0", "problems": []}
@@ -109,7 +117,7 @@ def test_a_damaged_check_is_said_with_its_line(run: Run, damaged: str) -> None:
     assert [fault.line for fault in read(run, faults=[]).faults] == [2]
 
 
-def test_rows_that_are_missing_or_too_many_are_noticed(run: Run) -> None:
+def test_rows_that_are_missing_or_too_many_are_noticed(run: RunFolder) -> None:
     lines = run.rows("paper").read_bytes().splitlines(keepends=True)
     for damaged in (lines[:2], [*lines, lines[0]], [*lines, b'{"torn'], [lines[1], lines[0], lines[2]]):
         run.rows("paper").write_bytes(b"".join(damaged))
@@ -117,16 +125,16 @@ def test_rows_that_are_missing_or_too_many_are_noticed(run: Run) -> None:
             read(run)
 
 
-def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: Run, paper: Suite) -> None:
-    sealed = run.head("paper").read_bytes()
+def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: RunFolder, paper: Suite) -> None:
+    sealed = run.manifest("paper").read_bytes()
     unseal(run.path)
     assert len(read(run).places) == 3
     assert read(run, faults=[]).faults == ()
     judged(run, paper)
-    assert run.head("paper").read_bytes() == sealed
+    assert run.manifest("paper").read_bytes() == sealed
 
 
-def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: Run, paper: Suite) -> None:
+def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: RunFolder, paper: Suite) -> None:
     completions(run, 5)
     rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False)
     assert [next(rows)["index"] for _ in range(4)] == [0, 1, 2, 3]
@@ -152,7 +160,9 @@ def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: Run, paper: Su
         (("verdicts", 1, "cut"), {"events": 1}),
     ],
 )
-def test_what_is_unknown_in_a_row_is_refused_with_its_line(run: Run, place: Parts, value: object) -> None:
+def test_what_is_unknown_in_a_row_is_refused_with_its_line(
+    run: RunFolder, place: Parts, value: object
+) -> None:
     rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
     inner = rows[1]
     for part in place[:-1]:

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.trace import Event, Trace, trace_data
-from codebotler.rtl import parse
-from roboeval.evaluation.runs.traces import can_judge, circumstances, first_events, trace_of
+from roboeval.evaluation.runs.traces import circumstances, first_events, trace_of
 
 rooms = st.sampled_from(["hall", "lab"])
 events = st.one_of(
@@ -54,12 +53,3 @@ def test_only_what_changes_is_written() -> None:
     }
     assert circumstances(()) == {"places": []}
     assert circumstances(trace[3:4]) == {"places": [[1, "hall"], [2, "lab"]]}
-
-
-def test_which_formulas_need_them() -> None:
-    old: dict[str, Any] = {"trace": []}
-    for text in ('at("lab", say("x"))', 'holding("mug", say("x"))', 'to("amy", ask("x", "y"))'):
-        for formula in (f"tr.Exists({text})", f'not tr.AfterFirst({text}).Exists(say("x"))'):
-            assert not can_judge(parse(formula), old)
-            assert can_judge(parse(formula), {**old, "places": []})
-    assert can_judge(parse('tr.ActAtFirst("lab", say("x")) and tr.Exists(found("mug"))'), old)

@@ -7,24 +7,24 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
-from functools import cache
+from functools import cache, partial
 from itertools import count
 from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK_FUNCTION, names_bound, parsed
 from roboeval.evaluation.explanation import error_sentence, reason
-from roboeval.evaluation.failures import NO_PROGRAM
-from roboeval.evaluation.runs.completions import Key, name_of
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS
+from roboeval.evaluation.runs.completions import CompletionKey, name_of
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of, key_of
 
-Lines: TypeAlias = tuple[str, ...]
-Change: TypeAlias = tuple[str, str]  # `-`, `+` or a space, and a line of a diff
+ProgramLines: TypeAlias = tuple[str, ...]
+DiffLine: TypeAlias = tuple[str, str]  # `-`, `+` or a space, and a line of a diff
 Cause: TypeAlias = tuple[str, str, str, str | None]  # task, class, kind and failed check
 
-ALIKE = 0.6  # programs of a group share at least this part of their lines
-LONGEST = 20_000  # characters; the rest of a longer program is ignored
-CONTEXT = 2  # lines shown around a change
+MIN_SIMILARITY = 0.6  # programs of a group share at least this part of their lines
+MAX_COMPARED_CHARACTERS = 20_000  # characters; the rest of a longer program is ignored
+DIFF_CONTEXT = 2  # lines shown around a change
 
 
 @dataclass(frozen=True)
@@ -33,17 +33,17 @@ class Fix:
 
     name: str  # the completion that passes
     changed: int  # lines removed or added
-    changes: tuple[Change, ...]  # with context; a line of dots for each gap
+    changes: tuple[DiffLine, ...]  # with context; a line of dots for each gap
 
 
 @dataclass(frozen=True)
-class Cluster:
+class FailureGroup:
     """Completions of one task with similar programs that fail by the same check or error."""
 
     task: str
     failure: Mapping[str, Any]  # the failure of the representative
-    members: tuple[Key, ...]
-    representative: Key  # the first completion with the most frequent program
+    members: tuple[CompletionKey, ...]
+    representative: CompletionKey  # the first completion with the most frequent program
     program: str | None  # the program of the representative; None if it was removed
     reason: Mapping[str, Any]  # why the representative fails, in which world and line
     fix: Fix | None  # None if there is no program, or none that passes
@@ -51,7 +51,7 @@ class Cluster:
     @property
     def has_no_program(self) -> bool:
         """Whether the replies contained no program."""
-        return str(self.failure["class"]) == NO_PROGRAM
+        return str(self.failure["class"]) == NO_PROGRAM_CLASS
 
     @property
     def why(self) -> str:
@@ -66,7 +66,7 @@ class Cluster:
         return sorted({prompt for _, prompt, _ in self.members})
 
 
-def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]]:
+def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str]) -> list[list[Row]]:
     """Group failing completions, the largest groups first; groups of one size take turns by task.
 
     Replies without a program form one group for each task and kind.
@@ -75,7 +75,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[l
     for row in failed:
         why = failure_of(row)
         causes[row["task"], why["class"], why["kind"], why["check"]].append(row)
-    shape_of = cache(shape)
+    shape_of = cache(normalised_lines)
     found = (group for rows in causes.values() for group in _group_similar(rows, programs, shape_of))
     turns: defaultdict[tuple[int, str], Iterator[int]] = defaultdict(count)
     ordered = sorted(found, key=lambda rows: key_of(rows[0]))
@@ -83,54 +83,54 @@ def group_failures(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[l
     return [rows for _, _, rows in sorted(placed, key=lambda one: one[:2])]
 
 
-def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[Cluster]:
+def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[FailureGroup]:
     """Find for each group why it fails, and the smallest fix."""
     programs = results.programs
-    right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
-    for key in sorted(results.passed):
-        if key in programs:
-            right[key[0]].append((name_of(key), programs[key]))
-    candidates = {task: passing_programs(named) for task, named in right.items()}
+    candidates = cache(partial(_passing_of_task, results))
     for rows in groups:
         often = Counter(programs.get(key_of(row)) for row in rows)
         most = max(often.values())
         row = next(row for row in rows if often[programs.get(key_of(row))] == most)
         program = programs.get(key_of(row))
-        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM
-        yield Cluster(
+        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM_CLASS
+        yield FailureGroup(
             task=row["task"],
             failure=failure_of(row),
             members=tuple(sorted(map(key_of, rows))),
             representative=key_of(row),
             program=program,
             reason=reason(row, results.suite, ablated=results.is_ablated),
-            fix=None if has_none else shortest_fix(str(program), candidates.get(row["task"], [])),
+            fix=None if has_none else shortest_fix(str(program), candidates(row["task"])),
         )
 
 
-def nearest_fix(results: Results, key: Key) -> Fix | None:
+def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
     """Find the smallest fix of a completion; None if its program was removed or none passes."""
+    program = results.programs.get(key)
+    return None if program is None else shortest_fix(program, _passing_of_task(results, key[0]))
+
+
+def _passing_of_task(results: Results, task: str) -> list[PassingProgram]:
     programs = results.programs
-    if key not in programs:
-        return None
-    right = (other for other in sorted(results.passed) if other[0] == key[0] and other in programs)
-    return shortest_fix(programs[key], passing_programs((name_of(other), programs[other]) for other in right))
+    right = sorted(key for key in results.passed if key[0] == task and key in programs)
+    return passing_programs((name_of(key), programs[key]) for key in right)
 
 
 def _group_similar(
-    rows: Sequence[Row], programs: Mapping[Key, str], shape_of: Callable[[str], Lines]
+    rows: Sequence[Row], programs: Mapping[CompletionKey, str], shape_of: Callable[[str], ProgramLines]
 ) -> Iterator[list[Row]]:
-    """Group rows with the same cause by the similarity of their programs."""
-    if failure_of(rows[0])["class"] == NO_PROGRAM:
+    if failure_of(rows[0])["class"] == NO_PROGRAM_CLASS:
         yield sorted(rows, key=key_of)
         return
-    of_shape: defaultdict[Lines, list[Row]] = defaultdict(list)
+    of_shape: defaultdict[ProgramLines, list[Row]] = defaultdict(list)
     for row in sorted(rows, key=key_of):
         of_shape[shape_of(programs.get(key_of(row), ""))].append(row)
     leaders: list[tuple[Counter[str], list[Row]]] = []
     for lines, those in sorted(of_shape.items(), key=lambda item: (-len(item[1]), key_of(item[1][0]))):
         counts = Counter(lines)
-        near = next((group for leader, group in leaders if similarity(leader, counts) >= ALIKE), None)
+        near = next(
+            (group for leader, group in leaders if similarity(leader, counts) >= MIN_SIMILARITY), None
+        )
         if near is None:
             leaders.append((counts, those))
         else:
@@ -138,18 +138,18 @@ def _group_similar(
     yield from (group for _, group in leaders)
 
 
-def cluster_data(cluster: Cluster) -> dict[str, Any]:
+def group_data(group: FailureGroup) -> dict[str, Any]:
     """A group as plain data."""
-    fix = cluster.fix
+    fix = group.fix
     return {
-        "task": cluster.task,
-        "size": len(cluster.members),
-        "failure": dict(cluster.failure),
-        "world": cluster.reason["world"],
-        "why": cluster.why,
-        "representative": name_of(cluster.representative),
-        "members": list(map(name_of, cluster.members)),
-        "program": cluster.program,
+        "task": group.task,
+        "size": len(group.members),
+        "failure": dict(group.failure),
+        "world": group.reason["world"],
+        "why": group.why,
+        "representative": name_of(group.representative),
+        "members": list(map(name_of, group.members)),
+        "program": group.program,
         "fix": None
         if fix is None
         else {"program": fix.name, "changed": fix.changed, "difference": list(map("".join, fix.changes))},
@@ -159,9 +159,9 @@ def cluster_data(cluster: Cluster) -> dict[str, Any]:
 # --- similar programs
 
 
-def shape(program: str) -> Lines:
+def normalised_lines(program: str) -> ProgramLines:
     """Normalise a program to lines that do not depend on names, comments and layout."""
-    tree = parsed(program) if len(program) <= LONGEST else None
+    tree = parsed(program) if len(program) <= MAX_COMPARED_CHARACTERS else None
     if not isinstance(tree, ast.Module):
         return _lines(program)
     try:
@@ -175,8 +175,8 @@ def shape(program: str) -> Lines:
         return _lines(program)
 
 
-def _lines(text: str) -> Lines:
-    return tuple(line.rstrip() for line in text[:LONGEST].splitlines() if line.strip())
+def _lines(text: str) -> ProgramLines:
+    return tuple(line.rstrip() for line in text[:MAX_COMPARED_CHARACTERS].splitlines() if line.strip())
 
 
 # The field of each node that holds a name of the program's own choice.
@@ -215,20 +215,20 @@ class PassingProgram:
     """A program that passes, to compare others with."""
 
     name: str
-    lines: Lines
+    lines: ProgramLines
     counts: Counter[str]  # occurrences of each line
 
 
 def passing_programs(named: Iterable[tuple[str, str]]) -> list[PassingProgram]:
     """Distinct programs, each under the first of its names."""
-    first: dict[Lines, str] = {}
+    first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)
     return [PassingProgram(name, lines, Counter(lines)) for lines, name in first.items()]
 
 
-def _split(program: str) -> Lines:
-    return tuple(line.rstrip() for line in program[:LONGEST].strip("\n").splitlines())
+def _split(program: str) -> ProgramLines:
+    return tuple(line.rstrip() for line in program[:MAX_COMPARED_CHARACTERS].strip("\n").splitlines())
 
 
 def shortest_fix(program: str, candidates: Sequence[PassingProgram]) -> Fix | None:
@@ -254,14 +254,14 @@ def _least_changes(one: Counter[str], other: Counter[str]) -> int:
     return ((one - other) + (other - one)).total()
 
 
-def _count_changes(one: Lines, other: Lines) -> int:
+def _count_changes(one: ProgramLines, other: ProgramLines) -> int:
     matcher = SequenceMatcher(None, one, other, autojunk=False)
     return len(one) + len(other) - 2 * sum(block.size for block in matcher.get_matching_blocks())
 
 
-def _changes(one: Lines, other: Lines) -> Iterator[Change]:
+def _changes(one: ProgramLines, other: ProgramLines) -> Iterator[DiffLine]:
     matcher = SequenceMatcher(None, one, other, autojunk=False)
-    for number, group in enumerate(matcher.get_grouped_opcodes(CONTEXT)):
+    for number, group in enumerate(matcher.get_grouped_opcodes(DIFF_CONTEXT)):
         if number or group[0][1] > 0:
             yield " ", "..."
         for tag, a, b, c, d in group:

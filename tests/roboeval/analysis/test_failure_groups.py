@@ -5,9 +5,9 @@ from typing import Any, cast
 
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from made_results import results_of
-from roboeval.analysis.cluster import cluster_data, describe_groups, group_failures, nearest_fix
-from roboeval.cli.views.groups import cluster_view
-from roboeval.evaluation.runs.completions import Key
+from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures, nearest_fix
+from roboeval.cli.views.groups import failure_group_view
+from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
@@ -32,6 +32,7 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
         "line": None,
         "failed_checks": [check],
         "trace": [["goto", "hall"]],
+        "places": [],
     }
     why: Failure = {"class": "TaskCompletionError", "kind": "Location", "world": 1, "check": check}
     first: WorldVerdict = {**verdict, "satisfied": True, "failed_checks": [], "trace": [["say", "x"]]}
@@ -48,7 +49,7 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
 
 def test_same_task_same_check_similar_program() -> None:
     rows = [failed(0, 0), failed(0, 1), failed(1, 0), failed(0, 2), failed(0, 3, check="other()")]
-    programs: dict[Key, str] = {
+    programs: dict[CompletionKey, str] = {
         ("Visit", 0, 0): GOES.format("lab"),
         ("Visit", 0, 1): GOES.format("lab").replace("here", "there"),
         ("Visit", 1, 0): GOES.format("room"),
@@ -74,13 +75,16 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     ran = {"world": "w", "satisfied": False, "status": "python-error", "line": None}
     ran |= {"error": {"kind": "SyntaxError", "message": "invalid syntax"}, "failed_checks": [], "trace": []}
     rows = [{**one, "verdicts": [ran]} for one in rows] + [row(1, 0)]
-    programs: dict[Key, str] = {("Visit", 0, 0): "No.", ("Visit", 0, 1): "I must not do that,\nsince ..."}
+    programs: dict[CompletionKey, str] = {
+        ("Visit", 0, 0): "No.",
+        ("Visit", 0, 1): "I must not do that,\nsince ...",
+    }
     programs |= {("Visit", 0, 2): "", ("Visit", 1, 0): RIGHT}
     results = results_of(rows, SUITE, programs)
     refused, empty = describe_groups(group_failures(cast("list[Row]", rows[:3]), programs), results)
     assert [len(one.members) for one in (refused, empty)] == [2, 1]
     assert (refused.fix, refused.why) == (None, NO_PROGRAM_SENTENCES["refusal"])
-    text = printed(cluster_view(refused))
+    text = printed(failure_group_view(refused))
     assert NO_PROGRAM_SENTENCES["refusal"] in text
     assert 'in "' not in text, "no robot was in a world"
 
@@ -124,13 +128,13 @@ def test_the_representative_is_of_the_most_frequent_program() -> None:
 
 
 def test_a_group_for_machines() -> None:
-    data = json.loads(json.dumps(cluster_data(told())))
+    data = json.loads(json.dumps(group_data(told())))
     assert (data["size"], data["representative"], data["world"]) == (3, "Visit/0/1", "w")
     assert '+    say("me")' in data["fix"]["difference"]
 
 
 def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
-    shown = printed(cluster_view(told(f"say({HOSTILE}")), width=200)
+    shown = printed(failure_group_view(told(f"say({HOSTILE}")), width=200)
     assert SHOWN.removesuffix("\\n") in shown
     assert "\x1b" not in shown
     assert shown.startswith("3 completions of Visit, failed check: Location")
@@ -143,7 +147,7 @@ def test_programs_that_are_gone() -> None:
     (one,) = describe_groups([group], results)
     assert one.program is None
     assert one.fix is None
-    assert "no longer in this run" in printed(cluster_view(one), width=200)
+    assert "no longer in this run" in printed(failure_group_view(one), width=200)
 
 
 def test_only_the_world_that_decides_keeps_its_trace() -> None:

@@ -1,0 +1,150 @@
+"""Figures of curves: prompts by threshold of pass@1, and the effect of retries."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.markers import TICKDOWN
+
+from roboeval.analysis.metrics import threshold_curve
+from roboeval.analysis.resample import LIMITS
+from roboeval.report.drawing import (
+    COLOURS,
+    COLUMN_WIDTH,
+    DASHES,
+    FOREGROUND,
+    MARKERS,
+    MAX_COLOURED_RUNS,
+    MAX_LEGEND_NAME,
+    PAGE_WIDTH,
+    PALE,
+    new_figure,
+    share_axis,
+    short_name,
+)
+from roboeval.report.runs import JudgedRun
+
+LABELLED_POWERS = (0.1, 0.01, 0.001)  # labelled on an axis of thresholds
+MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # more labels, if prompts have at most 20 completions
+MIN_LABEL_RATIO = 1.6  # smallest ratio of two labels that do not overlap
+
+Points: TypeAlias = Sequence[tuple[float, float]]
+
+
+def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
+    """Draw the share of prompts by threshold of pass@1, one line per model."""
+    most = most_completions(runs)
+    lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
+    means = [run.mean for run in runs]
+    figure = _plot_lines(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
+    _threshold_axes(figure.axes[0], most)
+    _threshold_labels(figure.axes[0], most)
+    return figure
+
+
+def most_completions(runs: Sequence[JudgedRun]) -> int:
+    """The most completions of any prompt; at least 2, since an axis needs two ends."""
+    return max(2, *(prompt.n for run in runs for score in run.scores for prompt in score.prompts))
+
+
+def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
+    """Draw the share of accepted programs by number of retries, one line per model."""
+    lines = {name: [*enumerate(those)] for name, those in shares.items()}
+    figure = _plot_lines(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
+    axes = figure.axes[0]
+    axes.set_xscale("symlog", linthresh=1)
+    axes.set_xlim(0, LIMITS[-1])
+    axes.set_xticks([*LIMITS], [str(limit) for limit in LIMITS])
+    axes.minorticks_off()
+    share_axis(axes)
+    axes.set_xlabel("retries (at most)")
+    axes.set_ylabel("accepted programs")
+    return figure
+
+
+def _plot_lines(
+    lines: Mapping[str, Points],
+    quality: Sequence[float],
+    height: float,
+    **style: Any,  # noqa: ANN401 - options of matplotlib
+) -> Figure:
+    """Draw a line for each model; only the best have colours if there are too many models."""
+    is_narrow = len(lines) <= MAX_COLOURED_RUNS
+    columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
+    figure = new_figure(
+        COLUMN_WIDTH if is_narrow else PAGE_WIDTH, height + 0.13 * math.ceil(len(lines) / columns)
+    )
+    axes = figure.add_subplot()
+    best = sorted(range(len(lines)), key=lambda number: -quality[number])[:MAX_COLOURED_RUNS]
+    for number, (name, points) in enumerate(lines.items()):
+        if number not in best:
+            axes.plot(*zip(*points, strict=True), color=PALE, linewidth=0.7, zorder=1, **style)
+            continue
+        at = number if is_narrow else best.index(number)
+        look = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
+        look |= {"color": COLOURS[at], "label": short_name(name), "markersize": 3.2, "clip_on": False}
+        axes.plot(*zip(*points, strict=True), **look)
+    if not is_narrow:
+        axes.plot([], [], color=PALE, linewidth=0.7, label=f"{len(lines) - MAX_COLOURED_RUNS} others")
+    figure.legend(loc="outside lower center", ncols=columns, handlelength=3.2)
+    return figure
+
+
+def _steps(points: Points, most: int) -> Points:
+    """The part of a curve down to a threshold of 1 / `most`, the end of the axis."""
+    end = 1 / most
+    shown = [(threshold, share) for threshold, share in points if threshold >= end]
+    return [*shown, (end, shown[-1][1])]
+
+
+def _threshold_axes(axes: Axes, most: int) -> None:
+    """Set the scale and labels of shared axes; setting one of them sets all."""
+    axes.set_xscale("log")
+    axes.set_xlim(1, 1 / most)
+    shown = (*(EXTRA_LABELS if most <= MAX_SHORT_AXIS else ()), *LABELLED_POWERS)
+    marked = [mark for mark in shown if mark * most >= MIN_LABEL_RATIO]
+    axes.set_xticks([1, *marked, 1 / most], ["1", *(f"{power:g}" for power in marked), f"1/{most}"])
+    share_axis(axes)
+
+
+def _threshold_labels(axes: Axes, most: int) -> None:
+    axes.minorticks_off()  # drawing them as one line is much faster
+    marks = (digit * power for power in LABELLED_POWERS for digit in range(2, 10))
+    between = [mark for mark in marks if mark > 1 / most]
+    small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
+    axes.plot(between, [0] * len(between), color=FOREGROUND, clip_on=False, linestyle="none", **small)
+    axes.grid(visible=True, axis="y")
+    axes.set_xlabel("threshold of pass@1")
+    axes.set_ylabel("prompts at or above it")
+
+
+def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
+    """Draw the share of prompts by threshold of pass@1, for each model and limit of retries."""
+    columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MAX_COLOURED_RUNS else 5)
+    rows = math.ceil(len(curves) / columns)
+    figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)
+    all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    _threshold_axes(all_axes[0, 0], most)
+    for axes in all_axes.flat[len(curves) :]:
+        axes.set_visible(False)
+    for axes, (name, of_limits) in zip(all_axes.flat, curves.items(), strict=False):
+        for at, (limit, points) in enumerate(of_limits.items()):
+            axes.plot(
+                *zip(*_steps(points, most), strict=True),
+                color=COLOURS[at - 1] if at else FOREGROUND,
+                linestyle=DASHES[at % len(DASHES)],
+                linewidth=1.3,
+                label=f"{limit} retries" if limit else "no retry",
+                drawstyle="steps-post",
+                clip_on=False,
+            )
+        _threshold_labels(axes, most)
+        axes.set_title(short_name(name), loc="left")
+        axes.label_outer()
+    handles, labels = all_axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5 if columns > 1 else 2, handlelength=3)
+    return figure
