@@ -22,17 +22,19 @@ from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill, SkillTable
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.core.words import counted, listed
 
 TASK_FUNCTION = "task_program"
 LONGEST_PROGRAM = 20_000  # characters of a program that is parsed: at most a tenth of a second
-MOST_NAMES, LONGEST_MISSPELT_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
+MAX_KNOWN_NAMES, MAX_MISSPELT_LENGTH, MAX_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
 NAME_CUTOFF = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
 GIVEN_MODULES = ("time", "sys")  # modules that every program finds imported
-FILE = "<program>"
+SOURCE_NAME = "<program>"
 
-warnings.filterwarnings("ignore", module=FILE)  # about invalid escapes such as "\d" in the programs of models
+warnings.filterwarnings(
+    "ignore", module=SOURCE_NAME
+)  # about invalid escapes such as "\d" in the programs of models
 
 # CPython before 3.13 counts the depth of all trees in the making together: where two threads parse at the
 # same time, one of them gets a SystemError. A forked process must not find the lock closed.
@@ -73,7 +75,7 @@ class Program:
 def parse(source: str) -> ast.Module:
     """The syntax tree of a source, which nobody may change, with the errors of `ast.parse`."""
     with _PARSING:
-        return ast.parse(composed(source), FILE)
+        return ast.parse(compose(source), SOURCE_NAME)
 
 
 @lru_cache(maxsize=8)
@@ -93,35 +95,35 @@ def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
 def parse_expression(source: str) -> ast.expr:
     """The syntax tree of an expression, with the errors of `ast.parse`."""
     with _PARSING:
-        return ast.parse(source, FILE, mode="eval").body
+        return ast.parse(source, SOURCE_NAME, mode="eval").body
 
 
-def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
+def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     """The syntax tree of any text, or why there is none; hostile nesting ends in CPython's own exceptions.
 
     If `compiled` is set, the compiler looks for further errors, such as a stray `return`. On text that others
     wrote, only a closed process may do that.
     """
     if "\0" in source or len(source) > LONGEST_PROGRAM:
-        return _unreadable(source)
+        return _text_flaw(source)
     try:
         tree = parse(source)
         if compiled:
             with _PARSING:
-                compile(tree, FILE, "exec", dont_inherit=True)
+                compile(tree, SOURCE_NAME, "exec", dont_inherit=True)
     except SyntaxError as error:
         return Flaw(error.lineno or None, type(error).__name__, f"the program does not parse: {error.msg}")
     except UnicodeEncodeError as error:
         line = source[: error.start].count("\n") + 1
         return Flaw(line, type(error).__name__, "the program contains a lone surrogate")
     except (RecursionError, MemoryError) as error:
-        return _too_deep(error)
+        return _nesting_flaw(error)
     except (ValueError, OverflowError, SystemError) as error:
         return Flaw(None, type(error).__name__, f"the program cannot be read: {error}")
     return tree
 
 
-def _unreadable(source: str) -> Flaw:
+def _text_flaw(source: str) -> Flaw:
     if len(source) > LONGEST_PROGRAM:
         return Flaw(None, "MemoryError", f"the program is longer than {LONGEST_PROGRAM:,} characters")
     line = source[: source.index("\0")].count("\n") + 1
@@ -138,20 +140,20 @@ def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth valu
     raise ValueError("it is a dictionary or a set")
 
 
-def tree_of(source: str) -> ast.Module:
+def parse_leniently(source: str) -> ast.Module:
     """The syntax tree of a source; an empty one if it does not parse."""
-    tree = parsed(source)
+    tree = parse_program(source)
     return ast.Module([], []) if isinstance(tree, Flaw) else tree
 
 
-def _too_deep(error: Exception) -> Flaw:
+def _nesting_flaw(error: Exception) -> Flaw:
     return Flaw(None, type(error).__name__, "the program is nested too deeply to be checked")
 
 
 # --- what a program defines and calls
 
 
-def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
+def task_definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     """The definitions of `task_program` directly in the module."""
     return [
         node
@@ -160,18 +162,18 @@ def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     ]
 
 
-def bound_names(source: str) -> set[str]:
+def module_bound_names(source: str) -> set[str]:
     """The names that a source defines or imports at module level; none if it does not compile."""
-    return set() if isinstance(parsed(source, compiled=True), Flaw) else _bound_in_module(source)
+    return set() if isinstance(parse_program(source, compiled=True), Flaw) else _bound_in_module(source)
 
 
 def _bound_in_module(source: str) -> set[str]:
     with _PARSING:
-        symbols = symtable.symtable(source, FILE, "exec").get_symbols()
+        symbols = symtable.symtable(source, SOURCE_NAME, "exec").get_symbols()
     return {s.get_name() for s in symbols if s.is_assigned() or s.is_imported()}
 
 
-def names_bound(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
+def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
     """The names that a program defines anywhere, in whatever scope; `*` after `from x import *`."""
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
@@ -192,7 +194,7 @@ def names_bound(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
     """The skills that a program names, unless it redefines them, each with the first line."""
-    rebound = names_bound(tree)
+    rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
         if isinstance(node, ast.Name) and node.id in skills and node.id not in rebound:
@@ -238,23 +240,23 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
 # --- certain errors
 
 
-def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
+def find_flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
     """Find the certain errors of a program, by line; it is compiled, and not run.
 
     Args:
         source: its text, from a trusted author or in a closed process.
         skills: what the program may call.
     """
-    tree = parsed(source, compiled=True)
-    return (tree,) if isinstance(tree, Flaw) else flaws_of(tree, source, skills)
+    tree = parse_program(source, compiled=True)
+    return (tree,) if isinstance(tree, Flaw) else find_tree_flaws(tree, source, skills)
 
 
-def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
+def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
     """The certain errors of a program that compiles, by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:
-        found = [_too_deep(error)]
+        found = [_nesting_flaw(error)]
     return tuple(sorted(dict.fromkeys(found), key=lambda flaw: flaw.line or 0))
 
 
@@ -262,8 +264,8 @@ def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
     """Whether `task_program` is there and can be called without arguments."""
     if TASK_FUNCTION not in _bound_in_module(source):
         yield Flaw(None, "NameError", f"the program defines no {TASK_FUNCTION} at module level")
-    found = entries(tree)
-    if not found or found[-1].decorator_list or TASK_FUNCTION in names_bound(tree, ignoring=found):
+    found = task_definitions(tree)
+    if not found or found[-1].decorator_list or TASK_FUNCTION in all_bound_names(tree, ignoring=found):
         return
     entry = found[-1]
     if isinstance(entry, ast.AsyncFunctionDef):
@@ -280,7 +282,9 @@ def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
 
 def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
     undefined = undefined_names(tree, skills)
-    hints = _meant(tree, dict.fromkeys(name for _, name, is_local in undefined if not is_local), skills)
+    hints = _suggest_names(
+        tree, dict.fromkeys(name for _, name, is_local in undefined if not is_local), skills
+    )
     called = {n.func.id for n in nodes(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
     for line, name, is_local in undefined:
         if is_local:
@@ -295,13 +299,13 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
             yield Flaw(line, "NameError", message, is_misuse=name in called)
 
 
-def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
+def _suggest_names(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
     """The names that may be meant by undefined ones, as far as that is quickly found."""
-    known = sorted({*names_bound(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
+    known = sorted({*all_bound_names(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
-    if len(known) > MOST_NAMES:
+    if len(known) > MAX_KNOWN_NAMES:
         return found
-    for name in islice((one for one in undefined if len(one) <= LONGEST_MISSPELT_NAME), MOST_HINTS):
+    for name in islice((one for one in undefined if len(one) <= MAX_MISSPELT_LENGTH), MAX_HINTS):
         alike = get_close_matches(name, (other for other in known if other != name), n=1, cutoff=NAME_CUTOFF)
         if alike:
             found[name] = alike[0]
@@ -310,21 +314,21 @@ def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> di
 
 def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
     """Calls of skills that cannot succeed."""
-    rebound = names_bound(tree)
+    rebound = all_bound_names(tree)
     if "*" in rebound:
         return
     for node in nodes(tree):
         match node:
             case ast.Call(ast.Name(name)) if name in skills and name not in rebound:
                 is_own = name not in SKILLS
-                yield from (replace(flaw, is_misuse=is_own) for flaw in _wrong_call(node, skills[name]))
+                yield from (replace(flaw, is_misuse=is_own) for flaw in _check_call(node, skills[name]))
 
 
-def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
+def _check_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
     is_open = any(isinstance(a, ast.Starred) for a in node.args) or any(k.arg is None for k in node.keywords)
     if is_open:
         return
-    message = _mismatch(node, skill)
+    message = _describe_mismatch(node, skill)
     if message:
         yield Flaw(node.lineno, "TypeError", message)
         return
@@ -332,12 +336,12 @@ def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
     given |= {k.arg: k.value for k in node.keywords if k.arg}
     for parameter in skill.parameters:
         if parameter.is_options:
-            yield from _wrong_options(given[parameter.name], skill, parameter)
+            yield from _check_options(given[parameter.name], skill, parameter)
         elif skill.name not in SKILLS:
-            yield from _wrong_value(given[parameter.name], skill, parameter)
+            yield from _check_value(given[parameter.name], skill, parameter)
 
 
-def _mismatch(node: ast.Call, skill: Skill) -> str | None:
+def _describe_mismatch(node: ast.Call, skill: Skill) -> str | None:
     """Why the arguments do not fit the skill's parameters, in a sentence."""
     names = [p.name for p in skill.parameters]
     takes = f"{skill.name} takes {listed(names) or 'no arguments'}"
@@ -353,7 +357,7 @@ def _mismatch(node: ast.Call, skill: Skill) -> str | None:
     return f"{takes}, but got {counted(count, 'argument') if count else 'none'}"
 
 
-def _wrong_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
+def _check_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
     """A value that is written where it is passed, and that a skill does not take."""
     try:
         value = ast.literal_eval(node)
@@ -365,12 +369,12 @@ def _wrong_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator
         yield Flaw(node.lineno, "ValueError" if is_choice else "TypeError", message)
 
 
-def _wrong_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
+def _check_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
     what = f"the {parameter.name} of {skill.name}"
     if isinstance(node, ast.List):
         if not node.elts:
             yield Flaw(node.lineno, "AskEmptyOptions", f"{what} are an empty list")
-    elif given := _literal(node):
+    elif given := _name_literal(node):
         yield Flaw(node.lineno, "TypeError", f"{what} must be a list, but {given} is given")
 
 
@@ -383,7 +387,7 @@ _LITERALS: dict[type[ast.expr], str] = {
 }
 
 
-def _literal(node: ast.expr) -> str | None:
+def _name_literal(node: ast.expr) -> str | None:
     """The kind of a literal, in words; None for other expressions."""
     if isinstance(node, ast.Constant):
         return "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"

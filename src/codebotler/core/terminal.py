@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-WIDEST = 10_000
+MAX_PIPE_WIDTH = 10_000
 QUIET_S = 2.0  # after which a command says what it is doing
 
 
 @contextmanager
-def noting_all() -> Iterator[None]:
+def report_problems() -> Iterator[None]:
     """Print logs, warnings and tracebacks as notes while a command runs; an unknown error exits with 1."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # what the terminal cannot show ends no command
@@ -106,7 +106,7 @@ def print_rich(what: RenderableType) -> None:
         drawing.print(what, crop=False)
         return
     if "COLUMNS" not in os.environ:
-        natural = Measurement.get(drawing, drawing.options.update(max_width=WIDEST), what).maximum
+        natural = Measurement.get(drawing, drawing.options.update(max_width=MAX_PIPE_WIDTH), what).maximum
         drawing.width = max(drawing.width, natural)
     with drawing.capture() as drawn:
         drawing.print(what, crop=False)
@@ -153,7 +153,7 @@ def note(sentence: str) -> None:
     print(visible_lines(sentence), file=sys.stderr)
 
 
-def says_yes(question: str) -> bool:
+def confirm(question: str) -> bool:
     """Ask a question on stderr; anything but yes means no."""
     print(f"{visible(question)} [y/N] ", end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in {"y", "yes"}

@@ -25,7 +25,7 @@ class Option(NamedTuple):
     is_text: bool = True
 
 
-def options_of(values: Iterable[object]) -> tuple[Option, ...]:
+def to_options(values: Iterable[object]) -> tuple[Option, ...]:
     """Options as events have them, from what a question offers; options stay as they are."""
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
@@ -83,7 +83,7 @@ class Event:
         values["destination"] = destination
 
 
-def attempted(
+def attempted_event(
     skill: Skill,
     arguments: Sequence[Scalar | tuple[Option, ...] | tuple[Scalar, ...]],
     *,

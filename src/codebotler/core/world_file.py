@@ -208,7 +208,7 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
         alike = get_close_matches(name, skills, 1)
         raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
     row = skills[name]
-    if not row.is_by_lot:
+    if not row.is_random:
         raise ValueError(f"the code of {name} decides what comes of it; say what is true of what it asks for")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)

@@ -15,9 +15,9 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from codebotler.core.errors import UserError, both_ends
+from codebotler.core.errors import UserError, elide_middle
 from codebotler.core.files import read_text
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 
 YamlPath: TypeAlias = tuple[str | int, ...]
 """A path of keys and positions in a file."""
@@ -60,7 +60,7 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
         with suppress(ValueError, LookupError, AttributeError, OverflowError):  # an impossible date, say
             if not is_long:
                 made = super().construct_object(node, deep)
-                return composed(made) if isinstance(made, str) else made  # a list is filled later
+                return compose(made) if isinstance(made, str) else made  # a list is filled later
         problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
         raise _fault(f"{problem}; put quotes around the text", node)
 
@@ -70,7 +70,7 @@ def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
 
 
 def _quoted(value: object) -> str:
-    return both_ends(f'"{value}"' if isinstance(value, str) else str(value), LONGEST_VALUE)
+    return elide_middle(f'"{value}"' if isinstance(value, str) else str(value), LONGEST_VALUE)
 
 
 class YamlFile:
@@ -125,7 +125,7 @@ class YamlFile:
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
-            first, hint = _first(error.errors(include_url=False))
+            first, hint = _select_error(error.errors(include_url=False))
             place = (*at, *first["loc"])
             raise self.wrong(_sentence(first, self._name(place)) + hint, *place) from None
 
@@ -161,7 +161,7 @@ class YamlFile:
                     raise _fault("this key is not text; write one word or put quotes around it", key)
                 if key.tag != TEXT_TAG and not SMALL_NUMBER.fullmatch(key.value):  # hashes may collide
                     raise _fault(f"the key {_quoted(key.value)} is not a text; put quotes around it", key)
-                inner = (*place, composed(key.value))
+                inner = (*place, compose(key.value))
                 if inner in self._lines:
                     raise _fault(f'the key "{key.value}" is repeated; keep one of them', key)
                 self._remember(value, inner)
@@ -188,7 +188,7 @@ FAULT_WORDS = {
     "too_long": "{name} has too many entries; it takes {max_length}",
     "finite_number": "{name} is not a finite number",
 }
-WHAT = (
+VALUE_KINDS = (
     (bool, "a truth value"),
     (int | float, "a number"),
     (str, "a text"),
@@ -198,7 +198,7 @@ WHAT = (
 )
 
 
-def _first(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
+def _select_error(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
     """The error to report, and a hint: a key that is missing may be there, but misspelt."""
     first = errors[0]
     *around, missing = first["loc"] or ("",)
@@ -218,17 +218,17 @@ def _sentence(error: ErrorDetails, name: str) -> str:
             return f'the key "{last}" is missing'
         return f"this entry has too few values; it needs at least {last + 1}"
     if kind in EXPECTED_TYPES:
-        return f"{name} {_instead_of(EXPECTED_TYPES[kind], value)}"
+        return f"{name} {_describe_mismatch(EXPECTED_TYPES[kind], value)}"
     if kind in FAULT_WORDS:
         return FAULT_WORDS[kind].format(name=name, **error.get("ctx", {}))
     plain = error["msg"].removeprefix("Value error, ").replace("Input should be", "it should be")
     return f"{name} is {_quoted(value)}, but {plain[:1].lower()}{plain[1:]}"
 
 
-def _instead_of(expected: str, value: object) -> str:
+def _describe_mismatch(expected: str, value: object) -> str:
     if value is None:
         return "is empty; fill it in or remove it"
-    sentence = f"is {next(word for kind, word in WHAT if isinstance(value, kind))}, not {expected}"
+    sentence = f"is {next(word for kind, word in VALUE_KINDS if isinstance(value, kind))}, not {expected}"
     if expected == "a list" and isinstance(value, Mapping):
         return f'{sentence}; begin each entry with "- "'
     if expected != "a text" or not isinstance(value, int | float | date):

@@ -14,7 +14,7 @@ from uuid import uuid4
 from mcap.writer import Writer
 
 from codebotler import __version__
-from codebotler.core.files import expect_replaceable, written_whole
+from codebotler.core.files import expect_replaceable, open_replacement
 from codebotler.core.world import Point, World
 from codebotler.missions import foxglove
 from codebotler.missions.foxglove import (
@@ -245,5 +245,5 @@ def export(
         path.write_bytes(whole.getvalue())
         return
     temporary = path.with_name(f".{uuid4().hex}.mcap")  # no file of the user's, and no name that is too long
-    with written_whole(path, temporary) as file:
+    with open_replacement(path, temporary) as file:
         file.write(whole.getvalue())

@@ -6,12 +6,12 @@ import hashlib
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
 from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
-from codebotler.prompts import stated
+from codebotler.prompts import clean_instruction
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -38,7 +38,7 @@ class Order:
 
     def __post_init__(self) -> None:
         if not self.has_program:
-            stated(self.instruction)
+            clean_instruction(self.instruction)
 
     @property
     def has_program(self) -> bool:
@@ -65,7 +65,7 @@ class SessionView:
     programless: ProgramlessReply | None = None  # the model's last reply, if that holds no program
     author: str = ""  # the model that wrote it; empty if a person did
     is_written: bool = False  # whether a model is writing now
-    check: Check | None = None  # of this very program
+    check: CheckResult | None = None  # of this very program
     missing_skills: tuple[str, ...] = ()  # that the program calls and the robot lacks, in sentences
     unknown_rooms: tuple[str, ...] = ()  # that the program names and the robot does not know, in sentences
     room_map: RoomMap | None = None  # of the robot, as far as it says

@@ -4,9 +4,9 @@ from codebotler.prompts.rendering import (
     PictureMessage,
     Prompt,
     PromptMessage,
+    clean_instruction,
     prompt_for,
-    stated,
     template_hash,
 )
 
-__all__ = ["PictureMessage", "Prompt", "PromptMessage", "prompt_for", "stated", "template_hash"]
+__all__ = ["PictureMessage", "Prompt", "PromptMessage", "clean_instruction", "prompt_for", "template_hash"]

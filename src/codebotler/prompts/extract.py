@@ -12,10 +12,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from codebotler.core.program import TASK_FUNCTION, Program, bound_names, entries, undefined_names
+from codebotler.core.program import (
+    TASK_FUNCTION,
+    Program,
+    module_bound_names,
+    task_definitions,
+    undefined_names,
+)
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.unicode import composed
-from codebotler.prompts.lines import goes_on, is_code, is_prose, tree_of, trimmed, without_residue
+from codebotler.core.unicode import compose
+from codebotler.prompts.lines import continues_prose, is_code, is_prose, parse_lines, trim, without_residue
 from codebotler.prompts.segments import Segment, answer_of
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
@@ -43,7 +49,7 @@ def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
     Raises:
         EngineError: no isolated process can be started.
     """
-    reply = composed(reply)
+    reply = compose(reply)
     try:
         return ReplyContent(*extract(reply, continues=continues))
     except IsolatedCallError:
@@ -85,7 +91,7 @@ def program_in(text: str) -> str:
 @isolated("def task_program():\n    say('hello')\n")
 def defines_task(text: str) -> bool:
     """Whether a text compiles and binds `task_program` at module level."""
-    return TASK_FUNCTION in bound_names(text)
+    return TASK_FUNCTION in module_bound_names(text)
 
 
 @isolated(
@@ -95,22 +101,22 @@ def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
     """The text of the program in a reply, the reasoning, and whether there is any code."""
     lines = re.split(r"\r\n|\r|\n", reply.removeprefix("\ufeff"))
     if _is_program(lines, continues=continues):
-        return _joined([lines]), "", True
+        return _join([lines]), "", True
     answer, reasoning = answer_of("\n".join(lines), lambda code: _block(code, fenced=True).tree is not None)
     blocks = [block for segment in answer for block in _blocks(segment, continues=continues)]
-    chosen = _chosen(blocks, continues=continues)
+    chosen = _choose(blocks, continues=continues)
     program = "".join(s.text for s in answer) if chosen is None else _with_helpers(chosen, blocks)
     return program, reasoning, bool(blocks)
 
 
 def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
     """Whether all of a reply is the program, whatever its texts look like."""
-    tree = tree_of(lines)
-    is_one = tree is not None and not (continues and len(entries(tree)) > 1)
+    tree = parse_lines(lines)
+    is_one = tree is not None and not (continues and len(task_definitions(tree)) > 1)
     return (
         is_one
-        and len(trimmed(lines)) == len(_stripped(lines))
-        and TASK_FUNCTION in bound_names("\n".join(lines))
+        and len(trim(lines)) == len(_strip_blank_lines(lines))
+        and TASK_FUNCTION in module_bound_names("\n".join(lines))
     )
 
 
@@ -133,7 +139,9 @@ class _Block:
     @property
     def is_outline(self) -> bool:
         """Whether its program is nothing but a docstring, `...` or `pass`."""
-        return self.tree is not None and any(all(map(_is_idle, e.body)) for e in entries(self.tree)[-1:])
+        return self.tree is not None and any(
+            all(map(_is_idle, e.body)) for e in task_definitions(self.tree)[-1:]
+        )
 
 
 def _is_idle(statement: ast.stmt) -> bool:
@@ -149,33 +157,33 @@ def _blocks(segment: Segment, *, continues: bool) -> Iterator[_Block]:
     """All code of a segment, in order: all of it if it parses, and otherwise whatever is no prose."""
     fenced = segment.kind == "fence"
     whole = _block(segment.code, fenced=fenced)
-    found = [whole] if whole.tree else [_block(run, fenced=fenced) for run in _runs(segment.code)]
+    found = [whole] if whole.tree else [_block(run, fenced=fenced) for run in _code_runs(segment.code)]
     for block in found:
         if _code_of(block.lines):
-            yield from _versions(block, continues=continues)
+            yield from _split_versions(block, continues=continues)
 
 
 def _block(lines: Sequence[str], *, fenced: bool) -> _Block:
     """The lines as a block, without what is left of a chat template if they parse only then."""
-    block = _block_as_written(trimmed(lines), fenced=fenced)
+    block = _block_as_written(trim(lines), fenced=fenced)
     if block.tree:
         return block
-    without = _block_as_written(trimmed([without_residue(line) for line in lines]), fenced=fenced)
+    without = _block_as_written(trim([without_residue(line) for line in lines]), fenced=fenced)
     return without if without.tree else block
 
 
 def _block_as_written(lines: Sequence[str], *, fenced: bool) -> _Block:
-    headless = _headless(lines)
-    lines = headless or _dedented(lines)
-    return _Block(lines, tree_of(lines), fenced, headless is not None)
+    headless = _as_body(lines)
+    lines = headless or _dedent(lines)
+    return _Block(lines, parse_lines(lines), fenced, headless is not None)
 
 
-def _runs(lines: Sequence[str]) -> Iterator[list[str]]:
+def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
     """The stretches of lines between paragraphs of prose."""
     run: list[str] = []
     in_prose = False
     for line in lines:
-        in_prose = goes_on(line) if in_prose else is_prose(line)
+        in_prose = continues_prose(line) if in_prose else is_prose(line)
         if not in_prose:
             run.append(line)
         elif run:
@@ -184,7 +192,7 @@ def _runs(lines: Sequence[str]) -> Iterator[list[str]]:
     yield run
 
 
-def _headless(lines: Sequence[str]) -> list[str] | None:
+def _as_body(lines: Sequence[str]) -> list[str] | None:
     """The lines as the body of `task_program`; None if they are none.
 
     A body may lack the indentation of its first line, because the prompt ended with it.
@@ -199,7 +207,7 @@ def _headless(lines: Sequence[str]) -> list[str] | None:
             return None
         return [f"def {TASK_FUNCTION}():", *lines]
     inner = code[1 : next((n for n, i in enumerate(code) if n and not _indent(lines[i])), None)]
-    if not inner or start in (code[0], *inner) or tree_of(lines) is not None:
+    if not inner or start in (code[0], *inner) or parse_lines(lines) is not None:
         return None
     margin = min((_indent(lines[i]) for i in inner), key=len)
     if head.rstrip()[-1] in ":([{,\\" and _indent(lines[inner[0]]) == margin:
@@ -207,14 +215,14 @@ def _headless(lines: Sequence[str]) -> list[str] | None:
     return [f"def {TASK_FUNCTION}():", *lines[: code[0]], margin + head, *lines[code[0] + 1 :]]
 
 
-def _versions(block: _Block, *, continues: bool) -> list[_Block]:
+def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
     """A block cut in front of each further definition of `task_program` and the comment that introduces it.
 
     In a chat, one that parses stays whole, as its last definition counts. A base model goes on with examples.
     """
     lines = block.lines
     starts = [i for i, line in enumerate(lines) if _ENTRY.match(line) and "=" not in line.split("(", 1)[0]]
-    if len(starts) <= 1 or (block.tree and (not continues or len(entries(block.tree)) <= 1)):
+    if len(starts) <= 1 or (block.tree and (not continues or len(task_definitions(block.tree)) <= 1)):
         return [block]
     cuts = [0, *(_introduction(lines, start) for start in starts[1:]), len(lines)]
     parts = [_block(lines[start:end], fenced=block.fenced) for start, end in pairwise(cuts)]
@@ -231,7 +239,7 @@ def _introduction(lines: Sequence[str], start: int) -> int:
 # --- from blocks to the program
 
 
-def _chosen(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
+def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
     """The block that is the program: one that defines it, or else one that could be meant as it.
 
     What a base model writes first goes on from the prompt; in a chat, the last complete one counts that is
@@ -263,7 +271,7 @@ def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
         if missing and not defined:
             others = [i for i, block in enumerate(blocks) if not block.defines_task]
             others += [i for i, block in enumerate(blocks[:at]) if block.defines_task and not block.headless]
-            defined = {i: bound_names("\n".join(blocks[i].lines)) for i in others}
+            defined = {i: module_bound_names("\n".join(blocks[i].lines)) for i in others}
         found = set()
         for i, names in defined.items():
             if i not in kept and names & missing:
@@ -272,8 +280,8 @@ def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
         if not found:
             break
         kept |= found
-        tree = tree_of([_joined(blocks[i].lines for i in sorted(kept))])
-    return _joined(blocks[i].lines for i in sorted(kept))
+        tree = parse_lines([_join(blocks[i].lines for i in sorted(kept))])
+    return _join(blocks[i].lines for i in sorted(kept))
 
 
 def _undefined(tree: ast.Module | None) -> set[str]:
@@ -295,18 +303,18 @@ def _indent(line: str) -> str:
     return line[: len(line) - len(line.lstrip())]
 
 
-def _dedented(lines: Sequence[str]) -> list[str]:
+def _dedent(lines: Sequence[str]) -> list[str]:
     """The lines without the indentation of the first one; a line that lacks it stays as it is."""
     margin = next((_indent(line) for line in lines if line.strip()), "")
     return [line.removeprefix(margin) for line in lines]
 
 
-def _stripped(lines: Sequence[str]) -> Sequence[str]:
+def _strip_blank_lines(lines: Sequence[str]) -> Sequence[str]:
     """The lines without the blank ones at both ends."""
     code = _code_of(lines)
     return lines[code[0] : code[-1] + 1] if code else []
 
 
-def _joined(parts: Iterable[Sequence[str]]) -> str:
+def _join(parts: Iterable[Sequence[str]]) -> str:
     """The parts as one text, each without the blank lines at its ends."""
-    return "\n\n\n".join("\n".join(_stripped(lines)) for lines in parts) + "\n"
+    return "\n\n\n".join("\n".join(_strip_blank_lines(lines)) for lines in parts) + "\n"

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 
-from codebotler.core.program import Flaw, parsed
+from codebotler.core.program import Flaw, parse_program
 
 MARKUP = r"(?:</?[A-Za-z][\w:.-]*>|<[|\uff5c][^<>\n]*[|\uff5c]>|\[/\w+\]|\[[A-Z_]{3,}\])"
 RESIDUE_LINE = re.compile(rf"(?:{MARKUP}\s*)*(?:[Pp]ython3?|py|[Aa]ssistant|model)?")
@@ -44,10 +44,10 @@ def is_prose(line: str) -> bool:
     if INTERJECTION.match(line) or (line.strip() and is_residue(line)):
         return True
     is_sentence = PROSE.match(line) or (re.match(r" ?\S", line) and _has_words(line))
-    return bool(is_sentence) and not is_code(line) and tree_of([line.strip()]) is None
+    return bool(is_sentence) and not is_code(line) and parse_lines([line.strip()]) is None
 
 
-def goes_on(line: str) -> bool:
+def continues_prose(line: str) -> bool:
     """Whether a paragraph of prose goes on with a line, which may look like anything."""
     return bool(line.strip()) and not is_code(without_residue(line))
 
@@ -66,7 +66,7 @@ def is_residue(line: str) -> bool:
     return bool(RESIDUE_LINE.fullmatch(line.strip()))
 
 
-def trimmed(lines: Sequence[str]) -> Sequence[str]:
+def trim(lines: Sequence[str]) -> Sequence[str]:
     """Lines without those at both ends that are blank or left of a chat template."""
     kept = [i for i, line in enumerate(lines) if not is_residue(line)]
     return lines[kept[0] : kept[-1] + 1] if kept else []
@@ -79,12 +79,12 @@ def without_residue(line: str) -> str:
     return line
 
 
-def tree_of(lines: Sequence[str]) -> ast.Module | None:
+def parse_lines(lines: Sequence[str]) -> ast.Module | None:
     """The syntax tree of lines; None if they do not parse."""
-    return _tree_of("\n".join(lines))
+    return _parse_text("\n".join(lines))
 
 
 @lru_cache(maxsize=64)  # more than the texts of a reply that are tried, so that each is parsed once
-def _tree_of(text: str) -> ast.Module | None:
-    tree = parsed(text)
+def _parse_text(text: str) -> ast.Module | None:
+    tree = parse_program(text)
     return None if isinstance(tree, Flaw) else tree

@@ -14,15 +14,18 @@ from string import Template
 from typing import Literal
 
 from codebotler.core.errors import UserError, expect_list
-from codebotler.core.program import TASK_FUNCTION, Flaw, called_skills, parsed, tree_of
+from codebotler.core.program import TASK_FUNCTION, Flaw, called_skills, parse_leniently, parse_program
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.core.words import listed
 
 PROMPT_FOLDER = Path(__file__).parent
 OPENING = f"def {TASK_FUNCTION}():\n"
-MAX_LENGTH, MAX_TRIES = 100_000, 20  # of a reply, within which the end of its function is looked for
+MAX_SEARCHED_LENGTH, MAX_END_TRIES = (
+    100_000,
+    20,
+)  # of a reply, within which the end of its function is looked for
 STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI's endpoint takes no more than four
 
 
@@ -63,9 +66,9 @@ class Prompt:
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
         """The request to write a program again without its problems, each of which is a sentence."""
         listed = "\n".join(f"- {problem}" for problem in problems)
-        answer = PromptMessage("assistant", _fenced(program))
-        repair = PromptMessage("user", _filled("repair", problems=listed))
-        text = _filled(
+        answer = PromptMessage("assistant", _fence(program))
+        repair = PromptMessage("user", _fill("repair", problems=listed))
+        text = _fill(
             "completion-repair", program=_comment(program), problems=_comment(listed), opening=self.opening
         )
         return replace(
@@ -81,7 +84,7 @@ class Prompt:
             why: what was wrong with the reply, in a sentence.
         """
         *before, request = self.messages
-        asked = f"{request.text}\n\n{_filled('no-program', why=why)}"
+        asked = f"{request.text}\n\n{_fill('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
 
     def program_from(self, reply: str) -> str:
@@ -98,15 +101,17 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
     """
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
-    for found in islice(re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_LENGTH)]), MAX_TRIES):
-        if not isinstance(parsed(opening + reply[: found.start()]), Flaw):
+    for found in islice(
+        re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_SEARCHED_LENGTH)]), MAX_END_TRIES
+    ):
+        if not isinstance(parse_program(opening + reply[: found.start()]), Flaw):
             return found.start()
     return end
 
 
-def stated(instruction: str) -> str:
+def clean_instruction(instruction: str) -> str:
     """An instruction without space around it; UserError if it says nothing."""
-    if not (said := composed(instruction.strip())):
+    if not (said := compose(instruction.strip())):
         raise UserError("the instruction is empty; say what the robot should do")
     return said
 
@@ -130,23 +135,22 @@ def prompt_for(
         UserError: the instruction is empty, or the rooms are a single text.
     """
     expect_list(rooms, "the rooms")
-    instruction = stated(instruction)
-    about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
-    about_rules = _filled("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
+    instruction = clean_instruction(instruction)
+    about_rooms = _fill("rooms", rooms=", ".join(rooms)) if rooms else ""
+    about_rules = _fill("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
     wish = "\n\n".join(filter(None, (instruction, about_rooms, about_rules)))
     stubs = [stub(skill) for skill in skills.values()]
     shown = [example for example in examples() if example.skills <= skills.keys()]
-    messages = [PromptMessage("system", _filled("system", skills="\n\n".join(stubs)))]
+    messages = [PromptMessage("system", _fill("system", skills="\n\n".join(stubs)))]
     for example in shown:
         messages.append(PromptMessage("user", example.instruction))
-        messages.append(PromptMessage("assistant", _fenced(example.program)))
+        messages.append(PromptMessage("assistant", _fence(example.program)))
     messages.append(PromptMessage("user", wish))
-    text = _filled(
+    text = _fill(
         "completion",
         skills="\n\n\n".join(stubs),
         examples="\n\n\n".join(
-            _filled("completion-example", instruction=e.instruction, program=e.program.rstrip())
-            for e in shown
+            _fill("completion-example", instruction=e.instruction, program=e.program.rstrip()) for e in shown
         ),
         instruction=_comment(instruction.strip()).removeprefix("# "),
         rooms="".join(_comment(about) + "\n" for about in (about_rooms, about_rules) if about),
@@ -174,7 +178,7 @@ def examples() -> tuple[Example, ...]:
     files = (path.read_text(encoding="utf-8") for path in sorted((PROMPT_FOLDER / "examples").glob("*.txt")))
     parts = (text.partition("\n\n") for text in files)
     return tuple(
-        Example(instruction, program, frozenset(called_skills(tree_of(program))))
+        Example(instruction, program, frozenset(called_skills(parse_leniently(program))))
         for instruction, _, program in parts
     )
 
@@ -193,11 +197,11 @@ def _template(name: str) -> Template:
     return Template((PROMPT_FOLDER / f"{name}.txt").read_text(encoding="utf-8"))
 
 
-def _filled(name: str, **values: str) -> str:
+def _fill(name: str, **values: str) -> str:
     return _template(name).substitute(values).rstrip("\n")
 
 
-def _fenced(program: str) -> str:
+def _fence(program: str) -> str:
     longest = max((len(run) for run in re.findall("`{3,}", program)), default=2)
     fence = "`" * (longest + 1)
     return f"{fence}python\n{program.strip(chr(10))}\n{fence}"

@@ -34,7 +34,7 @@ NEXT_TURN = re.compile(
     r"|^(?:user|human):"
 )
 
-Parses: TypeAlias = Callable[[Sequence[str]], bool]
+ParseTest: TypeAlias = Callable[[Sequence[str]], bool]
 """Whether lines are a program's, or the body of one."""
 
 
@@ -53,7 +53,7 @@ class Segment:
     code: Sequence[str] = ()
 
 
-def answer_of(reply: str, parses: Parses) -> tuple[list[Segment], str]:
+def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
     """The fences and texts of a reply's answer, and its thoughts.
 
     All in front of the last marker of a pair is a thought, as the prompt may hold the first one; but where
@@ -81,9 +81,9 @@ def _first_turn(reply: str) -> str:
     return reply
 
 
-def _segments(reply: str, parses: Parses) -> Iterator[Segment]:
+def _segments(reply: str, parses: ParseTest) -> Iterator[Segment]:
     while reply:
-        start, segment, end = next(_marked(reply, parses), (len(reply), None, len(reply)))
+        start, segment, end = next(_find_marked(reply, parses), (len(reply), None, len(reply)))
         if text := reply[:start]:
             yield Segment("text", text, text.split("\n"))
         if segment:
@@ -91,15 +91,15 @@ def _segments(reply: str, parses: Parses) -> Iterator[Segment]:
         reply = reply[end:]
 
 
-def _marked(reply: str, parses: Parses) -> Iterator[tuple[int, Segment, int]]:
+def _find_marked(reply: str, parses: ParseTest) -> Iterator[tuple[int, Segment, int]]:
     """Where each fence and each thought starts, what it is, and where it ends; only the first is certain."""
     for line in WHOLE_LINE.finditer(reply):
         start, end, text = line.start(), line.end(), line[0]
         if (fence := FENCE_LINE.match(text)) and not _is_in_code(fence, reply[:start]):
-            code, length = _fenced(fence, reply[end:], parses)
+            code, length = _read_fence(fence, reply[end:], parses)
             yield start, Segment("fence", reply[start : end + length], code), end + length
         for marker in _markers_at_ends(text):
-            if found := _thought(marker, reply[start:]):
+            if found := _read_thought(marker, reply[start:]):
                 segment, length = found
                 yield start + marker.start, segment, start + length
 
@@ -114,7 +114,7 @@ def _is_in_code(fence: re.Match[str], before: str) -> bool:
     return not fence["indent"].strip() and len(fence["indent"]) > FENCE_MARGIN and is_code(head)
 
 
-def _fenced(fence: re.Match[str], rest: str, parses: Parses) -> tuple[Sequence[str], int]:
+def _read_fence(fence: re.Match[str], rest: str, parses: ParseTest) -> tuple[Sequence[str], int]:
     """The code behind a fence, and its length with the fence that closes it.
 
     A text in the code may hold a fence, and the last fence may follow on a line of code. So the first end
@@ -192,7 +192,7 @@ def _markers_at_ends(line: str) -> Iterator[_Marker]:
     yield from deque(markers, maxlen=1)
 
 
-def _thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:
+def _read_thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:
     """The thought that a marker of the first line begins or ends, and where it ends; None if it does neither.
 
     A thought without an end was cut off. A pair of any other name holds a thought if a program follows.

@@ -16,7 +16,7 @@ from codebotler.rtl.formulas import (
     Regex,
     Scope,
     Test,
-    Text,
+    TextPattern,
     Without,
     Words,
 )
@@ -46,7 +46,7 @@ __all__ = [
     "RtlSyntaxError",
     "Scope",
     "Test",
-    "Text",
+    "TextPattern",
     "Time",
     "Without",
     "Words",

@@ -77,7 +77,7 @@ class Words(Matcher):
         parts: one or more texts.
     """
 
-    parts: tuple[Text, ...]
+    parts: tuple[TextPattern, ...]
 
     def _matches(self, text: str) -> bool:
         return all(part.matches(text) for part in self.parts)
@@ -86,7 +86,7 @@ class Words(Matcher):
         return f"words({', '.join(map(str, self.parts))})"
 
 
-Text: TypeAlias = Regex | Words | Without | Number | Time | Claim
+TextPattern: TypeAlias = Regex | Words | Without | Number | Time | Claim
 
 
 @dataclass(frozen=True)
@@ -111,15 +111,15 @@ class EventPattern:
     """
 
     kind: str
-    text: Text
-    options: Text | None = None
+    text: TextPattern
+    options: TextPattern | None = None
     mention: bool = False
     place: str | None = None
-    answer: Text | None = None
+    answer: TextPattern | None = None
     found: bool | None = None
-    holding: Text | None = None
-    to: Text | None = None
-    more: tuple[Text, ...] = ()
+    holding: TextPattern | None = None
+    to: TextPattern | None = None
+    more: tuple[TextPattern, ...] = ()
     offers: tuple[int, int | None] | None = None
     has_text: bool = True
     means: str | None = field(default=None, compare=False)

@@ -61,7 +61,7 @@ def visible(trace: Trace) -> tuple[object, ...]:
 
 
 def _test_holds(test: formulas.Test, trace: Trace) -> bool:
-    span = scoped(test.scopes, trace)
+    span = positions_in_scopes(test.scopes, trace)
     match test:
         case formulas.Exists(element):
             return first(element, trace, span) is not None
@@ -147,21 +147,21 @@ def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: ra
     return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
 
 
-def scoped(scopes: tuple[formulas.Scope, ...], trace: Trace) -> range:
+def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> range:
     """The positions of a trace that are within all scopes."""
     span = range(len(trace))
     for scope in scopes:
-        span = narrowed(scope, bound(scope, trace, span), span)
+        span = narrow(scope, bounding_event(scope, trace, span), span)
     return span
 
 
-def bound(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
+def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
     """The position of the event that bounds a scope."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
-def narrowed(scope: formulas.Scope, at: int | None, span: range) -> range:
+def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
     """What is left of a span by a scope whose bound is at a position; all of it, or nothing, without one."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span

@@ -15,7 +15,7 @@ from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import TRUTH_TYPE, ValueType, as_text
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
@@ -70,7 +70,7 @@ def parse(
     Raises:
         RtlSyntaxError: the text is no formula.
     """
-    return _Parser(composed(text), skills, means).formula()
+    return _Parser(compose(text), skills, means).formula()
 
 
 class _Parser:
@@ -203,7 +203,7 @@ class _Parser:
         first, *more = map(self.value, given, types)
         return formulas.EventPattern(kind, first, more=tuple(more))
 
-    def value(self, node: ast.expr, wanted: ValueType) -> formulas.Text:
+    def value(self, node: ast.expr, wanted: ValueType) -> formulas.TextPattern:
         """A text that matches; for a number or a truth value, also itself."""
         if wanted.base == "str":
             text = self.matched(node)
@@ -266,7 +266,7 @@ class _Parser:
             raise self.error(node, f"options takes numbers from 0 to {MOST_OFFERED}, the smaller one first")
         return replace(element, offers=(least, most if len(given) > 1 else None))
 
-    def matched(self, node: ast.expr) -> formulas.Text:
+    def matched(self, node: ast.expr) -> formulas.TextPattern:
         match node:
             case ast.Constant(str()):
                 return formulas.Regex(self.regex(node))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Self
 
 from codebotler.checking.check import check
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
@@ -149,7 +149,9 @@ class Console:
         session.stop_soon(by)
         return True
 
-    def check(self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()) -> Check:
+    def check(
+        self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()
+    ) -> CheckResult:
         """Check a program, one at a time; without a map of the robot's rooms they are taken from it."""
         with self._checking:
             if self._pool is None:

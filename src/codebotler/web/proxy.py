@@ -10,7 +10,7 @@ from typing import Any
 
 from starlette.types import Scope
 
-from codebotler.core.errors import UserError, both_ends
+from codebotler.core.errors import UserError, elide_middle
 from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.chosen import ConfigFile
@@ -49,7 +49,7 @@ class OuterAddress:
         """
         address = cls.found_in(text)
         if address is None:
-            quoted = f'"{both_ends(text, LONGEST)}" is no address of a proxy'
+            quoted = f'"{elide_middle(text, LONGEST)}" is no address of a proxy'
             raise UserError(f"{quoted}; write https://HOST, with :PORT and /PATH if it has them")
         return address
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from nicegui import ui
 
-from codebotler.checking.problems import Check, Sample
-from codebotler.checking.storyboard import cut, event_from_step, steps_of
+from codebotler.checking.problems import CheckResult, Sample
+from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
 from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
@@ -62,7 +62,7 @@ NOWHERE = Reached()
 NONE_FITS = "What happened fits none of the imagined worlds; they are only examples."
 
 
-def draw_strips(check: Check, reached: Reached = NOWHERE) -> None:
+def draw_strips(check: CheckResult, reached: Reached = NOWHERE) -> None:
     """Draw what a robot would do, as far as a check found, and tick off the rooms that it has visited.
 
     A strip that is no longer possible is folded.
@@ -147,17 +147,17 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 # --- which strips and scenes
 
 
-def strips(check: Check) -> list[Strip]:
+def strips(check: CheckResult) -> list[Strip]:
     """One strip for each kind of world that makes a difference: those that show a problem first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
-        different.setdefault((strip.scenes, strip.ending), (sample.number in check.showing, strip))
+        different.setdefault((strip.scenes, strip.ending), (sample.number in check.evidence, strip))
     ranked = sorted(different.values(), key=lambda each: (not each[0], not each[1].ends_well))
     return [strip for _, strip in ranked[:MOST_STRIPS]]
 
 
-def _strip(sample: Sample, check: Check) -> Strip:
+def _strip(sample: Sample, check: CheckResult) -> Strip:
     error = sample.outcome.error
     if sample.in_vain:
         ending = "The robot waits or searches without success, which is not counted as a problem."
@@ -175,7 +175,7 @@ def scenes(
 ) -> tuple[Scene, ...]:
     """The scenes of a trace from its start on; of a long one its ends, and the steps that are needed."""
     found: list[Scene] = [Scene(shortened(start, MOST_TEXT))]
-    for is_shown, some in cut(steps, needed):
+    for is_shown, some in select_steps(steps, needed):
         if not is_shown:
             found.append(Scene(LEFT_OUT, (Deed("more", f"{len(some):,} more steps"),)))
             continue

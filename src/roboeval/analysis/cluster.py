@@ -11,7 +11,7 @@ from functools import cache
 from itertools import count
 from typing import Any, TypeAlias
 
-from codebotler.core.program import TASK_FUNCTION, names_bound, parsed
+from codebotler.core.program import TASK_FUNCTION, all_bound_names, parse_program
 from roboeval.evaluation.explanation import error_sentence, reason
 from roboeval.evaluation.failures import NO_PROGRAM
 from roboeval.evaluation.runs.completions import Key, name_of
@@ -161,12 +161,12 @@ def cluster_data(cluster: Cluster) -> dict[str, Any]:
 
 def shape(program: str) -> Lines:
     """Normalise a program to lines that do not depend on names, comments and layout."""
-    tree = parsed(program) if len(program) <= LONGEST else None
+    tree = parse_program(program) if len(program) <= LONGEST else None
     if not isinstance(tree, ast.Module):
         return _lines(program)
     try:
         nodes = list(ast.walk(tree))
-        bound = names_bound(tree) - {TASK_FUNCTION}
+        bound = all_bound_names(tree) - {TASK_FUNCTION}
         numbers = {name: f"name{number}" for number, name in enumerate(_names_in_order(nodes, bound), 1)}
         for node in nodes:
             _rename(node, numbers)

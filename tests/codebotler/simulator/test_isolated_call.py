@@ -15,7 +15,7 @@ import pytest
 import closed_functions as closed
 from codebotler.checking.check import check
 from codebotler.core import program as programs
-from codebotler.core.program import FILE, LONGEST_PROGRAM
+from codebotler.core.program import LONGEST_PROGRAM, SOURCE_NAME
 from codebotler.prompts.extract import program_in, program_of
 from codebotler.simulator.isolated_call import IsolatedCallError, end_all
 from codebotler.simulator.worker import EngineError
@@ -121,7 +121,7 @@ def no_compiler_(monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.compile
 
     def parse_only(source: Any, filename: str, mode: str, flags: int = 0, *args: Any, **more: Any) -> Any:  # noqa: ANN401 - as the builtin
-        assert filename != FILE or flags & ast.PyCF_ONLY_AST, "a program is compiled in this process"
+        assert filename != SOURCE_NAME or flags & ast.PyCF_ONLY_AST, "a program is compiled in this process"
         return real(source, filename, mode, flags, *args, **more)
 
     def refuse(*_: object) -> None:

@@ -14,7 +14,7 @@ SKILL_FAILED = "SkillFailed"
 """The kind of error where the function of a user's own skill raises what it does not declare."""
 
 
-def called(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
+def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
     """Call the function of a skill; UserError if it returns a value that it does not declare."""
     assert row.does is not None, "the robot was made with it"
     given = [

@@ -11,7 +11,7 @@ from types import ModuleType
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import SKILL_OPTIONS
-from codebotler.core.skills.own_modules import is_own_module, module_of, place_of
+from codebotler.core.skills.own_modules import is_own_module, load_own_module, location_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 
@@ -27,7 +27,7 @@ def skills_from(*files: Path | str) -> SkillTable:
     """
     rows = [*SKILLS.rows]
     for path in {Path(file).resolve(): Path(file) for file in files}.values():
-        found = declared_in(path)
+        found = _declared_skills(path)
         if not found:
             raise UserError("it declares no skill; put @skill above a function", file=path)
         for row in found:
@@ -36,9 +36,9 @@ def skills_from(*files: Path | str) -> SkillTable:
     return SkillTable(tuple(rows)) if files else SKILLS
 
 
-def declared_in(path: Path) -> list[Skill]:
+def _declared_skills(path: Path) -> list[Skill]:
     """The skills that a file declares, in its order."""
-    module = loaded(path)
+    module = load_skill_module(path)
     found = [value for value in vars(module).values() if isinstance(value, Skill)]
     return [row for row in dict.fromkeys(found) if getattr(row.does, "__module__", "") == module.__name__]
 
@@ -46,22 +46,22 @@ def declared_in(path: Path) -> list[Skill]:
 def files_of(skills: SkillTable) -> dict[str, str]:
     """The names of the files that declare skills of a table, each with the SHA-256 of its content."""
     modules = {getattr(row.does, "__module__", "") for row in skills.rows}
-    paths = {Path(place_of(name)) for name in modules if is_own_module(name)}
+    paths = {Path(location_of(name)) for name in modules if is_own_module(name)}
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}
 
 
-def loaded(path: Path) -> ModuleType:
+def load_skill_module(path: Path) -> ModuleType:
     """The module of a file, which is run once; UserError if it cannot be run."""
     try:
-        return module_of(path)
+        return load_own_module(path)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever the file raises
-        raise _refused(path, error) from None
+        raise _as_user_error(path, error) from None
 
 
 UNKNOWN_OPTION = re.compile(r"skill\(\) got an unexpected keyword argument '(\w+)'")
 
 
-def _refused(path: Path, error: BaseException) -> UserError:
+def _as_user_error(path: Path, error: BaseException) -> UserError:
     """Why a file cannot be used, by the line at which it failed."""
     if isinstance(error, UserError) and error.file is not None:
         return error

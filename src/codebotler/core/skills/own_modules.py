@@ -20,7 +20,7 @@ def is_own_module(name: str) -> bool:
     return name.startswith(OWN_MODULES)
 
 
-def module_of(path: Path) -> ModuleType:
+def load_own_module(path: Path) -> ModuleType:
     """The module of a file, which is run once; whatever the file raises is raised here.
 
     Raises:
@@ -50,12 +50,12 @@ def module_of(path: Path) -> ModuleType:
     return module
 
 
-def place_of(module: str) -> str:
+def location_of(module: str) -> str:
     """Where another process finds a module: the path of a user's own file, or the module's name."""
     return str(sys.modules[module].__file__) if is_own_module(module) else module
 
 
-def find_in(place: str, name: str) -> object:
+def find_object(place: str, name: str) -> object:
     """Return what a module calls `name`; `place_of` says where the module is."""
-    module = module_of(Path(place)) if place.endswith(".py") else import_module(place)
+    module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)

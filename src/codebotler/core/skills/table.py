@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn, SupportsIndex
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.own_modules import find_in, place_of
-from codebotler.core.skills.values import TEXT_TYPE, ValueType, possible, written_call
+from codebotler.core.skills.own_modules import find_object, location_of
+from codebotler.core.skills.values import TEXT_TYPE, ValueType, sample_values, written_call
 from codebotler.core.skills.verbs import Verb
 
 
@@ -116,10 +116,10 @@ class Skill:
         name = getattr(self.does, "__module__", "")
         module = sys.modules.get(name)
         if module is not None and getattr(module, self.name, None) is self:
-            return find_in, (place_of(name), self.name)
+            return find_object, (location_of(name), self.name)
         return super().__reduce_ex__(protocol)
 
-    def doing(self, does: Callable[..., Any]) -> Skill:
+    def with_function(self, does: Callable[..., Any]) -> Skill:
         """Return this skill with another function."""
         return replace(self, does=does, is_idle=False)
 
@@ -129,7 +129,7 @@ class Skill:
         return self.recording is not None and self.recording.is_drive
 
     @property
-    def is_by_lot(self) -> bool:
+    def is_random(self) -> bool:
         """Whether its function has no code, so that its results are random."""
         return hasattr(self.does, "__wrapped__")
 
@@ -163,7 +163,7 @@ def _sample(parameter: Parameter) -> object:
     if value.choices:
         one: object = value.choices[0]
     else:
-        one = parameter.name if value.base == "str" else possible(replace(value, is_list=False))[0]
+        one = parameter.name if value.base == "str" else sample_values(replace(value, is_list=False))[0]
     return [one] if value.is_list else one
 
 
@@ -224,9 +224,9 @@ class SkillTable(Mapping[str, Skill]):
         left_out = {*names}
         return SkillTable(tuple(row for row in self.rows if row.name not in left_out))
 
-    def doing(self, **does: Callable[..., Any]) -> SkillTable:
+    def with_functions(self, **does: Callable[..., Any]) -> SkillTable:
         """Return these skills, some with another function."""
-        return SkillTable(tuple(s.doing(does[s.name]) if s.name in does else s for s in self.rows))
+        return SkillTable(tuple(s.with_function(does[s.name]) if s.name in does else s for s in self.rows))
 
     @property
     def idle(self) -> frozenset[str]:

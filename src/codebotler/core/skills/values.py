@@ -13,7 +13,7 @@ Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
 LARGEST_WHOLE_NUMBER = 2**53  # of whole numbers, which JSON and robots carry exactly
-BASES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
+BASE_TYPES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ValueType:
         if self.base is None:
             return "nothing"
         if self.is_list:
-            return f"a list of {PLURALS[self.base]}" if not self.choices else f"a list of {self._listed}"
+            return f"a list of {PLURAL_NAMES[self.base]}" if not self.choices else f"a list of {self._listed}"
         return self._listed if self.choices else named[self.base]
 
     @property
@@ -86,7 +86,7 @@ class ValueType:
         return float(value) if self.base == "float" else value
 
 
-PLURALS: Mapping[Base, str] = {
+PLURAL_NAMES: Mapping[Base, str] = {
     "str": "texts",
     "int": "whole numbers",
     "float": "numbers",
@@ -106,8 +106,8 @@ def value_type(annotation: object) -> ValueType | None:
     """The type that an annotation means; None if it is none of those that skills can have."""
     if annotation is None or annotation is type(None):
         return NO_VALUE
-    if isinstance(annotation, type) and annotation in BASES:
-        return ValueType(BASES[annotation])
+    if isinstance(annotation, type) and annotation in BASE_TYPES:
+        return ValueType(BASE_TYPES[annotation])
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return _one_of(tuple(member.value for member in annotation), annotation)
     if get_origin(annotation) is Literal:
@@ -123,20 +123,20 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
     kinds = {type(choice) for choice in choices}
     if len(kinds) != 1 or not kinds <= {str, int, float}:
         return None
-    return ValueType(BASES[kinds.pop()], choices=choices, enum=enum)
+    return ValueType(BASE_TYPES[kinds.pop()], choices=choices, enum=enum)
 
 
-def possible(value: ValueType) -> tuple[Any, ...]:
+def sample_values(value: ValueType) -> tuple[Any, ...]:
     """Some values of a type, of which a random one is the result."""
     if value.is_list:
-        some = possible(ValueType(value.base, choices=value.choices))
+        some = sample_values(ValueType(value.base, choices=value.choices))
         return [some[0]], [], [some[0], some[-1]]
     if value.base is None:
         return (None,)
-    return value.choices or SAMPLE_VALUES[value.base]
+    return value.choices or SCALAR_SAMPLES[value.base]
 
 
-SAMPLE_VALUES: Mapping[Base, tuple[Scalar, ...]] = {
+SCALAR_SAMPLES: Mapping[Base, tuple[Scalar, ...]] = {
     "bool": (True, False),
     "int": (1, 0, 2, 10),
     "float": (1.0, 0.0, 0.5, 100.0),

@@ -8,11 +8,21 @@ from typing import Any, overload
 
 from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Option
-from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
+from codebotler.rtl.formulas import (
+    ActAtFirst,
+    ActAtSome,
+    And,
+    EventPattern,
+    Formula,
+    Not,
+    Or,
+    Regex,
+    TextPattern,
+)
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.rtl.semantics import is_match
 
-ANY_TEXT = Regex("")
+_MATCH_ANY = Regex("")
 
 
 def elements(formula: Formula) -> Iterator[EventPattern]:
@@ -83,9 +93,9 @@ def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
         EventPattern(
             kind, element.text, element.options, element.mention, more=element.more, offers=element.offers
         ),
-        EventPattern(kind, ANY_TEXT, answer=element.answer, found=element.found),
-        EventPattern(kind, ANY_TEXT, place=element.place),
-        EventPattern(kind, ANY_TEXT, holding=element.holding, to=element.to),
+        EventPattern(kind, _MATCH_ANY, answer=element.answer, found=element.found),
+        EventPattern(kind, _MATCH_ANY, place=element.place),
+        EventPattern(kind, _MATCH_ANY, holding=element.holding, to=element.to),
     )
 
 
@@ -116,7 +126,7 @@ def _distinct_events(
     return distinct.values()
 
 
-def _distinct(texts: Iterable[Text | None]) -> tuple[Text, ...]:
+def _distinct(texts: Iterable[TextPattern | None]) -> tuple[TextPattern, ...]:
     return tuple(dict.fromkeys(text for text in texts if text is not None))
 
 
@@ -140,10 +150,10 @@ def _more(alike: Sequence[EventPattern]) -> Iterable[tuple[str, ...]]:
 
 
 @overload
-def _texts(wanted: Sequence[Text | None]) -> list[str | None]: ...
+def _texts(wanted: Sequence[TextPattern | None]) -> list[str | None]: ...
 @overload
-def _texts(wanted: Sequence[Text | None], nothing: str) -> list[str]: ...
-def _texts(wanted: Sequence[Text | None], nothing: str | None = None) -> list[Any]:
+def _texts(wanted: Sequence[TextPattern | None], nothing: str) -> list[str]: ...
+def _texts(wanted: Sequence[TextPattern | None], nothing: str | None = None) -> list[Any]:
     """Texts that match in all combinations, with a placeholder for a missing text."""
     texts = _distinct(wanted)
     strings = distinct_strings(texts, outer=True) if texts else ()
@@ -152,14 +162,14 @@ def _texts(wanted: Sequence[Text | None], nothing: str | None = None) -> list[An
     return [*dict.fromkeys([nothing, *strings])]
 
 
-def _is_as_empty(string: str, texts: Sequence[Text]) -> bool:
+def _is_as_empty(string: str, texts: Sequence[TextPattern]) -> bool:
     return all(text.matches(string) == text.matches("") for text in texts)
 
 
 def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
     """Options that match in all combinations, and so many of them; one may match what another cannot."""
     texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
-    found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
+    found: dict[frozenset[TextPattern], tuple[Option, ...]] = {frozenset(): ()}
     other: tuple[Option, ...] = ()
     for string in distinct_strings(texts, outer=True):
         matched = frozenset(text for text in texts if text.matches(string))

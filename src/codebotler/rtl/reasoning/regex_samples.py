@@ -18,7 +18,7 @@ _MOST_SPELLED = 16
 _LONGEST = 10_000
 
 
-def failing(pattern: str) -> re.Pattern[str]:
+def failing_regex(pattern: str) -> re.Pattern[str]:
     """A regex that tries all that another one tries, needs no repeat twice, and is never found."""
     tree = parse_tree(pattern)
     _loosen(tree)
@@ -52,7 +52,7 @@ def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Pyt
 @cache
 def samples(pattern: str) -> tuple[str, ...]:
     """Up to four strings in which a regex is found, if possible without outer spaces; may be empty."""
-    words = _spelled_in_all_ways(parse_tree(pattern))
+    words = _spell_in_all_ways(parse_tree(pattern))
     forms = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in words]
     tries = (map(str.strip, forms), forms, _guesses(pattern))
     found = (dict.fromkeys(filter(Regex(pattern).matches, several)) for several in tries)
@@ -62,7 +62,7 @@ def samples(pattern: str) -> tuple[str, ...]:
 def counter_samples(pattern: str) -> list[str]:
     """Strings from the negative lookaheads of a regex, which keep it from being found."""
     denied = (arguments[-1] for op, arguments in parse_tree(pattern) if str(op) == "ASSERT_NOT")
-    words = (word.strip() for tree in denied for word in _spelled_in_all_ways(tree)[:_MOST_SPELLED])
+    words = (word.strip() for tree in denied for word in _spell_in_all_ways(tree)[:_MOST_SPELLED])
     return [*dict.fromkeys(filter(None, words))]
 
 
@@ -72,24 +72,24 @@ def _guesses(pattern: str) -> Iterator[str]:
     return ("".join(random.choices(letters, k=random.randint(0, 8))).strip() for _ in range(3_000))
 
 
-def _spelled_in_all_ways(tree: Tree) -> list[str]:
+def _spell_in_all_ways(tree: Tree) -> list[str]:
     """Spelled without gaps, with gaps, and with gaps and lookaheads last."""
     behind = sorted(tree, key=lambda node: str(node[0]) == "ASSERT")
-    ways = zip_longest(spelled(tree), spelled(tree, " "), spelled(behind, " "))
+    ways = zip_longest(spell_out(tree), spell_out(tree, " "), spell_out(behind, " "))
     return [*dict.fromkeys(text for text in chain.from_iterable(ways) if text is not None)]
 
 
-def spelled(tree: Tree, gap: str = "") -> list[str]:
+def spell_out(tree: Tree, gap: str = "") -> list[str]:
     """Some strings that a tree matches, with a gap wherever it allows any character."""
     texts = [""]
     for op, arguments in tree:
-        parts = _spelled_node(op, arguments, gap)
+        parts = _spell_node(op, arguments, gap)
         texts = [*dict.fromkeys(text + part for part in parts for text in texts)][:_MOST_SPELLED]
     return texts
 
 
-def _spelled_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
-    inner = [spelled(tree, gap) for tree in inner_trees(str(op), arguments)]
+def _spell_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
+    inner = [spell_out(tree, gap) for tree in inner_trees(str(op), arguments)]
     match str(op):
         case "LITERAL":
             return [chr(arguments)]

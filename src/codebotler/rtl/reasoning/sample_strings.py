@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from itertools import chain, combinations, islice, permutations, product
 
-from codebotler.rtl.formulas import Regex, Text, Without, Words
+from codebotler.rtl.formulas import Regex, TextPattern, Without, Words
 from codebotler.rtl.reasoning.regex_samples import counter_samples, samples
 from codebotler.rtl.text.claims import Claim, Number, Time
 
@@ -20,7 +20,7 @@ _MOST_ALIKE = 2
 
 
 @cache
-def distinct_strings(texts: tuple[Text, ...], *, outer: bool = False) -> tuple[str, ...]:
+def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> tuple[str, ...]:
     """A short string for each combination of texts that some candidate matches.
 
     `outer` allows spaces at the ends, which options may have and texts of events may not.
@@ -32,12 +32,12 @@ def distinct_strings(texts: tuple[Text, ...], *, outer: bool = False) -> tuple[s
 
 
 @cache
-def can_match(text: Text, *, outer: bool = False) -> bool:
+def can_match(text: TextPattern, *, outer: bool = False) -> bool:
     """Whether a string was found that matches a text."""
     return any(map(text.matches, _candidates((text,), outer=outer)))
 
 
-def patterns(text: Text) -> Iterator[str]:
+def patterns(text: TextPattern) -> Iterator[str]:
     """The regexes in a text of a formula."""
     match text:
         case Words(parts):
@@ -51,7 +51,7 @@ def patterns(text: Text) -> Iterator[str]:
 
 
 @cache
-def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
+def _candidates(texts: tuple[TextPattern, ...], *, outer: bool) -> tuple[str, ...]:
     regexes = dict.fromkeys(chain.from_iterable(map(patterns, texts)))
     groups = [[*group] for one in regexes for group in (samples(one), counter_samples(one)) if group]
     words = [*dict.fromkeys([*chain.from_iterable(groups), *chain.from_iterable(map(_claims, texts))])]
@@ -61,15 +61,15 @@ def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
         words,
         (f"x{word}x" for word in whole),
         (form for word in whole for form in (f"x {word}", f"{word} x")),
-        _pairs(_told_apart(whole, texts)),
+        _pairs(_distinguishable(whole, texts)),
         _subsets([group[0] for group in groups]),
-        *(_joined(text.parts) for text in texts if isinstance(text, Words)),
+        *(_join_parts(text.parts) for text in texts if isinstance(text, Words)),
         (form for word in words for form in (f" {word}", f"{word} ", f" {word} ")),
     )
     return tuple(dict.fromkeys(text for text in every if outer or text == text.strip()))
 
 
-def _claims(text: Text) -> Iterator[str]:
+def _claims(text: TextPattern) -> Iterator[str]:
     """Strings that make the claim a text asks for, or a different one."""
     match text:
         case Words(parts):
@@ -84,7 +84,7 @@ def _claims(text: Text) -> Iterator[str]:
             return
 
 
-def _told_apart(words: Iterable[str], texts: Sequence[Text]) -> list[str]:
+def _distinguishable(words: Iterable[str], texts: Sequence[TextPattern]) -> list[str]:
     """The first two of any words that the texts, their parts and their regexes do not tell apart."""
     parts = chain.from_iterable(text.parts if isinstance(text, Words) else (text,) for text in texts)
     wanted = [*dict.fromkeys([*parts, *(Regex(pattern) for text in texts for pattern in patterns(text))])]
@@ -104,7 +104,7 @@ def _subsets(words: Sequence[str]) -> Iterator[str]:
     return (" ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1]))
 
 
-def _joined(parts: Sequence[Text]) -> Iterator[str]:
+def _join_parts(parts: Sequence[TextPattern]) -> Iterator[str]:
     """Samples of all parts, in several orders."""
     groups = [
         [word for pattern in patterns(part) for word in samples(pattern)] or [""]

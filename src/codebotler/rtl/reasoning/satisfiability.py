@@ -54,7 +54,7 @@ class Reasoner:
         self._readings: dict[Formula, Reading] = {}
         self._driving: Reading | None = None
         if moves is not None and rooms is not None and any(element.place is not None for element in wanted):
-            self._driving = _driving(self.events, rooms, moves)
+            self._driving = _driving_automaton(self.events, rooms, moves)
 
     def conflict(self, formulas: Sequence[Formula], denied: Formula | None = None) -> list[Formula] | None:
         """The formulas that contradict each other, in their order, or None if all can hold.
@@ -117,7 +117,7 @@ class Reasoner:
         return self._readings[formula]
 
 
-def _driving(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
+def _driving_automaton(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
     """The automaton of the traces in which each event happens where the robot is."""
     lost = len(rooms)
     kinds = [(event.text if event.kind == GOTO else "", event.place) for event in events]
@@ -155,7 +155,7 @@ def _search(
     while heap:
         _, _, state = heapq.heappop(heap)
         if not any(map(getitem, distances, state)):
-            return tuple(reversed([*_back(state, came)]))
+            return tuple(reversed([*_path_back(state, came)]))
         steps = came[state][0] + 1
         here = [*map(getitem, tables, state)]
         for letter, event in letters.items():
@@ -172,7 +172,7 @@ def _search(
     return None
 
 
-def _back(state: States, came: Mapping[States, tuple[int, States, Event | None]]) -> Iterator[Event]:
+def _path_back(state: States, came: Mapping[States, tuple[int, States, Event | None]]) -> Iterator[Event]:
     _, before, event = came[state]
     while event is not None:
         yield event

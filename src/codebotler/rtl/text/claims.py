@@ -63,8 +63,8 @@ def _given(kinds: tuple[re.Pattern[str], ...], text: str) -> frozenset[float]:
     if not any(kind == 0 for part in parts for kind, _ in part):
         no_other = (part for part in parts if not any(kind for kind, _ in part))
         return frozenset(n for part in no_other for _, numbers in part for n in numbers)
-    found = frozenset(n for part in parts for n in _paired(part))
-    return found or frozenset(n for sentence in stated for n in _paired([*_marks(sentence, kinds)]))
+    found = frozenset(n for part in parts for n in _numbers_of_thing(part))
+    return found or frozenset(n for sentence in stated for n in _numbers_of_thing([*_marks(sentence, kinds)]))
 
 
 # "2 people in the offices" are no 2 offices.
@@ -112,7 +112,7 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
             yield start, -end, kind
 
 
-def _paired(marks: list[Mark]) -> Iterator[float]:
+def _numbers_of_thing(marks: list[Mark]) -> Iterator[float]:
     """The numbers of the first thing: those before it, or after it if the marks begin with a thing."""
     ordered = marks if marks and marks[0][0] is None else marks[::-1]
     numbers: tuple[float, ...] = ()

@@ -131,8 +131,8 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     if lists and not sentence.rstrip().endswith("?"):
         sentence = _DASH.sub(", ", sentence)
     rejected = [f"not {match[1]}" for match in _INSTEAD.finditer(sentence)]
-    sentence = _with_exception(_INSTEAD.sub(" ", sentence))
-    parts = [part for half in _at_colon(sentence) for part in _divided(half)]
+    sentence = _split_exception(_INSTEAD.sub(" ", sentence))
+    parts = [part for half in _split_at_colon(sentence) for part in _split_at_joints(half)]
     if sentence.rstrip().endswith("?"):
         parts = [
             part._replace(text=f"{part.text}?")
@@ -140,8 +140,8 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
             else part
             for part in parts
         ]
-    whole = _with_results(_gathered(parts)) if lists else [part.text for part in parts]
-    return [*_with_subjects(whole), *rejected]
+    whole = _join_results(_join_lists(parts)) if lists else [part.text for part in parts]
+    return [*_add_subjects(whole), *rejected]
 
 
 def complete_clauses(parts: Iterable[str]) -> Iterator[str]:
@@ -153,7 +153,7 @@ def complete_clauses(parts: Iterable[str]) -> Iterator[str]:
         names_lack = is_unfinished or _LACK.search(part) is not None
 
 
-def _divided(sentence: str) -> Iterator[_Part]:
+def _split_at_joints(sentence: str) -> Iterator[_Part]:
     joint = ""
     # "She would love to, but is busy" does not affirm.
     for at, piece in enumerate(_JOINT.split(_IN_VAIN.sub("might", sentence))):
@@ -164,7 +164,7 @@ def _divided(sentence: str) -> Iterator[_Part]:
             joint = ""
 
 
-def _with_exception(sentence: str) -> str:
+def _split_exception(sentence: str) -> str:
     """The sentence, with a clause for who is excepted: `all come, without Bob` for `all but Bob come`."""
     match = _EXCEPT.search(sentence)
     if match is None:
@@ -176,7 +176,7 @@ def _with_exception(sentence: str) -> str:
     return f"{rule}, {excepted}"
 
 
-def _with_results(parts: Iterable[str]) -> list[str]:
+def _join_results(parts: Iterable[str]) -> list[str]:
     """The clauses, with what was not found behind where it was sought, as in `I looked, but found none`."""
     whole: list[str] = []
     for part in parts:
@@ -187,7 +187,7 @@ def _with_results(parts: Iterable[str]) -> list[str]:
     return whole
 
 
-def _at_colon(sentence: str) -> list[str]:
+def _split_at_colon(sentence: str) -> list[str]:
     """Both sides of a colon if each is a clause: `You are not alone: Bob comes`, but not `Absent: Bob`."""
     head, colon, tail = sentence.partition(":")
     if colon and denies_something(head) and _VERB.search(_JOINT.split(tail)[0]):
@@ -195,7 +195,7 @@ def _at_colon(sentence: str) -> list[str]:
     return [sentence]
 
 
-def _with_subjects(parts: Iterable[str]) -> list[str]:
+def _add_subjects(parts: Iterable[str]) -> list[str]:
     """The parts, with the subject `room 3` before `no stapler` in `room 3 has paper, but no stapler`."""
     whole: list[str] = []
     for part in parts:
@@ -204,7 +204,7 @@ def _with_subjects(parts: Iterable[str]) -> list[str]:
     return whole
 
 
-def _gathered(parts: Sequence[_Part]) -> Iterator[str]:
+def _join_lists(parts: Sequence[_Part]) -> Iterator[str]:
     waiting: list[_Part] = []
     done: list[str] = []
     for number, part in enumerate(parts, start=1):
@@ -236,7 +236,7 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
     A list ends at a contrast, or where the next clause cannot begin with it. Otherwise, if a list is what the
     clause before ends with, it ends with `and` and one more name: `he has tea and milk, sugar is missing`.
     """
-    if not waiting or _belong(waiting, part.text):
+    if not waiting or _belongs_to_next(waiting, part.text):
         return 0
     joints = [name.joint for name in (*waiting, part)]
     contrasts = [at for at, joint in enumerate(joints) if at and joint not in (",", "and")]
@@ -255,7 +255,7 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
     return ends[-1] if may_list and ends else 0
 
 
-def _belong(waiting: Sequence[_Part], part: str) -> bool:
+def _belongs_to_next(waiting: Sequence[_Part], part: str) -> bool:
     """Whether the words before a clause belong to it: `in room 3, there is one`."""
     if any(_ASKED.search(name.text) for name in waiting):
         return True

@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
@@ -262,7 +262,7 @@ def _at_work(view: SessionView) -> list[dict[str, Any]]:
     return [{"kind": "line", "line": line, "class": kind}] if is_there else []
 
 
-def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
+def _marks(found: CheckResult | None, program: str) -> list[dict[str, Any]]:
     """Problems at their lines: the line is coloured, and the message follows it."""
     if found is None:
         return []

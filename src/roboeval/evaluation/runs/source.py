@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import MAX_ROW, parsed_row, read_lines
+from codebotler.core.files import MAX_ROW, parse_row, read_lines
 from codebotler.models.recorded import RECORDED_NAMES, RecordedModel, open_recorded
 from roboeval.evaluation.runs.completions import COMPLETIONS, EXAMPLE, Completion, read_completions
 from roboeval.evaluation.runs.folder import Run
@@ -57,7 +57,7 @@ def is_answers(path: Path) -> bool:
         return False
     _, line = next(read_lines(path, limit=LONGEST_ANSWER), (0, b""))
     try:
-        row = parsed_row(line)
+        row = parse_row(line)
     except UserError:
         return False
     return row is not None and "custom_id" in row
