@@ -41,7 +41,7 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -> str:
-    """Decode a file's bytes; convert line ends to `\\n` and drop a byte order mark."""
+    """Decode a file's bytes; use newlines as line ends and drop a byte order mark."""
     if len(data) > limit:
         raise UserError(f"is larger than {limit:,} bytes", file=name)
     _expect_not_utf_16(data, name)

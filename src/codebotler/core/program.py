@@ -1,7 +1,7 @@
-"""Programs as text: parsing, the skills they call, and certain errors.
+"""Parse programs, and find the skills they call and certain errors.
 
-Parsing takes linear time, but for texts in which CPython 3.11 is quadratic, so it has a bound. Compiling,
-`symtable` and pyflakes have no bound of their own: on text that others wrote, they run only in isolated
+A limit on the length bounds the time to parse, which is quadratic for some texts in CPython 3.11. Nothing
+bounds the time to compile and to run `symtable` and pyflakes: apply them to untrusted text only in isolated
 processes (`codebotler.simulator.isolated_call`).
 """
 
@@ -26,9 +26,9 @@ from codebotler.core.unicode import compose
 from codebotler.core.words import counted, listed
 
 TASK_FUNCTION = "task_program"
-LONGEST_PROGRAM = 20_000  # characters of a program that is parsed: at most a tenth of a second
-MAX_KNOWN_NAMES, MAX_MISSPELT_LENGTH, MAX_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
-NAME_CUTOFF = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
+MAX_PROGRAM_LENGTH = 20_000  # characters; parsing them takes at most a tenth of a second
+MAX_KNOWN_NAMES, MAX_MISSPELT_LENGTH, MAX_HINTS = 1_000, 60, 10  # limits of hints about misspelt names
+NAME_CUTOFF = 0.65  # the least similarity of a suggested name, from 0 to 1
 GIVEN_MODULES = ("time", "sys")  # modules that every program finds imported
 SOURCE_NAME = "<program>"
 
@@ -36,8 +36,8 @@ warnings.filterwarnings(
     "ignore", module=SOURCE_NAME
 )  # about invalid escapes such as "\d" in the programs of models
 
-# CPython before 3.13 counts the depth of all trees in the making together: where two threads parse at the
-# same time, one of them gets a SystemError. A forked process must not find the lock closed.
+# CPython before 3.13 adds up the depths of the trees that all threads are building: of two threads that
+# parse at the same time, one gets a SystemError. A forked process must not inherit a locked lock.
 _PARSING = threading.Lock()
 os.register_at_fork(
     before=_PARSING.acquire, after_in_parent=_PARSING.release, after_in_child=_PARSING.release
@@ -49,9 +49,9 @@ class Flaw:
     """A certain error of a program."""
 
     line: int | None  # counted from 1; None where no line is to blame
-    kind: str  # of the failure that it leads to, such as `NameError` or `AskEmptyOptions`
+    kind: str  # the kind of failure it leads to, such as `NameError` or `AskEmptyOptions`
     message: str  # one plain sentence
-    is_misuse: bool = False  # of a skill, which an `except` for all errors hides, and does not make right
+    is_misuse: bool = False  # whether it misuses a skill, which a broad `except` hides but does not fix
 
 
 @dataclass(frozen=True)
@@ -73,16 +73,16 @@ class Program:
 
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """The syntax tree of a source, which nobody may change, with the errors of `ast.parse`."""
+    """Return the syntax tree of a source, which callers must not change; raise as `ast.parse` does."""
     with _PARSING:
         return ast.parse(compose(source), SOURCE_NAME)
 
 
 @lru_cache(maxsize=8)
 def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
-    """All nodes of a program's tree, in the order of `ast.walk`."""
+    """Return all nodes of a program's tree, in the order of `ast.walk`."""
     found: list[ast.AST] = [tree]
-    for node in found:  # which grows meanwhile
+    for node in found:  # the list grows as the loop runs
         for name in node._fields:
             part = getattr(node, name, None)
             if isinstance(part, ast.AST):
@@ -93,18 +93,18 @@ def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
 
 
 def parse_expression(source: str) -> ast.expr:
-    """The syntax tree of an expression, with the errors of `ast.parse`."""
+    """Return the syntax tree of an expression; raise as `ast.parse` does."""
     with _PARSING:
         return ast.parse(source, SOURCE_NAME, mode="eval").body
 
 
 def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
-    """The syntax tree of any text, or why there is none; hostile nesting ends in CPython's own exceptions.
+    """Return the syntax tree of any text, or the flaw that prevents parsing.
 
-    If `compiled` is set, the compiler looks for further errors, such as a stray `return`. On text that others
-    wrote, only a closed process may do that.
+    With `compiled`, also find errors of the compiler, such as a stray `return`; only an isolated process may
+    do that with untrusted text.
     """
-    if "\0" in source or len(source) > LONGEST_PROGRAM:
+    if "\0" in source or len(source) > MAX_PROGRAM_LENGTH:
         return _text_flaw(source)
     try:
         tree = parse(source)
@@ -124,14 +124,14 @@ def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
 
 
 def _text_flaw(source: str) -> Flaw:
-    if len(source) > LONGEST_PROGRAM:
-        return Flaw(None, "MemoryError", f"the program is longer than {LONGEST_PROGRAM:,} characters")
+    if len(source) > MAX_PROGRAM_LENGTH:
+        return Flaw(None, "MemoryError", f"the program is longer than {MAX_PROGRAM_LENGTH:,} characters")
     line = source[: source.index("\0")].count("\n") + 1
     return Flaw(line, "SyntaxError", "the program contains a null character")
 
 
 def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth values, lists of them
-    """The value of a literal; a ValueError for others, and for dictionaries and sets: keys may collide."""
+    """Evaluate a literal; raise ValueError for other nodes, dictionaries and sets (hash collisions)."""
     try:
         if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
             return ast.literal_eval(node)
@@ -141,7 +141,7 @@ def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth valu
 
 
 def parse_leniently(source: str) -> ast.Module:
-    """The syntax tree of a source; an empty one if it does not parse."""
+    """Return the syntax tree of a source; an empty tree if it does not parse."""
     tree = parse_program(source)
     return ast.Module([], []) if isinstance(tree, Flaw) else tree
 
@@ -154,7 +154,7 @@ def _nesting_flaw(error: Exception) -> Flaw:
 
 
 def task_definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """The definitions of `task_program` directly in the module."""
+    """Return the definitions of `task_program` at module level."""
     return [
         node
         for node in tree.body
@@ -163,7 +163,7 @@ def task_definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFuncti
 
 
 def module_bound_names(source: str) -> set[str]:
-    """The names that a source defines or imports at module level; none if it does not compile."""
+    """Return the names that a source binds at module level; none if it does not compile."""
     return set() if isinstance(parse_program(source, compiled=True), Flaw) else _bound_in_module(source)
 
 
@@ -174,7 +174,7 @@ def _bound_in_module(source: str) -> set[str]:
 
 
 def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """The names that a program defines anywhere, in whatever scope; `*` after `from x import *`."""
+    """Return the names that a program binds in any scope; `*` after `from x import *`."""
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -193,7 +193,7 @@ def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[s
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """The skills that a program names, unless it redefines them, each with the first line."""
+    """Return the skills that a program uses and does not redefine, each with its first line."""
     rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
@@ -203,14 +203,14 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
-    """The line and name of each use of an undefined name, and whether it is a local one used too early."""
+    """Return line and name of each undefined name, and whether it is a local variable used too early."""
     messages, names_in = _pyflakes()
-    # Names in annotations that are texts are never looked up when a program runs.
+    # Names in string annotations are never looked up at run time.
     spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
     with _PARSING:
         found = names_in(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
     return [
-        # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
+        # pyflakes gives the bare name, not a tuple, where a local variable hides a builtin
         (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
         for m in found
         for is_local in [isinstance(m, messages.UndefinedLocal)]
@@ -220,16 +220,13 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
 
 @cache
 def _pyflakes() -> tuple[Any, Callable[..., Any]]:
-    """What pyflakes says, and what looks for it.
-
-    Imported where it is used: it takes a tenth of a second, which every command line would pay.
-    """
-    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - see above
-    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - the same
+    """Import pyflakes on first use, since that takes a tenth of a second."""
+    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - slow
+    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
     class Names(Checker):  # type: ignore[misc]  # which has no types
         def addBinding(self, node: ast.AST | None, value: Any) -> None:  # noqa: ANN401, N802 - pyflakes' own
-            if node is None:  # built in, like some 170 others of each program
+            if node is None:  # one of some 170 builtins, for which the quick way suffices
                 self.scope[value.name] = value
             else:
                 super().addBinding(node, value)
@@ -241,18 +238,18 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
 
 
 def find_flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """Find the certain errors of a program, by line; it is compiled, and not run.
+    """Find the certain errors of a program, sorted by line, without running it.
 
     Args:
-        source: its text, from a trusted author or in a closed process.
-        skills: what the program may call.
+        source: the program; untrusted text only in an isolated process.
+        skills: the skills that the program may call.
     """
     tree = parse_program(source, compiled=True)
     return (tree,) if isinstance(tree, Flaw) else find_tree_flaws(tree, source, skills)
 
 
 def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """The certain errors of a program that compiles, by line."""
+    """Find the certain errors of a program that compiles, sorted by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:
@@ -261,7 +258,6 @@ def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable = SKILLS) 
 
 
 def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
-    """Whether `task_program` is there and can be called without arguments."""
     if TASK_FUNCTION not in _bound_in_module(source):
         yield Flaw(None, "NameError", f"the program defines no {TASK_FUNCTION} at module level")
     found = task_definitions(tree)
@@ -300,7 +296,7 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 
 
 def _suggest_names(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
-    """The names that may be meant by undefined ones, as far as that is quickly found."""
+    """Suggest known names for undefined ones, within a short time."""
     known = sorted({*all_bound_names(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
     if len(known) > MAX_KNOWN_NAMES:
@@ -313,7 +309,6 @@ def _suggest_names(tree: ast.Module, undefined: Iterable[str], skills: SkillTabl
 
 
 def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
-    """Calls of skills that cannot succeed."""
     rebound = all_bound_names(tree)
     if "*" in rebound:
         return
@@ -325,8 +320,7 @@ def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 
 
 def _check_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
-    is_open = any(isinstance(a, ast.Starred) for a in node.args) or any(k.arg is None for k in node.keywords)
-    if is_open:
+    if any(isinstance(a, ast.Starred) for a in node.args) or any(k.arg is None for k in node.keywords):
         return
     message = _describe_mismatch(node, skill)
     if message:
@@ -342,7 +336,6 @@ def _check_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
 
 
 def _describe_mismatch(node: ast.Call, skill: Skill) -> str | None:
-    """Why the arguments do not fit the skill's parameters, in a sentence."""
     names = [p.name for p in skill.parameters]
     takes = f"{skill.name} takes {listed(names) or 'no arguments'}"
     keywords = [k.arg for k in node.keywords if k.arg]
@@ -358,7 +351,7 @@ def _describe_mismatch(node: ast.Call, skill: Skill) -> str | None:
 
 
 def _check_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
-    """A value that is written where it is passed, and that a skill does not take."""
+    """Find a literal argument that the skill does not accept."""
     try:
         value = ast.literal_eval(node)
     except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):
@@ -388,7 +381,6 @@ _LITERALS: dict[type[ast.expr], str] = {
 
 
 def _name_literal(node: ast.expr) -> str | None:
-    """The kind of a literal, in words; None for other expressions."""
     if isinstance(node, ast.Constant):
         return "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"
     return _LITERALS.get(type(node))

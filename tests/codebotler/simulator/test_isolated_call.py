@@ -15,7 +15,7 @@ import pytest
 import closed_functions as closed
 from codebotler.checking.check import check
 from codebotler.core import program as programs
-from codebotler.core.program import LONGEST_PROGRAM, SOURCE_NAME
+from codebotler.core.program import MAX_PROGRAM_LENGTH, SOURCE_NAME
 from codebotler.prompts.extract import program_in, program_of
 from codebotler.simulator.isolated_call import IsolatedCallError, end_all
 from codebotler.simulator.worker import EngineError
@@ -147,7 +147,7 @@ def test_programs_of_others_are_never_compiled_in_this_process() -> None:
 
 
 def test_program_that_is_too_long_is_not_read() -> None:
-    long = TASK + "# " + "x" * LONGEST_PROGRAM
+    long = TASK + "# " + "x" * MAX_PROGRAM_LENGTH
     assert [problem.kind for problem in check(long).problems] == ["MemoryError"]
 
 
