@@ -1,4 +1,4 @@
-"""The Robot Temporal Logic of the paper: parse a formula, test it on a trace, and say why it fails."""
+"""The Robot Temporal Logic of the paper: parse formulas, evaluate them on traces, explain failures."""
 
 from codebotler.rtl.explanation import Explanation, explain
 from codebotler.rtl.formulas import (

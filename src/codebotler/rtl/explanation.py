@@ -1,4 +1,4 @@
-"""Why a formula does not hold on a trace, in one sentence."""
+"""Explain in one sentence why a formula fails on a trace."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from codebotler.rtl.wording import describe_action, describe_event, elide_list, 
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why a formula fails.
+    """The reason why a formula fails.
 
     Args:
-        clause: the smallest part of the formula, or its negation, that makes it fail; all of it where an
-            option is no text.
-        event: the position in the trace of the event that makes it fail; None for an absence.
-        sentence: the reason for a reader, counting steps from 1.
+        clause: the smallest part of the formula, or its negation, that fails; all of it if an option is not
+            a text.
+        event: the position of the event that makes it fail; None if an event is missing.
+        sentence: the reason in words, with steps counted from 1.
     """
 
     clause: formulas.Formula
@@ -41,12 +41,7 @@ class Explanation:
 
 
 def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
-    """Why a formula fails on a trace; None if it holds.
-
-    Args:
-        formula: what was required.
-        trace: what the robot did.
-    """
+    """Explain why a formula fails on a trace; return None if it holds."""
     try:
         if holds(formula, trace):
             return None
@@ -63,7 +58,7 @@ def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
 
 
 def _join_facts(facts: Sequence[_Fact]) -> str:
-    """Facts that are wrong together; the words `the robot` stand before them."""
+    """Join facts to a predicate of `the robot`."""
     if len(facts) == 1:
         return f"{facts[0].text}{facts[0].ending}{facts[0].detail}"
     missing = [fact for fact in facts if fact.is_missing]
@@ -92,7 +87,7 @@ def _failing_part(formula: formulas.Formula, trace: Trace) -> formulas.Formula:
 def _deciding_tests(
     formula: formulas.Formula, trace: Trace, *, is_true: bool
 ) -> Iterator[tuple[formulas.Test, bool]]:
-    """The tests that make a formula true or false, each with whether it is true itself."""
+    """Yield the tests that decide a formula, each with its own truth."""
     mention = _as_mention(formula)
     if mention is not None and not is_true and not holds(mention, trace):
         yield mention, False
@@ -110,7 +105,7 @@ def _deciding_tests(
 
 
 def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
-    """The one test that `ask(t, ".*") or ask(".*", t)` comes to."""
+    """Return the test with `mention` that is equivalent to `ask(t, ".*") or ask(".*", t)`."""
     match formula:
         case formulas.Or((one, other)) if isinstance(one, formulas.PresenceTest) and isinstance(
             other, formulas.PresenceTest
@@ -125,19 +120,19 @@ def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     return None
 
 
-_MOST_QUOTED = 3  # of what the robot did instead
+_MAX_QUOTED = 3  # other events
 _AtPlace = formulas.ActAtFirst | formulas.ActAtSome
 
 
 class _Fact(NamedTuple):
-    """Whether a test is true, in English; the words `the robot` stand before it."""
+    """The result of a test in English, as a predicate of `the robot`."""
 
     event: int | None
     text: str
-    ending: str = ""  # what was required instead, unless other facts follow
-    detail: str = ""  # what came nearest
-    is_missing: bool = False  # whether it is that the robot did not do something
-    short: str = ""  # the text without what other facts tell already
+    ending: str = ""  # the requirement, unless other facts follow
+    detail: str = ""  # the closest event
+    is_missing: bool = False  # whether the robot failed to do something
+    short: str = ""  # the text without parts that other facts repeat
 
 
 def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
@@ -221,7 +216,7 @@ def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Se
 
 
 def _missing_bound(scopes: tuple[formulas.Scope, ...], trace: Trace) -> formulas.Scope | None:
-    """The first scope that leaves nothing of a trace, since what bounds it never happened."""
+    """Return the first scope that is empty because its bounding event never happened."""
     span = range(len(trace))
     for scope in scopes:
         at = bounding_event(scope, trace, span)
@@ -256,7 +251,7 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
 
 
 def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
-    """The positions of the events that a test looks at."""
+    """Return the positions that a test examines."""
     span = positions_in_scopes(test.scopes, trace)
     match test:
         case formulas.Exists():
@@ -269,9 +264,9 @@ def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
 
 
 def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -> str:
-    """The scopes that bound what is left of a trace, such as ` after going to the lobby (step 1)`.
+    """Describe the scopes, such as ` after going to the lobby (step 1)`.
 
-    Where something is missing, the reader also needs to know after what it was to happen.
+    For a missing event, include bounds that never happened.
     """
     span, ends = range(len(trace)), {"after": "", "before": ""}
     for scope in scopes:
@@ -291,7 +286,7 @@ def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -
 def _describe_instead(
     element: formulas.EventPattern, trace: Trace, here: Sequence[int]
 ) -> tuple[int | None, str]:
-    """What the robot did instead of an element: the same elsewhere, or other things of this kind here."""
+    """Describe a matching event elsewhere, or other events of this kind here."""
     done = [at for at in range(len(trace)) if _is_match(element, trace, at)]
     if done:
         return done[0], f": it did so only at {_steps(done)}"
@@ -303,7 +298,7 @@ def _describe_instead(
         rooms = dict.fromkeys(describe_event(trace[at], element) for at in alike)
         return None, f"{only} {listed(elide_list([*rooms]))}"
     shown = [f"{describe_event(trace[at], element)} (step {at + 1})" for at in alike]
-    return alike[0], f"{only} {listed(elide_list(shown, _MOST_QUOTED))}"
+    return alike[0], f"{only} {listed(elide_list(shown, _MAX_QUOTED))}"
 
 
 def _is_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:

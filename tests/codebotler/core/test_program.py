@@ -209,9 +209,9 @@ def test_threads_parse_at_the_same_time() -> None:
 
 ODD = r"""
 import re
-from codebotler.core.program import flaws, parse_expression
+from codebotler.core.program import find_flaws, parse_expression
 from codebotler.core.world import World
-flaws("def task_program():\n    say('\\d' if 1 is 1 else '')\n")
+find_flaws("def task_program():\n    say('\\d' if 1 is 1 else '')\n")
 parse_expression(r"'\d'")
 re.compile("[[a] nested")
 """

@@ -1,4 +1,4 @@
-"""The types of arguments and results of skills: which values fit, and how programs write them."""
+"""The types of arguments and results of skills, and how programs write their values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeAlias, get_args, get_origin
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
-LARGEST_WHOLE_NUMBER = 2**53  # of whole numbers, which JSON and robots carry exactly
+MAX_INTEGER = 2**53  # JSON and robots carry integers up to this exactly
 BASE_TYPES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
 
 
@@ -21,10 +21,10 @@ class ValueType:
     """The type of an argument or a result of a skill.
 
     Args:
-        base: the type of a single value; None for nothing at all.
+        base: the type of a single value; None for no value.
         is_list: whether it is a list of these values.
-        choices: the only values that fit, if they are listed.
-        enum: what the function of the skill gets for a choice, where it wants no plain value.
+        choices: the allowed values; empty for all of the type.
+        enum: the enumeration that the function of the skill gets instead of a plain choice.
     """
 
     base: Base | None = "str"
@@ -34,19 +34,19 @@ class ValueType:
 
     @property
     def kind(self) -> str:
-        """The type as the sandbox knows it, without what it chooses from."""
+        """The name of the type for the sandbox, without choices."""
         return f"list[{self.base}]" if self.is_list else str(self.base)
 
     @property
     def annotation(self) -> str:
-        """The type as programs and models see it, such as `list[str]` or `Literal["red", "green"]`."""
+        """The annotation for programs and models, such as `list[str]` or `Literal["red", "green"]`."""
         quoted = map(_written, self.choices)
         one = f"Literal[{', '.join(quoted)}]" if self.choices else str(self.base)
         return f"list[{one}]" if self.is_list else one
 
     @property
     def words(self) -> str:
-        """What is expected, in words."""
+        """The expected values, in words."""
         named = {"str": "text", "int": "a whole number", "float": "a number", "bool": "True or False"}
         if self.base is None:
             return "nothing"
@@ -60,7 +60,7 @@ class ValueType:
         return " or ".join([", ".join(quoted[:-1]), quoted[-1]] if quoted[1:] else quoted)
 
     def fits(self, value: object) -> bool:
-        """Whether a value is of this type, exactly; a whole number is a number, too."""
+        """Whether a value has exactly this type; an integer is also a float."""
         if self.base is None:
             return value is None
         if self.is_list:
@@ -73,12 +73,12 @@ class ValueType:
             return False
         if isinstance(value, float) and not isfinite(value):
             return False
-        if given is int and abs(value) > LARGEST_WHOLE_NUMBER:  # type: ignore[arg-type]  # a whole number
+        if given is int and abs(value) > MAX_INTEGER:  # type: ignore[arg-type]  # a whole number
             return False
         return not self.choices or value in self.choices
 
     def wanted(self, value: Any) -> Any:  # noqa: ANN401 - of any of these types
-        """A value that fits as the function of the skill wants it."""
+        """Convert a value of this type for the function of the skill."""
         if isinstance(value, list | tuple):
             return [self.wanted(each) for each in value]
         if self.enum is not None:
@@ -96,14 +96,14 @@ TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
-    """A result without enumerations: each member is replaced by its value."""
+    """Replace members of enumerations by their values."""
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.value if isinstance(value, Enum) else value
 
 
 def value_type(annotation: object) -> ValueType | None:
-    """The type that an annotation means; None if it is none of those that skills can have."""
+    """Return the type that an annotation means; None if skills cannot have it."""
     if annotation is None or annotation is type(None):
         return NO_VALUE
     if isinstance(annotation, type) and annotation in BASE_TYPES:
@@ -127,7 +127,7 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def sample_values(value: ValueType) -> tuple[Any, ...]:
-    """Some values of a type, of which a random one is the result."""
+    """Return some values of a type, as candidates for random results."""
     if value.is_list:
         some = sample_values(ValueType(value.base, choices=value.choices))
         return [some[0]], [], [some[0], some[-1]]
@@ -145,7 +145,7 @@ SCALAR_SAMPLES: Mapping[Base, tuple[Scalar, ...]] = {
 
 
 def written_call(name: str, arguments: Sequence[object]) -> str:
-    """A call as a program writes it, such as `open_door("glass door")`."""
+    """Write a call in Python, such as `open_door("glass door")`."""
     return f"{name}({', '.join(map(_written, arguments))})"
 
 
@@ -156,9 +156,9 @@ def _written(value: object) -> str:
 
 
 def as_text(value: object) -> str:
-    """An argument as events and rules have it: `3`, `0.5`, `red`, `true`, `cup, plate`."""
+    """Write an argument for events and rules: `3`, `0.5`, `red`, `true`, `cup, plate`."""
     if isinstance(value, list | tuple):
         return ", ".join(map(as_text, value))
     if isinstance(value, float) and value.is_integer():
-        return f"{value:.0f}" if value else "0"  # which has a sign
+        return f"{value:.0f}" if value else "0"  # without the sign of -0.0
     return str(value).lower() if isinstance(value, bool) else str(value)
