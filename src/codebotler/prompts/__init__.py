@@ -1,4 +1,4 @@
-"""The prompts of models, made from text files in this folder, and the programs in their replies."""
+"""Prompts for models, from text files in this folder, and programs in their replies."""
 
 from codebotler.prompts.rendering import (
     PictureMessage,

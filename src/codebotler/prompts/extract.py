@@ -1,7 +1,7 @@
-"""Extracts the program from a model's reply, without fixing or completing it.
+"""Extract the program from a model's reply, without fixing or completing it.
 
-A reply is split into thoughts, fenced code and text; fences and text into blocks of code, without prose and
-without what is left of chat templates; of these blocks, one is the program.
+Split the reply into thoughts, fenced code and text, then fences and text into blocks of code without prose
+and marks of chat templates, and choose one block as the program.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from codebotler.prompts.lines import continues_prose, is_code, is_prose, parse_l
 from codebotler.prompts.segments import Segment, answer_of
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
-HELPER_ROUNDS = 20  # helpers of helpers, of which a reply to one instruction has two or three
+MAX_HELPER_DEPTH = 20  # helpers of helpers; replies have two or three levels
 
 
 @dataclass(frozen=True)
 class ReplyContent:
-    """What a model's reply holds.
+    """The parts of a model's reply.
 
     Args:
-        program: the text of the program; the rest of the reply where there is none.
-        reasoning: what the model thought aloud between markers; empty where it did not.
-        has_code: whether any of it, thoughts aside, may be code; False is certain.
+        program: the text of the program, or all of the reply without reasoning.
+        reasoning: the model's reasoning between markers; may be empty.
+        has_code: whether the reply apart from reasoning may have code; False is certain.
     """
 
     program: str
@@ -44,7 +44,7 @@ class ReplyContent:
 
 
 def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
-    """Find the program, the reasoning and any code in a model's whole reply; see `program_of`.
+    """Split a model's complete reply into program and reasoning; see `program_of`.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -57,18 +57,18 @@ def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
 
 
 def program_of(reply: str, *, continues: bool = False) -> Program:
-    """The program in a model's whole reply.
+    """Return the program in a model's complete reply.
 
-    Of several definitions of `task_program`, the last complete one counts. Thoughts between markers such as
-    `<think>` and `</think>` are left out; any other pair of markers is one of thoughts if a program follows
-    it. Whole lines are kept or dropped, and of lines only the marks of chat templates and fences: only what
-    is certainly no code is dropped. A program that was cut off stays cut off.
+    Of several definitions of `task_program`, the last complete one counts. Reasoning between markers such as
+    `<think>` and `</think>` is dropped; other pairs of markers also count if a program follows. Only lines
+    that are certainly not code, and marks of chat templates and fences, are dropped. A program that was cut
+    off stays cut off.
 
     Args:
         reply: code with or without fences and prose, or the indented body of `task_program` alone. One that
-            takes seconds to read is taken for the program as it is.
-        continues: whether a base model wrote it, which goes on from the prompt: then the first version
-            counts, and a next example that follows it is dropped.
+            takes seconds to parse is returned unchanged.
+        continues: whether a base model continued the prompt: then the first version counts, and further
+            examples are dropped.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -77,11 +77,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
 
 
 def program_in(text: str) -> str:
-    """Find the program in a text that may be one, or a model's reply; see `program_of`.
-
-    Args:
-        text: a program that defines `task_program`, in whatever way, stays as it is.
-    """
+    """Return a text that defines `task_program`, or else the program in it; see `program_of`."""
     try:
         return text if defines_task(text) else program_of(text).source
     except IsolatedCallError:
@@ -98,7 +94,7 @@ def defines_task(text: str) -> bool:
     "Here it is:\n```python\ndef task_program():\n    greet()\n```\n```\ndef greet():\n    say('hello')\n```"
 )
 def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
-    """The text of the program in a reply, the reasoning, and whether there is any code."""
+    """Return the program and the reasoning in a reply, and whether there is any code."""
     lines = re.split(r"\r\n|\r|\n", reply.removeprefix("\ufeff"))
     if _is_program(lines, continues=continues):
         return _join([lines]), "", True
@@ -110,7 +106,7 @@ def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
 
 
 def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
-    """Whether all of a reply is the program, whatever its texts look like."""
+    """Whether the complete reply is the program, whatever its strings look like."""
     tree = parse_lines(lines)
     is_one = tree is not None and not (continues and len(task_definitions(tree)) > 1)
     return (
@@ -127,10 +123,10 @@ def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
 class _Block:
     """Lines of a reply that belong together as code."""
 
-    lines: Sequence[str]  # without the indentation they share
+    lines: Sequence[str]  # without common indentation
     tree: ast.Module | None  # None if they do not parse
     fenced: bool
-    headless: bool  # a body, in front of which `def task_program():` was put
+    headless: bool  # whether it was a body, and `def task_program():` was added
 
     @property
     def defines_task(self) -> bool:
@@ -138,7 +134,7 @@ class _Block:
 
     @property
     def is_outline(self) -> bool:
-        """Whether its program is nothing but a docstring, `...` or `pass`."""
+        """Whether its program has only a docstring, `...` or `pass`."""
         return self.tree is not None and any(
             all(map(_is_idle, e.body)) for e in task_definitions(self.tree)[-1:]
         )
@@ -154,7 +150,7 @@ _ENTRY = re.compile(rf"(?:async\s+)?def\s+{TASK_FUNCTION}\b|{TASK_FUNCTION}\s*=(
 
 
 def _blocks(segment: Segment, *, continues: bool) -> Iterator[_Block]:
-    """All code of a segment, in order: all of it if it parses, and otherwise whatever is no prose."""
+    """Yield the blocks of a segment: all of it if it parses, else the parts that are not prose."""
     fenced = segment.kind == "fence"
     whole = _block(segment.code, fenced=fenced)
     found = [whole] if whole.tree else [_block(run, fenced=fenced) for run in _code_runs(segment.code)]
@@ -164,7 +160,7 @@ def _blocks(segment: Segment, *, continues: bool) -> Iterator[_Block]:
 
 
 def _block(lines: Sequence[str], *, fenced: bool) -> _Block:
-    """The lines as a block, without what is left of a chat template if they parse only then."""
+    """Make a block, without marks of a chat template if the lines parse only then."""
     block = _block_as_written(trim(lines), fenced=fenced)
     if block.tree:
         return block
@@ -179,7 +175,7 @@ def _block_as_written(lines: Sequence[str], *, fenced: bool) -> _Block:
 
 
 def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
-    """The stretches of lines between paragraphs of prose."""
+    """Yield the lines between paragraphs of prose."""
     run: list[str] = []
     in_prose = False
     for line in lines:
@@ -193,9 +189,9 @@ def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
 
 
 def _as_body(lines: Sequence[str]) -> list[str] | None:
-    """The lines as the body of `task_program`; None if they are none.
+    """Add a header to the lines if they are the body of `task_program`, else return None.
 
-    A body may lack the indentation of its first line, because the prompt ended with it.
+    The first line may lack its indentation, since the prompt may end with it.
     """
     code = _code_of(lines)
     if not code or is_prose(lines[code[0]].strip()):
@@ -216,9 +212,10 @@ def _as_body(lines: Sequence[str]) -> list[str] | None:
 
 
 def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
-    """A block cut in front of each further definition of `task_program` and the comment that introduces it.
+    """Split a block before each further definition of `task_program` and its comment.
 
-    In a chat, one that parses stays whole, as its last definition counts. A base model goes on with examples.
+    A chat model's block that parses stays whole, as its last definition counts; a base model may continue
+    with further examples.
     """
     lines = block.lines
     starts = [i for i, line in enumerate(lines) if _ENTRY.match(line) and "=" not in line.split("(", 1)[0]]
@@ -230,7 +227,7 @@ def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
 
 
 def _introduction(lines: Sequence[str], start: int) -> int:
-    """The first line of the comments and decorators in front of a definition."""
+    """Return the first line of the comments and decorators before a definition."""
     while start and (not lines[start - 1].strip() or lines[start - 1].startswith(("#", "@"))):
         start -= 1
     return start
@@ -240,10 +237,10 @@ def _introduction(lines: Sequence[str], start: int) -> int:
 
 
 def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
-    """The block that is the program: one that defines it, or else one that could be meant as it.
+    """Choose the block that defines the program, or else one that may be the program.
 
-    What a base model writes first goes on from the prompt; in a chat, the last complete one counts that is
-    more than an outline.
+    A base model's first block continues the prompt; in a chat, the last complete block that is more than an
+    outline counts.
     """
     if continues and blocks and blocks[0].defines_task:
         return blocks[0]
@@ -258,15 +255,12 @@ def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
 
 
 def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
-    """The chosen block with the other blocks that define, at top level, what it lacks.
-
-    An earlier version may hold it, whose `task_program` is then defined anew.
-    """
+    """Add the blocks, possibly earlier versions, that define names which the chosen block lacks."""
     at = blocks.index(chosen)
     kept = {at}
     tree = chosen.tree
     defined: dict[int, set[str]] = {}
-    for _ in range(HELPER_ROUNDS):
+    for _ in range(MAX_HELPER_DEPTH):
         missing = _undefined(tree)
         if missing and not defined:
             others = [i for i, block in enumerate(blocks) if not block.defines_task]
@@ -295,7 +289,7 @@ def _undefined(tree: ast.Module | None) -> set[str]:
 
 
 def _code_of(lines: Sequence[str]) -> list[int]:
-    """The indices of the lines that are not blank."""
+    """Return the indices of the lines that are not blank."""
     return [i for i, line in enumerate(lines) if line.strip()]
 
 
@@ -304,17 +298,16 @@ def _indent(line: str) -> str:
 
 
 def _dedent(lines: Sequence[str]) -> list[str]:
-    """The lines without the indentation of the first one; a line that lacks it stays as it is."""
+    """Remove the indentation of the first line from all lines that have it."""
     margin = next((_indent(line) for line in lines if line.strip()), "")
     return [line.removeprefix(margin) for line in lines]
 
 
 def _strip_blank_lines(lines: Sequence[str]) -> Sequence[str]:
-    """The lines without the blank ones at both ends."""
     code = _code_of(lines)
     return lines[code[0] : code[-1] + 1] if code else []
 
 
 def _join(parts: Iterable[Sequence[str]]) -> str:
-    """The parts as one text, each without the blank lines at its ends."""
+    """Join the parts, each without outer blank lines."""
     return "\n\n\n".join("\n".join(_strip_blank_lines(lines)) for lines in parts) + "\n"

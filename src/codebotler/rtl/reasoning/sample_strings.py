@@ -1,7 +1,6 @@
-"""Strings that match some of the regexes in formulas but not the others.
+"""Generate strings that match some regexes of formulas but not others.
 
-They are put together from samples of the texts' regexes, and each is tried. A combination for which none was
-found may still have one.
+Samples of the regexes are combined and tried, so a combination without a result may still be possible.
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ _MOST_ALIKE = 2
 
 @cache
 def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> tuple[str, ...]:
-    """A short string for each combination of texts that some candidate matches.
+    """Return a short string for each combination of patterns that a candidate matches.
 
-    `outer` allows spaces at the ends, which options may have and texts of events may not.
+    `outer` allows outer spaces, which options may have and texts of events may not.
     """
     found: dict[tuple[bool, ...], str] = {}
     for candidate in _candidates(texts, outer=outer):
@@ -33,12 +32,12 @@ def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> 
 
 @cache
 def can_match(text: TextPattern, *, outer: bool = False) -> bool:
-    """Whether a string was found that matches a text."""
+    """Whether some candidate matches a pattern."""
     return any(map(text.matches, _candidates((text,), outer=outer)))
 
 
 def patterns(text: TextPattern) -> Iterator[str]:
-    """The regexes in a text of a formula."""
+    """Yield the regexes in a text pattern."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(patterns, parts))
@@ -70,7 +69,7 @@ def _candidates(texts: tuple[TextPattern, ...], *, outer: bool) -> tuple[str, ..
 
 
 def _claims(text: TextPattern) -> Iterator[str]:
-    """Strings that make the claim a text asks for, or a different one."""
+    """Yield strings with the claim of a pattern or a different one."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(_claims, parts))
@@ -85,7 +84,7 @@ def _claims(text: TextPattern) -> Iterator[str]:
 
 
 def _distinguishable(words: Iterable[str], texts: Sequence[TextPattern]) -> list[str]:
-    """The first two of any words that the texts, their parts and their regexes do not tell apart."""
+    """Keep the first two of all words that the patterns, their parts and regexes do not distinguish."""
     parts = chain.from_iterable(text.parts if isinstance(text, Words) else (text,) for text in texts)
     wanted = [*dict.fromkeys([*parts, *(Regex(pattern) for text in texts for pattern in patterns(text))])]
     alike: defaultdict[tuple[bool, ...], list[str]] = defaultdict(list)
@@ -99,13 +98,13 @@ def _pairs(words: Sequence[str]) -> Iterator[str]:
 
 
 def _subsets(words: Sequence[str]) -> Iterator[str]:
-    """All choices of three or more words, the largest first, forwards and backwards."""
+    """Yield all subsets of three or more words, the largest first, forwards and backwards."""
     subsets = chain.from_iterable(combinations(words, size) for size in range(len(words), 2, -1))
     return (" ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1]))
 
 
 def _join_parts(parts: Sequence[TextPattern]) -> Iterator[str]:
-    """Samples of all parts, in several orders."""
+    """Yield samples of all parts, in several orders."""
     groups = [
         [word for pattern in patterns(part) for word in samples(pattern)] or [""]
         for part in parts
