@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache, partial
-from typing import Protocol
+from typing import TypeAlias
 
 from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.rooms import add_visited_rooms, room_map_for
@@ -75,7 +74,7 @@ def check(
     with _open_pool(pool, workers) as opened:
         if samples > WORLDS_PER_WORKER and not opened.is_here:
             known = room_map or room_map_for(program, skills=skills)
-            run = _PoolRunner(opened, program, settings)
+            run = _runner_on_pool(opened, program, settings)
             return _run_check(program, known, settings, run, WORLDS_PER_WORKER * opened.workers)
         return opened.call(lambda: check_on(opened.here(), program, room_map, settings))
 
@@ -104,9 +103,10 @@ def check_on(
     """Check one program on a worker that only the calling thread uses."""
     how = settings or CheckSettings()
     worker.begin_to_prepare(program, how.skills, how.rules)
-    run = partial(run_samples, worker, program, settings=how)
+    room_map = room_map or room_map_for(program, skills=how.skills)
+    run = _runner_after(worker, SampledRuns(program, room_map, (), how), {})
     with worker.one_child():
-        return _run_check(program, room_map or room_map_for(program, skills=how.skills), how, run)
+        return _run_check(program, room_map, how, run)
 
 
 def check_together(
@@ -116,74 +116,58 @@ def check_together(
     samplers = first_samplers(settings)[:WORLDS_PER_WORKER]
     first = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     known: list[dict[int, Outcome]] = [{} for _ in programs]
-    for (number, run), outcome in worker.run_tame([runs.job for runs in first]).items():
-        known[number][run] = outcome
+    for (number, run_number), outcome in worker.run_tame([runs.job for runs in first]).items():
+        known[number][run_number] = outcome
     found = []
     for runs, outcomes in zip(first, known, strict=True):
         with worker.one_child():
-            run_more = _WorkerRunner(worker, runs, outcomes)
-            found.append(_run_check(runs.program, runs.room_map, settings, run_more))
+            run = _runner_after(worker, runs, outcomes)
+            found.append(_run_check(runs.program, runs.room_map, settings, run))
     return found
 
 
-class SampleRunner(Protocol):
-    """A function that runs a program in several worlds."""
-
-    def __call__(
-        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
-    ) -> list[Sample]:
-        """Run the program; call `meanwhile` while waiting for it."""
-        ...
+RunSamples: TypeAlias = Callable[[RoomMap, Sequence[FactSampler], Meanwhile], list[Sample]]
+"""Runs a program in several worlds; calls the last argument while waiting for it."""
 
 
-@dataclass(frozen=True)
-class _PoolRunner:
-    """Runs a program on all workers of a pool."""
+def _runner_on_pool(pool: WorkerPool, program: str, settings: CheckSettings) -> RunSamples:
+    def run_share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+        return run_samples(pool.here(), program, room_map, samplers, settings)
 
-    pool: WorkerPool
-    program: str
-    settings: CheckSettings
-
-    def __call__(
-        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
-    ) -> list[Sample]:
-        shares = [samplers[start :: self.pool.workers] for start in range(self.pool.workers)]
-        futures = [self.pool.submit(self._run_share, room_map, each) for each in shares if each]
+    def run(room_map: RoomMap, samplers: Sequence[FactSampler], meanwhile: Meanwhile) -> list[Sample]:
+        shares = [samplers[start :: pool.workers] for start in range(pool.workers)]
+        futures = [pool.submit(run_share, room_map, each) for each in shares if each]
         meanwhile()
         return [sample for future in futures for sample in future.result()]
 
-    def _run_share(self, room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-        return run_samples(self.pool.here(), self.program, room_map, samplers, self.settings)
+    return run
 
 
-@dataclass(frozen=True)
-class _WorkerRunner:
-    """Runs a program on one worker and reuses known outcomes of its first runs."""
+def _runner_after(worker: Worker, first: SampledRuns, outcomes: Mapping[int, Outcome]) -> RunSamples:
+    """Return a function that runs a program on a worker and reuses the outcomes of its first runs."""
 
-    worker: Worker
-    first: SampledRuns
-    outcomes: Mapping[int, Outcome]
-
-    def __call__(
-        self, room_map: RoomMap, samplers: Sequence[FactSampler], /, *, meanwhile: Meanwhile
-    ) -> list[Sample]:
-        first = self.first
+    def run(room_map: RoomMap, samplers: Sequence[FactSampler], meanwhile: Meanwhile) -> list[Sample]:
         if room_map == first.room_map and samplers == first.samplers:
-            return first.samples_on(self.worker, self.outcomes)
-        return run_samples(
-            self.worker, first.program, room_map, samplers, first.settings, meanwhile=meanwhile
-        )
+            return first.samples_on(worker, outcomes)
+        how = first.settings
+        return run_samples(worker, first.program, room_map, samplers, how, meanwhile=meanwhile)
+
+    return run
 
 
 def _run_check(
     program: str,
     room_map: RoomMap,
     settings: CheckSettings,
-    run: SampleRunner,
+    run: RunSamples,
     width: int = WORLDS_PER_WORKER,
 ) -> CheckResult:
     read = cache(partial(read_program, program, room_map, settings.skills))
-    ran = run_in_sampled_worlds(partial(run, meanwhile=read), room_map, settings, width)
+
+    def run_worlds(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+        return run(room_map, samplers, read)
+
+    ran = run_in_sampled_worlds(run_worlds, room_map, settings, width)
     problems = list(read().problems)
     if not read().compiles:
         return CheckResult(tuple(problems), (), room_map, settings.seed, settings.strict)
@@ -191,7 +175,7 @@ def _run_check(
         wider = add_visited_rooms(room_map, ran)
         if wider == room_map:
             break
-        room_map, ran = wider, run_in_sampled_worlds(partial(run, meanwhile=read), wider, settings, width)
+        room_map, ran = wider, run_in_sampled_worlds(run_worlds, wider, settings, width)
     blamed = {problem.line for problem in problems}
     problems += [problem for problem in group_failures(ran, room_map) if problem.line not in blamed]
     problems.sort(key=lambda problem: problem.line or 0)

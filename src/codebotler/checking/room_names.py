@@ -66,7 +66,6 @@ def _drives(skills: SkillTable) -> dict[str, Skill]:
 
 
 def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.Call, ast.expr]]:
-    """Yield each call that drives, and its destination."""
     for node in nodes(tree):
         match node:
             case ast.Call(ast.Name(name), arguments, keywords) if name in drives:
@@ -151,7 +150,6 @@ class _Variables:
                     self._bind(one, value)
 
     def _bind_each(self, target: ast.expr, over: ast.expr) -> None:
-        """Bind the target of a loop to the elements of its iterable."""
         match target, over:
             case ast.Tuple([_, second]), ast.Call(ast.Name("enumerate"), [many, *_]):
                 self._bind_each(second, many)
@@ -170,7 +168,6 @@ class _Variables:
                 self._bind(target, over)
 
     def _compared(self, node: ast.AST, driven: set[str | None]) -> set[TextLiteral]:
-        """Return the texts with which an expression compares a room."""
 
         def is_room(side: ast.expr) -> bool:
             return A_ROOM in self.texts(side) or _variable(side) in driven

@@ -73,7 +73,6 @@ class HouseRuleFile(BaseModel):
         return Rule(self.name, self.says, formula, "always", self.refuse, self.any_)
 
     def _formula(self, text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
-        """Return the formula, or the conjunction of the formulas for all names."""
         if self.for_each is not None and EACH_TAG not in text:
             raise file.wrong(f'"for_each" needs {EACH_TAG} in the formula', *at)
         if self.for_each is None and EACH_TAG in text:

@@ -61,7 +61,6 @@ def read_rooms(program: str, skills: SkillTable) -> tuple[tuple[str, ...], bool]
 def _findings(
     program: str, room_map: RoomMap, skills: SkillTable
 ) -> tuple[bool, list[tuple[str, str, int | None]]]:
-    """Return whether a program compiles, and the kind, message and line of each problem."""
     tree = parse_program(program, compiled=True)
     if isinstance(tree, Flaw):
         return False, [(tree.kind, tree.message, tree.line)]

@@ -15,7 +15,7 @@ from codebotler.core.skills.kinds import GOTO
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace, option_data, option_from
 
-MOST_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
+MAX_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS = 40, 12, 6
 STEP_MARK = "❱"
 
 
@@ -63,9 +63,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
                 mark = Text(f"{STEP_MARK} {number}", "bold red") if is_needed else Text(number, "dim")
                 table.add_row(mark, Padding(step_text(step), (0, 0, 0, indent)))
         else:
-            table.add_row(
-                Text(), Text(f"... {len(some):,} more{_describe_repetition(steps, some)} ...", "dim")
-            )
+            table.add_row(Text(), Text(f"... {len(some):,} more ...", "dim"))
     return table
 
 
@@ -77,21 +75,9 @@ def select_steps(
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
         is_end = number <= FIRST_STEPS or number > len(steps) - LAST_STEPS
-        return len(steps) <= MOST_SHOWN_STEPS or is_end or number in needed
+        return len(steps) <= MAX_SHOWN_STEPS or is_end or number in needed
 
     return ((shown, list(some)) for shown, some in groupby(steps, key=is_shown))
-
-
-def _describe_repetition(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str, Any]]) -> str:
-    def same(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-        return {**a, "step": 0} == {**b, "step": 0}
-
-    first = hidden[0]["step"] - 1
-    for period in range(1, min(LONGEST_PERIOD, first) + 1):
-        if all(same(steps[at], steps[at - period]) for at in range(first, first + len(hidden))):
-            repeated = f"step {first}" if period == 1 else f"steps {first - period + 1} to {first}"
-            return f", repeating {repeated}"
-    return ""
 
 
 def step_text(step: Mapping[str, Any]) -> Text:

@@ -173,7 +173,6 @@ class Appender:
 
 
 def _intact_length(path: Path) -> int:
-    """Return the length of a file without a torn last line, in bytes."""
     with path.open("rb") as file:
         if not os.fstat(file.fileno()).st_size:
             return 0

@@ -351,7 +351,6 @@ def _describe_mismatch(node: ast.Call, skill: Skill) -> str | None:
 
 
 def _check_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
-    """Find a literal argument that the skill does not accept."""
     try:
         value = ast.literal_eval(node)
     except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):

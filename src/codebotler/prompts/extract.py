@@ -175,7 +175,6 @@ def _block_as_written(lines: Sequence[str], *, fenced: bool) -> _Block:
 
 
 def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the lines between paragraphs of prose."""
     run: list[str] = []
     in_prose = False
     for line in lines:
@@ -289,7 +288,6 @@ def _undefined(tree: ast.Module | None) -> set[str]:
 
 
 def _code_of(lines: Sequence[str]) -> list[int]:
-    """Return the indices of the lines that are not blank."""
     return [i for i, line in enumerate(lines) if line.strip()]
 
 
@@ -298,7 +296,6 @@ def _indent(line: str) -> str:
 
 
 def _dedent(lines: Sequence[str]) -> list[str]:
-    """Remove the indentation of the first line from all lines that have it."""
     margin = next((_indent(line) for line in lines if line.strip()), "")
     return [line.removeprefix(margin) for line in lines]
 
@@ -309,5 +306,4 @@ def _strip_blank_lines(lines: Sequence[str]) -> Sequence[str]:
 
 
 def _join(parts: Iterable[Sequence[str]]) -> str:
-    """Join the parts, each without outer blank lines."""
     return "\n\n\n".join("\n".join(_strip_blank_lines(lines)) for lines in parts) + "\n"

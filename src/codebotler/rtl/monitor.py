@@ -110,8 +110,6 @@ class _Machine:
 
 
 class _Future:
-    """Decides whether the result of a formula is final for certain letters."""
-
     def __init__(self, automaton: Automaton, letters: tuple[Letter, ...]) -> None:
         self._automaton, self._letters = automaton, letters
         self._opposite = replace(automaton, accepts=tuple(not accepted for accepted in automaton.accepts))

@@ -75,7 +75,6 @@ def describe_action(
 
 
 def _describe_details(element: EventPattern, means: str | None) -> str:
-    """Describe the conditions on an event other than its text."""
     more = ""
     if element.options is not None and means is None and not is_any(element.options):
         more += f" offering an option {describe_text(element.options)}"
@@ -111,7 +110,6 @@ def is_clear(element: EventPattern) -> bool:
 
 
 def _describe_part(text: TextPattern, thing: str) -> str:
-    """Describe one object of a verb with several."""
     named = _quote_choices(text)
     if isinstance(text, Regex) and named and text.pattern.startswith("^"):
         return named.strip('"')
@@ -171,7 +169,6 @@ def describe_event(event: Event, element: EventPattern) -> str:
 
 
 def _describe_options(event: Event, element: EventPattern) -> str:
-    """Describe the options of a question, or their number, if the pattern compares them."""
     if event.options and (element.mention or not is_any(element.options)):
         return f" with the options {listed(elide_list([quoted(option.text) for option in event.options]))}"
     return "" if element.offers is None else f" with {words.counted(len(event.options), 'option')}"

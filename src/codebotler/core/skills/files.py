@@ -37,7 +37,6 @@ def skills_from(*files: Path | str) -> SkillTable:
 
 
 def _declared_skills(path: Path) -> list[Skill]:
-    """Return the skills that a file declares, in its order."""
     module = load_skill_module(path)
     found = [value for value in vars(module).values() if isinstance(value, Skill)]
     return [row for row in dict.fromkeys(found) if getattr(row.does, "__module__", "") == module.__name__]

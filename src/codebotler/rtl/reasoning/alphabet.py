@@ -144,14 +144,12 @@ def _requests(alike: Sequence[EventPattern]) -> Sequence[str]:
 
 
 def _more(alike: Sequence[EventPattern]) -> Iterable[tuple[str, ...]]:
-    """Return further arguments that match in all combinations."""
     most = max(len(element.more) for element in alike)
     wanted = ([e.more[at] for e in alike if len(e.more) > at] for at in range(most))
     return product(*(distinct_strings(_distinct(texts), outer=True) for texts in wanted))
 
 
 def _texts(wanted: Sequence[TextPattern | None]) -> list[str | None]:
-    """Return None and texts that match in all combinations."""
     texts = _distinct(wanted)
     return [None, *(distinct_strings(texts, outer=True) if texts else ())]
 

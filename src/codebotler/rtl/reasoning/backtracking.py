@@ -75,7 +75,6 @@ def _measure(read: Callable[[str], object], text: str) -> float:
 
 
 def _fragments(tree: Tree) -> Iterator[str]:
-    """Yield texts that a regex, its prefixes and its parts match."""
     items = list(tree)
     for end, (op, arguments) in enumerate(items, 1):
         for part in (items[:end], items[end - 1 : end]):

@@ -67,7 +67,6 @@ def counter_samples(pattern: str) -> list[str]:
 
 
 def _guesses(pattern: str) -> Iterator[str]:
-    """Return short random strings of the characters in a regex."""
     random, letters = Random(pattern), f"{pattern}x1 "  # noqa: S311 - no secret
     return ("".join(random.choices(letters, k=random.randint(0, 8))).strip() for _ in range(3_000))
 

@@ -104,7 +104,6 @@ def _subsets(words: Sequence[str]) -> Iterator[str]:
 
 
 def _join_parts(parts: Sequence[TextPattern]) -> Iterator[str]:
-    """Yield samples of all parts, in several orders."""
     groups = [
         [word for pattern in patterns(part) for word in samples(pattern)] or [""]
         for part in parts
