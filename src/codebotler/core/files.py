@@ -246,23 +246,25 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
 
 def home() -> Path:
     """Return the state folder, which holds missions and need not exist."""
-    named, state = os.environ.get("CODEBOTLER_HOME"), os.environ.get("XDG_STATE_HOME")
-    if named:
-        return Path(named).absolute()
-    try:
-        return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
-    except RuntimeError:  # the user has no home folder, as in containers
-        raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder") from None
+    folder = _user_folder("XDG_STATE_HOME", ".local/state")
+    if folder is None:
+        raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder")
+    return folder
 
 
 def config_file() -> Path | None:
     """Return the file of the user's settings, which need not exist; None without a home folder."""
-    named, config = os.environ.get("CODEBOTLER_HOME"), os.environ.get("XDG_CONFIG_HOME")
-    if named:
-        return Path(named).absolute() / "config.yaml"
+    folder = _user_folder("XDG_CONFIG_HOME", ".config")
+    return None if folder is None else folder / "config.yaml"
+
+
+def _user_folder(variable: str, default: str) -> Path | None:
+    if ours := os.environ.get("CODEBOTLER_HOME"):
+        return Path(ours).absolute()
+    base = os.environ.get(variable)
     try:
-        return (Path(config) if config else Path.home() / ".config") / "codebotler" / "config.yaml"
-    except RuntimeError:
+        return (Path(base) if base else Path.home() / default) / "codebotler"
+    except RuntimeError:  # the user has no home folder, as in containers
         return None
 
 

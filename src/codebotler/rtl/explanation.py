@@ -17,7 +17,7 @@ from codebotler.rtl.semantics import (
     during_stays,
     first_stay,
     holds,
-    matches,
+    is_match,
     narrow,
     positions_in_scopes,
 )
@@ -126,7 +126,7 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
 
 
 def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
-    at = next(at for at in _positions(test, trace) if matches(test.element, trace, at))
+    at = next(at for at in _positions(test, trace) if is_match(test.element, trace[at], at))
     element = replace(test.element, place=None)
     done, did = (
         f"{verb(element.kind).past} {describe_event(trace[at], element)}",
@@ -160,7 +160,7 @@ def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     if isinstance(test, formulas.Last):
         return _not_last(element, where, trace, here)
     span = positions_in_scopes(test.scopes, trace)
-    arrivals = [at for at in span if matches(test.arrival, trace, at)]
+    arrivals = [at for at in span if is_match(test.arrival, trace[at], at)]
     if not arrivals:
         _, detail = _describe_instead(test.arrival, trace, span)
         never = f"never {describe_action(test.arrival, 'past', negated=True)}"
@@ -209,7 +209,7 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     where, number = _where(test.scopes, trace, is_true=is_true), test.number
     exactly, is_missing = isinstance(test, formulas.Count), not is_true
     span = positions_in_scopes(test.scopes, trace)
-    found = [at for at in span if _is_match(test.element, trace, at)]
+    found = [at for at in span if _is_conclusive_match(test.element, trace, at)]
     if found:
         text = describe_action(
             test.element, "past", when=f" {times(len(found))} ({_steps(found)})", where=where
@@ -265,7 +265,7 @@ def _describe_instead(
     element: formulas.EventPattern, trace: Trace, here: Sequence[int]
 ) -> tuple[int | None, str]:
     """Describe a matching event elsewhere, or other events of this kind here."""
-    done = [at for at in range(len(trace)) if _is_match(element, trace, at)]
+    done = [at for at in range(len(trace)) if _is_conclusive_match(element, trace, at)]
     if done:
         return done[0], f": it did so only at {_steps(done)}"
     alike = [at for at in here if trace[at].kind == element.kind]
@@ -279,9 +279,9 @@ def _describe_instead(
     return alike[0], f"{only} {listed(elide_list(shown, _MAX_QUOTED))}"
 
 
-def _is_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
+def _is_conclusive_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
     try:
-        return matches(element, trace, at)
+        return is_match(element, trace[at], at)
     except Inconclusive:
         return False
 

@@ -61,12 +61,12 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
         case formulas.Exists(element):
             return first(element, trace, span) is not None
         case formulas.Last(element):
-            return len(span) > 0 and matches(element, trace, span[-1])
+            return len(span) > 0 and is_match(element, trace[span[-1]], span[-1])
         case formulas.ActAtFirst(_, element):
             stay = first_stay(test, trace, span)
             return stay is not None and first(element, trace, stay) is not None
         case formulas.ActAtSome(_, element):
-            return any(matches(element, trace, at) for at in during_stays(test, trace, span))
+            return any(is_match(element, trace[at], at) for at in during_stays(test, trace, span))
         case formulas.AtLeast(element, number):
             return at_least(element, number, trace, span) == number
         case formulas.Count(element, number):
@@ -74,17 +74,12 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
     assert_never(test)
 
 
-def matches(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
-    """Whether a pattern matches the event at a position.
+def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
+    """Whether a pattern matches an event at a position of its trace.
 
     Raises:
         Inconclusive: an option that is not a text precedes the first match.
     """
-    return is_match(element, trace[at], at)
-
-
-def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
-    """Whether a pattern matches an event at a position of its trace; see `matches`."""
     if event.kind != element.kind:
         return False
     if element.place_regex is not None and element.place_regex.search(event.place) is None:
@@ -180,7 +175,7 @@ def during_stays(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, s
     """
     is_there = False
     for at in span:
-        is_there = is_there and not matches(test.departure, trace, at)
+        is_there = is_there and not is_match(test.departure, trace[at], at)
         if is_there:
             yield at
-        is_there = is_there or matches(test.arrival, trace, at)
+        is_there = is_there or is_match(test.arrival, trace[at], at)

@@ -222,12 +222,9 @@ class _Parser:
         return self.matched(node)
 
     def around_arguments(self, name: str, node: ast.Call) -> list[ast.expr]:
-        if name != "options":
-            return self.arguments(node, node, name, 2)
-        given = self.arguments(node, node, name)
-        if len(given) not in {2, 3}:
+        if name == "options" and len(node.args) not in {2, 3}:
             raise self.error(node, "options takes the least number, optionally the most, and a question")
-        return given
+        return self.arguments(node, node, name, None if name == "options" else 2)
 
     def around(self, name: str, node: ast.Call) -> formulas.EventPattern:
         *given, inner = self.around_arguments(name, node)

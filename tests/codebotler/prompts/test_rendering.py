@@ -211,7 +211,7 @@ def test_hash_is_that_of_all_but_the_instruction(monkeypatch: pytest.MonkeyPatch
         "STOP_TEXTS": ("\n#",),
         "OPENING": "def task_program() -> None:\n",
         "examples": lambda: examples()[1:],
-        "_fenced": lambda program: program,
+        "_fence": lambda program: program,
     }
     for name, changed in changes.items():
         monkeypatch.setattr(rendering, name, changed)

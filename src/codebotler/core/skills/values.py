@@ -9,6 +9,8 @@ from enum import Enum
 from math import isfinite
 from typing import Any, Literal, TypeAlias, get_args, get_origin
 
+from codebotler.core.words import listed
+
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
@@ -47,17 +49,11 @@ class ValueType:
     @property
     def words(self) -> str:
         """The expected values, in words."""
-        named = {"str": "text", "int": "a whole number", "float": "a number", "bool": "True or False"}
         if self.base is None:
             return "nothing"
-        if self.is_list:
-            return f"a list of {PLURAL_NAMES[self.base]}" if not self.choices else f"a list of {self._listed}"
-        return self._listed if self.choices else named[self.base]
-
-    @property
-    def _listed(self) -> str:
         quoted = [f'"{one}"' if isinstance(one, str) else str(one) for one in self.choices]
-        return " or ".join([", ".join(quoted[:-1]), quoted[-1]] if quoted[1:] else quoted)
+        one, many = [listed(quoted, "or")] * 2 if quoted else TYPE_NAMES[self.base]
+        return f"a list of {many}" if self.is_list else one
 
     def fits(self, value: object) -> bool:
         """Whether a value has exactly this type; an integer is also a float."""
@@ -86,11 +82,11 @@ class ValueType:
         return float(value) if self.base == "float" else value
 
 
-PLURAL_NAMES: Mapping[Base, str] = {
-    "str": "texts",
-    "int": "whole numbers",
-    "float": "numbers",
-    "bool": "truth values",
+TYPE_NAMES: Mapping[Base, Sequence[str]] = {
+    "str": ("text", "texts"),
+    "int": ("a whole number", "whole numbers"),
+    "float": ("a number", "numbers"),
+    "bool": ("True or False", "truth values"),
 }
 TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None)
 

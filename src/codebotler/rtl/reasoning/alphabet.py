@@ -62,7 +62,9 @@ def alphabet(
         aspects = [
             [
                 Event(kind, text, options, more=more)
-                for text in (_requests(alike) if moves_by is None else moves_by)
+                for text in (
+                    moves_by if moves_by is not None else distinct_strings(_distinct(e.text for e in alike))
+                )
                 for more in _more(alike)
                 for options in _options(alike)
             ],
@@ -137,10 +139,6 @@ def _places(wanted: Sequence[EventPattern], rooms: Sequence[str] | None) -> Sequ
     if not regexes:
         return [""]
     return distinct_strings(regexes) if rooms is None else rooms
-
-
-def _requests(alike: Sequence[EventPattern]) -> Sequence[str]:
-    return distinct_strings(_distinct(element.text for element in alike))
 
 
 def _more(alike: Sequence[EventPattern]) -> Iterable[tuple[str, ...]]:

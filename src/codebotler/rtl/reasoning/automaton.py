@@ -151,29 +151,18 @@ def _during_stays(test: formulas.ActAtSome) -> Machine:
 def _within(scope: formulas.Scope, inner: Machine) -> Machine:
     """Restrict a machine to the events in a scope; the state is (bound seen, inner state)."""
     at, (start, step, accepts) = scope.element, inner
-    match scope.name.removeprefix("Only"):
-        case "BeforeFirst":
+    which = scope.name.removeprefix("Only")
+    if which == "BeforeLast":
+        return _before_last(scope, inner)
 
-            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - as in Machine
-                came, here = state
-                return (True, here) if came or at in letter else (False, step(here, letter))
+    def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - as in Machine
+        came, here = state
+        if which == "BeforeFirst":
+            return (True, here) if came or at in letter else (False, step(here, letter))
+        begins = at in letter and not (came and which == "AfterFirst")
+        return (True, start) if begins else (came, step(here, letter))
 
-        case "AfterFirst":
-
-            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - of whichever part it is
-                came, here = state
-                return (True, start) if not came and at in letter else (came, step(here, letter))
-
-        case "AfterLast":
-
-            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - of whichever part it is
-                came, here = state
-                return (True, start) if at in letter else (came, step(here, letter))
-
-        case _:
-            return _before_last(scope, inner)
-
-    def accepted(state: Any) -> bool:  # noqa: ANN401 - of whichever part it is
+    def accepted(state: Any) -> bool:  # noqa: ANN401 - as in Machine
         came, here = state
         return accepts(start if scope.is_only and not came else here)
 

@@ -18,7 +18,7 @@ from codebotler.core.trace import Event, Trace
 from codebotler.rtl.formulas import Formula, Not
 from codebotler.rtl.reasoning.alphabet import alphabet, elements
 from codebotler.rtl.reasoning.automaton import Automaton, Undecided
-from codebotler.rtl.semantics import holds, matches
+from codebotler.rtl.semantics import holds, is_match
 
 MAX_VISITED_STATES = 20_000  # of the product in one search
 
@@ -45,7 +45,7 @@ class Reasoner:
             events += [Event(GOTO, move) for move in moves]
         distinct: dict[tuple[object, ...], tuple[list[bool], Event]] = {}
         for event in events:
-            row = [matches(element, (event,), 0) for element in wanted]
+            row = [is_match(element, event, 0) for element in wanted]
             where = () if moves is None else (event.place, event.text if event.kind == GOTO else "")
             distinct.setdefault((*row, *where), (row, event))
         rows, self.events = [row for row, _ in distinct.values()], [event for _, event in distinct.values()]
