@@ -156,6 +156,9 @@ class _Variables:
             case ast.Tuple(targets), ast.Call(ast.Name("zip"), many):
                 for one, those in zip(targets, many, strict=False):
                     self._bind_each(one, those)
+            case ast.Tuple([first, second]), ast.Call(ast.Attribute(ast.Dict() as pairs, "items")):
+                self._bind_each(first, pairs)
+                self._bind_each(second, ast.List(pairs.values))
             case ast.Tuple([first, _]), ast.Call(ast.Attribute(value, "items")):
                 self._bind_each(first, value)
             case ast.Tuple(), ast.List(rows) | ast.Tuple(rows) | ast.Set(rows):

@@ -21,7 +21,7 @@ from codebotler.rtl.semantics import (
     narrow,
     positions_in_scopes,
 )
-from codebotler.rtl.wording import describe_action, describe_event, elide_list, is_plain, room
+from codebotler.rtl.wording import describe_action, describe_event, elide_list, is_any, is_plain, room
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,10 @@ def _deciding_tests(
     formula: formulas.Formula, trace: Trace, *, is_true: bool
 ) -> Iterator[tuple[formulas.Test, bool]]:
     """Yield the tests that decide a formula, each with its own truth."""
+    mention = _as_mention(formula)
+    if mention is not None and not is_true and not holds(mention, trace):
+        yield mention, False
+        return
     match formula:
         case formulas.Not(part):
             yield from _deciding_tests(part, trace, is_true=not is_true)
@@ -97,6 +101,22 @@ def _deciding_tests(
                 yield from _deciding_tests(part, trace, is_true=is_true)
         case _:
             yield formula, is_true
+
+
+def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
+    """Return the test with `mention` that is equivalent to `ask(t, ".*") or ask(".*", t)`."""
+    match formula:
+        case formulas.Or((one, other)) if isinstance(one, formulas.PresenceTest) and isinstance(
+            other, formulas.PresenceTest
+        ):
+            a, b = one.element, other.element
+            if a.options is None or b.options is None or (a.text, a.options) != (b.options, b.text):
+                return None
+            text = a.options if is_any(a.text) else a.text
+            mention = replace(a, text=text, options=None, mention=True)
+            if replace(one, element=b) == other and is_any(a.text) != is_any(a.options):
+                return replace(one, element=mention)
+    return None
 
 
 _MAX_QUOTED = 3  # other events
