@@ -55,7 +55,7 @@ def said(outcome: Outcome) -> list[str]:
 
 def doing(say: Callable[..., None]) -> SkillTable:
     """The eight skills, of which one does something else."""
-    return SKILLS.doing(say=say)
+    return SKILLS.with_functions(say=say)
 
 
 def links_in(folder: Path) -> list[Path]:

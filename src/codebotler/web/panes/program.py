@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
@@ -101,7 +101,7 @@ class ProgramPane:
             ui.run_javascript(f"programEditor.show({json.dumps(content)})")
 
     def _typed(self, event: GenericEventArguments) -> None:
-        """Check typed text, unless another person changed the program first."""
+        """CheckResult typed text, unless another person changed the program first."""
         typed, self._received = event.args["text"], int(event.args["number"])
         current = _for_editor(self._console.view.program)
         if typed is None:
@@ -264,7 +264,7 @@ def _current_line(view: SessionView) -> list[dict[str, Any]]:
     return [{"kind": "line", "line": line, "class": kind}] if is_there else []
 
 
-def _problem_marks(found: Check | None, program: str) -> list[dict[str, Any]]:
+def _problem_marks(found: CheckResult | None, program: str) -> list[dict[str, Any]]:
     """Marks for lines with problems, and their messages."""
     if found is None:
         return []
