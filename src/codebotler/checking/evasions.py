@@ -20,7 +20,7 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.rule_guard import name_of
 from codebotler.simulator.settings import resolve_room
 
-EVENT_KINDS = {"drive": GOTO, "take": PICK, "put": PLACE, "look": CHECK, "ask": ASK}
+KIND_OF_METHOD = {"drive": GOTO, "take": PICK, "put": PLACE, "look": CHECK, "ask": ASK}
 """The kind of event that each method of a simulated robot records."""
 HARMLESS_MEMBERS = {"room", "rooms", "state", "outcome", "truth", "fail"}
 
@@ -64,15 +64,15 @@ def acts_inside(row: Skill) -> set[str]:
     try:
         tree = ast.parse(dedent(inspect.getsource(row.does)))
     except (OSError, SyntaxError):
-        return {*EVENT_KINDS.values(), SAY}
+        return {*KIND_OF_METHOD.values(), SAY}
     robot = row.does.__code__.co_varnames[0]
     used = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
     members = [node.attr for node in used if isinstance(node.value, ast.Name) and node.value.id == robot]
     mentions = sum(isinstance(node, ast.Name) and node.id == robot for node in ast.walk(tree))
     acts = {*members} - HARMLESS_MEMBERS
-    if mentions > len(members) or acts - {*EVENT_KINDS}:  # the robot is passed to a function, for example
-        return {*EVENT_KINDS.values(), SAY}
-    return always | {EVENT_KINDS[act] for act in acts}
+    if mentions > len(members) or acts - {*KIND_OF_METHOD}:  # the robot is passed to a function, for example
+        return {*KIND_OF_METHOD.values(), SAY}
+    return always | {KIND_OF_METHOD[act] for act in acts}
 
 
 def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 
 ROOMS_SKILL, ROOM_SKILL = "get_all_rooms", "get_current_location"
-MAX_CHECKED_ROOMS = 100
+MAX_NAMED_ROOMS = 100
 PROPAGATION_ROUNDS = 6  # from variable to variable; longer chains are unusual
 SAME_VALUES = frozenset({"sorted", "list", "set", "tuple", "reversed", "iter", "filter", "frozenset"})
 ELEMENT_METHODS = frozenset({"copy", "keys", "lower", "strip", "casefold", "title", "pop"})
@@ -27,7 +27,7 @@ A_ROOM: TextLiteral = (0, 0, "")  # the placeholder for the name of a room that 
 def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...]:
     """Return the names that a program drives to or compares rooms with, in order of its text."""
     try:
-        return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MAX_CHECKED_ROOMS]
+        return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MAX_NAMED_ROOMS]
     except RecursionError:
         return ()
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from codebotler.checking.problems import Sample
-from codebotler.checking.room_names import MAX_CHECKED_ROOMS
+from codebotler.checking.room_names import MAX_NAMED_ROOMS
 from codebotler.checking.static import read_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.labels import check_label
@@ -61,5 +61,5 @@ def add_visited_rooms(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
     requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == GOTO)
     driven = (room_map.room(request) for request in requests)
     found = dict.fromkeys([*room_map.rooms, *(room for room in driven if room is not None)])
-    rooms = [room for room in found if room != room_map.start][:MAX_CHECKED_ROOMS]
+    rooms = [room for room in found if room != room_map.start][:MAX_NAMED_ROOMS]
     return replace(room_map, rooms=(*rooms, room_map.start))

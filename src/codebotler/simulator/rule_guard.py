@@ -10,7 +10,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.labels import PLAIN_LABEL
 from codebotler.core.skills.kinds import GOTO, INSIDE, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.trace import Event
+from codebotler.core.trace import Event, attempted_event
 from codebotler.core.world import Point, Room, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
 from codebotler.simulator.house_rule import NON_TEXT_OPTION, Objection, Rule, RuleViolationError

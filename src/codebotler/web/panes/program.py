@@ -101,7 +101,7 @@ class ProgramPane:
             ui.run_javascript(f"programEditor.show({json.dumps(content)})")
 
     def _typed(self, event: GenericEventArguments) -> None:
-        """CheckResult typed text, unless another person changed the program first."""
+        """Check typed text, unless another person changed the program first."""
         typed, self._received = event.args["text"], int(event.args["number"])
         current = _for_editor(self._console.view.program)
         if typed is None:
