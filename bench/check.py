@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 
 from codebotler.checking.check import check_on
-from codebotler.checking.sampled import SAMPLES, CheckSettings
+from codebotler.checking.sampled import DEFAULT_SAMPLES, CheckSettings
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
@@ -197,7 +197,9 @@ def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool)
     said = rejections(sources, suite, range(SEEDS), pool)
     found = rates(sources, true, said)
     spent = time.perf_counter() - start
-    print(f"\n{name}: {len(sources)} programs, {SEEDS} seeds, {SAMPLES} samples a check, {spent:.0f} s")
+    print(
+        f"\n{name}: {len(sources)} programs, {SEEDS} seeds, {DEFAULT_SAMPLES} samples a check, {spent:.0f} s"
+    )
     print(f"  {', '.join(sorted(CERTAIN))} in some world:")
     print(f"    rejected             {found.certain}  (aim: at least {100 * CAUGHT:.0f} %)")
     print("  right in all worlds:")
@@ -240,7 +242,7 @@ def report_cost(sources: Sequence[Source], suite: Suite) -> None:
         once += middle - start
     worker.close()
     print(
-        f"\na check of {SAMPLES} samples: {1000 * checked / len(sources):.2f} ms, a single run: "
+        f"\na check of {DEFAULT_SAMPLES} samples: {1000 * checked / len(sources):.2f} ms, a single run: "
         f"{1000 * once / len(sources):.2f} ms; so it costs {checked / once:.1f} single runs "
         f"(mean of {len(sources)} programs)"
     )

@@ -23,8 +23,8 @@ from itertools import chain, count, repeat
 from pathlib import Path
 
 from check import Source, real
-from codebotler.checking.check import checks_on
-from codebotler.checking.problems import Check, Sample
+from codebotler.checking.check import check_together
+from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.rules import read_rules
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import VIOLATION
@@ -425,7 +425,9 @@ class Measuring:
         plans = [RoomMap.of(self.worlds(effect.source[0])[0]) for effect in effects]
         works = [(effect.source[1], plan) for effect, plan in zip(effects, plans, strict=True)]
         settings = CheckSettings(house_rules=house.rules)
-        for effect, plan, found in zip(effects, plans, checks_on(self.worker, works, settings), strict=True):
+        for effect, plan, found in zip(
+            effects, plans, check_together(self.worker, works, settings), strict=True
+        ):
             effect.rejected = bool(found.problems)
             blamed = [problem for problem in found.problems if problem.kind == VIOLATION]
             if blamed:
@@ -433,7 +435,9 @@ class Measuring:
                 effect.reason = " and ".join(sample.drawn) or "always"
                 effect.is_true = self.is_true(effect, house, plan, sample, found)
 
-    def is_true(self, effect: Effect, house: House, plan: RoomMap, sample: Sample, found: Check) -> bool:
+    def is_true(
+        self, effect: Effect, house: House, plan: RoomMap, sample: Sample, found: CheckResult
+    ) -> bool:
         """Whether a program breaks the rules in a sampled world, if nothing keeps it from that."""
         sampler = FactSampler(found.seed, sample.number, forced=sample.draws)
         outcome = self.worker.run(effect.source[1], partial(SampledRobot, plan, sampler))

@@ -49,13 +49,7 @@ def test_public_classes_and_constants_have_names_of_their_own() -> None:
     for module, text in _modules().items():
         for name in _public_names(text):
             owners.setdefault(name, set()).add(module)
-    shared = {name: modules for name, modules in owners.items() if len(modules) > 1}
-    assert {name: modules for name, modules in shared.items() if name not in KNOWN_CLASHES.split()} == {}
-
-
-KNOWN_CLASHES = """
-MAX_DIFF_LINES MAX_PROGRAM_CHARACTERS MAX_WAIT_SECONDS OPTIONAL_SETTINGS
-"""
+    assert {name: modules for name, modules in owners.items() if len(modules) > 1} == {}
 
 
 @cache

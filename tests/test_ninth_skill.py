@@ -9,7 +9,7 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.checking.storyboard import step_text, steps_of
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.program import Flaw, flaws
+from codebotler.core.program import Flaw, find_flaws
 from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, SkillTable
@@ -167,7 +167,7 @@ def test_a_check_in_imagined_worlds_knows_it() -> None:
     def wave_at_anybody(_: SimulatedRobot, person: str) -> None:
         assert person
 
-    table = TABLE.doing(wave=wave_at_anybody)
+    table = TABLE.with_functions(wave=wave_at_anybody)
     found = check(PROGRAMS["waves"], rooms=["hall", "lab"], skills=table)
     assert found.problems == ()
     assert found.data(TABLE)["samples"][0]["trace"][1] == ["wave", "alice"]
@@ -175,8 +175,8 @@ def test_a_check_in_imagined_worlds_knows_it() -> None:
 
 
 def test_static_check_knows_it() -> None:
-    assert flaws(PROGRAMS["waves"], TABLE) == ()
-    assert [problem.kind for problem in flaws(PROGRAMS["waves"])] == ["NameError", "NameError"]
-    (problem,) = flaws(PROGRAMS["too many"], TABLE)
+    assert find_flaws(PROGRAMS["waves"], TABLE) == ()
+    assert [problem.kind for problem in find_flaws(PROGRAMS["waves"])] == ["NameError", "NameError"]
+    (problem,) = find_flaws(PROGRAMS["too many"], TABLE)
     assert isinstance(problem, Flaw)
     assert (problem.line, problem.kind) == (2, "TypeError")

@@ -5,7 +5,7 @@ from __future__ import annotations
 __version__ = "0.1.0"
 
 __all__ = [
-    "Check",
+    "CheckResult",
     "EngineError",
     "Generation",
     "ModelError",
@@ -26,7 +26,7 @@ __all__ = [
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from codebotler.checking.check import check
-    from codebotler.checking.problems import Check, Problem
+    from codebotler.checking.problems import CheckResult, Problem
     from codebotler.core.errors import RobotError, UserError
     from codebotler.core.skills.declaration import skill
     from codebotler.core.skills.files import skills_from
@@ -44,7 +44,7 @@ else:  # each name is imported when it is first used
         __name__,
         {
             "checking.check": ["check"],
-            "checking.problems": ["Check", "Problem"],
+            "checking.problems": ["CheckResult", "Problem"],
             "core.errors": ["BadInput", "RobotError", "UserError"],
             "core.skills.declaration": ["skill"],
             "core.skills.files": ["skills_from"],

@@ -1,4 +1,4 @@
-"""Checking programs before a robot moves: by their text, and by runs in sampled worlds.
+"""Checks of programs before a robot moves: static analysis, and runs in sampled worlds.
 
-Start with `check.py`; `problems.py` is what a check finds.
+Start with `check.py`; `problems.py` defines its results.
 """

@@ -1,4 +1,4 @@
-"""Finds how a program could evade a rule: by another name of a room, or inside a skill of the user's own."""
+"""Find ways to evade a rule: another name of a room, or an action inside a custom skill."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.rule_guard import name_of
 from codebotler.simulator.settings import resolve_room
 
-ACTS = {"drive": GOTO, "take": PICK, "put": PLACE, "look": CHECK, "ask": ASK}
-"""The kind of event that each method of a simulated robot adds."""
-HARMLESS = {"room", "rooms", "state", "outcome", "truth", "fail"}
+KIND_OF_METHOD = {"drive": GOTO, "take": PICK, "put": PLACE, "look": CHECK, "ask": ASK}
+"""The kind of event that each method of a simulated robot records."""
+HARMLESS_MEMBERS = {"room", "rooms", "state", "outcome", "truth", "fail"}
 
 
-def evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) -> Iterator[str]:
-    """A sentence for each way in which a program could evade rules.
+def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) -> Iterator[str]:
+    """Yield a sentence for each way in which a program could evade rules.
 
     Args:
         rules: the rules in force.
-        rooms: the names of the rooms, if they are regexes.
-        skills: what a program may call.
+        rooms: the names of the rooms, which may be regexes.
+        skills: the skills that a program may call.
 
     Raises:
         UserError: a rule cannot hold in these rooms.
@@ -41,7 +41,7 @@ def evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) ->
 
 
 def _unseen_skills(rules: Sequence[Rule], skills: SkillTable) -> Iterator[str]:
-    """A sentence for each own skill that may do inside what a rule speaks of that does not name it."""
+    """Yield a sentence for each custom skill that may act against a rule that does not name it."""
     kinds = {
         rule.name: {one.kind for one in elements(rule.formula)} for rule in rules if rule.when == "always"
     }
@@ -57,30 +57,30 @@ def _unseen_skills(rules: Sequence[Rule], skills: SkillTable) -> Iterator[str]:
 
 
 def acts_inside(row: Skill) -> set[str]:
-    """The kinds of events that an own skill may add inside; all of them if its code does not tell."""
+    """Return the kinds of events that a custom skill may record; all kinds if its code is unclear."""
     always = {GOTO} if row.is_drive else set()
-    if row.is_by_lot or row.does is None:
+    if row.is_random or row.does is None:
         return always
     try:
         tree = ast.parse(dedent(inspect.getsource(row.does)))
     except (OSError, SyntaxError):
-        return {*ACTS.values(), SAY}
+        return {*KIND_OF_METHOD.values(), SAY}
     robot = row.does.__code__.co_varnames[0]
     used = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
-    acts = {node.attr for node in used if isinstance(node.value, ast.Name) and node.value.id == robot}
-    named = sum(isinstance(node, ast.Name) and node.id == robot for node in ast.walk(tree))
-    direct = sum(isinstance(node.value, ast.Name) and node.value.id == robot for node in used)
-    if named > direct or acts - HARMLESS - {*ACTS}:  # it is given to another function, for example
-        return {*ACTS.values(), SAY}
-    return always | {ACTS[act] for act in acts if act in ACTS}
+    members = [node.attr for node in used if isinstance(node.value, ast.Name) and node.value.id == robot]
+    mentions = sum(isinstance(node, ast.Name) and node.id == robot for node in ast.walk(tree))
+    acts = {*members} - HARMLESS_MEMBERS
+    if mentions > len(members) or acts - {*KIND_OF_METHOD}:  # the robot is passed to a function, for example
+        return {*KIND_OF_METHOD.values(), SAY}
+    return always | {KIND_OF_METHOD[act] for act in acts}
 
 
 def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator[str]:
-    """A sentence for each rule that names a room by some of the names which its regex gives it.
+    """Yield a sentence for each rule that covers only some of the names that a room's regex allows.
 
     Raises:
         UserError: a rule names such a room with `^` or `$`, so that any further word of a request evades it,
-            or names a part of the regex and not all of its words.
+            or names the room but not all of its names.
     """
     regexes = [room for room in rooms if not PLAIN_LABEL.fullmatch(room)]
 
@@ -100,9 +100,11 @@ def _partly_named_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> Iterator
                         f'which other words for "{room}" evade; write the name alone'
                     )
                 missed = next((one for one in requests if one not in matching), None)
-                if missed is not None and text.matches(room):  # the author may believe that it has all names
+                if missed is not None and text.matches(
+                    room
+                ):  # the author may believe that the rule covers all names
                     raise UserError(
-                        f'the rule "{rule.name}" does not name "{missed}", which "{room}" is as well; '
+                        f'the rule "{rule.name}" does not name "{missed}", which also means "{room}"; '
                         "write all names of the room"
                     )
                 if matching and missed is not None:

@@ -1,4 +1,4 @@
-"""What a check finds: `Check`, with its problems and the samples that show them."""
+"""`CheckResult`: the problems of a program and the samples that show them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from codebotler.simulator.sampled_robot import RoomMap, SampledFact
 
 @dataclass(frozen=True)
 class Problem:
-    """Something for which a program is rejected.
+    """A reason to reject a program.
 
     Args:
-        kind: of the failure, such as `GoToInvalidLocation` or `NameError`.
+        kind: the kind of failure, such as `GoToInvalidLocation` or `NameError`.
         message: what is wrong, in a plain sentence.
-        line: where, counted from 1; None where no line is to blame.
-        where: what is special about the worlds in which it arises, in words; empty where it always does.
-        samples: the numbers of these worlds; none where the text of the program alone shows it.
+        line: the line of the program, counted from 1; None if no line is to blame.
+        where: the facts that its worlds share, in words; empty if it occurs in every world.
+        samples: the numbers of these worlds; empty if static analysis found the problem.
     """
 
     kind: str
@@ -35,7 +35,7 @@ class Problem:
 
     @property
     def sentence(self) -> str:
-        """All of it in one sentence, for a person or a model."""
+        """The problem in one sentence, for a person or a model."""
         line = "" if self.line is None else f"line {self.line}: "
         where = f", where {self.where}" if self.where else ""
         return f"{line}{self.kind}: {self.message}{where}"
@@ -47,18 +47,18 @@ class Sample:
 
     number: int  # of the world, from 0
     outcome: Outcome
-    facts: tuple[SampledFact, ...] = field(default=(), repr=False)  # about the world, in the order of the run
-    draws: tuple[Draw, ...] = field(default=(), repr=False)  # that settled them, in order
-    in_vain: bool = False  # it waited or searched in vain, so that its end says little
-    is_chosen: bool = False  # the world was no random one, but chosen for a fact that had not been met
+    facts: tuple[SampledFact, ...] = field(default=(), repr=False)  # that the run discovered, in order
+    draws: tuple[Draw, ...] = field(default=(), repr=False)  # that decided the facts, in order
+    in_vain: bool = False  # whether the run waited or searched in vain, so that its end says little
+    is_chosen: bool = False  # whether the world was chosen for a fact that no random world had
 
-    def is_as_in(self, sampler: FactSampler) -> bool:
-        """Whether a run in another world would meet the same facts, and so be the same."""
+    def would_repeat_in(self, sampler: FactSampler) -> bool:
+        """Whether a run in another world would discover the same facts, and so be the same."""
         return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
     def drawn(self) -> tuple[str, ...]:
-        """The facts that chance settled, in words."""
+        """The random facts, in words."""
         return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.is_random))
 
     @property
@@ -68,15 +68,15 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Check:
-    """What a check found.
+class CheckResult:
+    """The result of checking a program.
 
     Args:
-        problems: by line; the program is rejected if there is one.
-        samples: the runs; none of a program that does not parse.
-        room_map: the rooms that the worlds have in common.
-        seed: from which the worlds were drawn.
-        strict: whether all facts were drawn.
+        problems: sorted by line; the program is accepted if there are none.
+        samples: the runs; empty if the program does not parse.
+        room_map: the rooms of all worlds.
+        seed: the seed of the worlds.
+        strict: whether all facts were random.
     """
 
     problems: tuple[Problem, ...]
@@ -86,11 +86,13 @@ class Check:
     strict: bool = False
 
     def __repr__(self) -> str:
-        return f"Check({counted(len(self.problems), 'problem')}, {counted(len(self.samples), 'sample')})"
+        return (
+            f"CheckResult({counted(len(self.problems), 'problem')}, {counted(len(self.samples), 'sample')})"
+        )
 
     @property
     def rooms(self) -> tuple[str, ...]:
-        """The rooms, in the order in which the robot knew them."""
+        """The rooms, in the robot's order."""
         return self.room_map.rooms
 
     @property
@@ -99,8 +101,8 @@ class Check:
         return self.room_map.guessed
 
     @property
-    def showing(self) -> frozenset[int]:
-        """The numbers of samples that show the problems: for each the first that ends so, if one does."""
+    def evidence(self) -> frozenset[int]:
+        """The number of the first sample that shows each problem, if one does."""
         ends = {
             sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
         }
@@ -110,10 +112,10 @@ class Check:
         return frozenset(number for number in first if number is not None)
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:
-        """All of it as plain data; equal checks give equal data.
+        """Return plain data for JSON, equal for equal results.
 
         Args:
-            skills: those with which it was checked.
+            skills: the skills that the program could call.
         """
         return {
             "accepted": not self.problems,
@@ -143,12 +145,12 @@ class Check:
 
 
 def no_room(request: str, room_map: RoomMap) -> str:
-    """The message for an unknown room, with the closest match."""
+    """Return the message for an unknown room, with the closest match."""
     name = brief(request)
     return f'there is no room "{name}"{closest_room(name, room_map.rooms)}'
 
 
 def closest_room(name: str, rooms: Sequence[str]) -> str:
-    """A clause that names the room with the closest name; empty if none is close."""
+    """Return a clause with the closest name of a room; empty if none is close."""
     closest = difflib.get_close_matches(name.lower(), rooms, n=1)
     return f'; the closest is "{closest[0]}"' if closest else ""

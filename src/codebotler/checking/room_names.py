@@ -1,4 +1,4 @@
-"""The rooms that a program names, found by following its variables without running it."""
+"""Find the rooms that a program names, by following its variables without running it."""
 
 from __future__ import annotations
 
@@ -7,38 +7,37 @@ from collections import defaultdict
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from codebotler.core.program import names_bound, nodes
+from codebotler.core.program import all_bound_names, nodes
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 
 ROOMS_SKILL, ROOM_SKILL = "get_all_rooms", "get_current_location"
-MOST_CHECKED_ROOMS = 100
-ROUNDS = 6  # in which names are passed on from variable to variable; longer chains are unusual
+MAX_NAMED_ROOMS = 100
+PROPAGATION_ROUNDS = 6  # from variable to variable; longer chains are unusual
 SAME_VALUES = frozenset({"sorted", "list", "set", "tuple", "reversed", "iter", "filter", "frozenset"})
-OF_A_LIST = frozenset({"copy", "keys", "lower", "strip", "casefold", "title", "pop"})
-COMPARING = frozenset({"startswith", "endswith"})
+ELEMENT_METHODS = frozenset({"copy", "keys", "lower", "strip", "casefold", "title", "pop"})
+COMPARISON_METHODS = frozenset({"startswith", "endswith"})
 
-Literal: TypeAlias = tuple[int, int, str]
+TextLiteral: TypeAlias = tuple[int, int, str]
 """A text in a program: its line from 1, its column from 0, and the text."""
 
-A_ROOM: Literal = (0, 0, "")  # the placeholder for the name of a room that a skill returns
+A_ROOM: TextLiteral = (0, 0, "")  # the placeholder for the name of a room that a skill returns
 
 
 def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...]:
-    """The rooms that a program drives to, or compares rooms with, by their names in its text, in order."""
+    """Return the names that a program drives to or compares rooms with, in order of its text."""
     try:
-        return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MOST_CHECKED_ROOMS]
+        return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MAX_NAMED_ROOMS]
     except RecursionError:
         return ()
 
 
 def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
-    """The line and the request of each drive whose room is written out.
+    """Return the line and the request of each drive to a literal room.
 
-    A program that compares something with the name of a room may drive there only if there is one; such
-    drives are left out.
+    Omit drives to rooms with which the program compares something: it may check first that they exist.
     """
-    bound = names_bound(tree)
+    bound = all_bound_names(tree)
     if "*" in bound:
         return []
     compared = {text for node in nodes(tree) if isinstance(node, ast.Compare) for text in _texts(node)}
@@ -63,12 +62,10 @@ def _texts(expression: ast.expr) -> Iterator[str]:
 
 
 def _drives(skills: SkillTable) -> dict[str, Skill]:
-    """The skills of which an argument names a room."""
     return {row.name: row for row in skills.rows if row.is_drive and row.recording and row.recording.text}
 
 
 def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.Call, ast.expr]]:
-    """The calls that drive, with where to."""
     for node in nodes(tree):
         match node:
             case ast.Call(ast.Name(name), arguments, keywords) if name in drives:
@@ -81,17 +78,17 @@ def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.
 
 
 class _Variables:
-    """The texts that the variables of a program may hold, roughly: a name means the same all over it."""
+    """The texts that the variables of a program may hold; scopes are ignored."""
 
     def __init__(self, tree: ast.Module, skills: SkillTable) -> None:
         self.tree, self.drives = tree, _drives(skills)
-        self.held: defaultdict[str, set[Literal]] = defaultdict(set)
+        self.held: defaultdict[str, set[TextLiteral]] = defaultdict(set)
         self.functions = {
             node.name: [*node.args.posonlyargs, *node.args.args]
             for node in nodes(tree)
             if isinstance(node, ast.FunctionDef)
         }
-        for _ in range(ROUNDS):
+        for _ in range(PROPAGATION_ROUNDS):
             before = sum(map(len, self.held.values()))
             for node in nodes(tree):
                 self._pass_on(node)
@@ -99,15 +96,15 @@ class _Variables:
                 break
 
     def rooms(self) -> list[str]:
-        """The names of rooms, in the order of the program."""
+        """Return the names of rooms, in the order of the program."""
         found = {text for _, request in _requests(self.tree, self.drives) for text in self.texts(request)}
-        driven = {_name(request) for _, request in _requests(self.tree, self.drives)} - {None}
+        driven = {_variable(request) for _, request in _requests(self.tree, self.drives)} - {None}
         for node in nodes(self.tree):
             found |= self._compared(node, driven)
         return [text for _, _, text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text))]
 
-    def texts(self, node: ast.expr) -> set[Literal]:
-        """What an expression may be, or what may be among its elements."""
+    def texts(self, node: ast.expr) -> set[TextLiteral]:
+        """Return the possible values of an expression or of its elements."""
         match node:
             case ast.Constant(str(value)):
                 return {(node.lineno, node.col_offset, value.strip())}
@@ -117,7 +114,7 @@ class _Variables:
                 return {A_ROOM}
         return self._all(_parts(node))
 
-    def _all(self, nodes: list[ast.expr]) -> set[Literal]:
+    def _all(self, nodes: list[ast.expr]) -> set[TextLiteral]:
         return set().union(*map(self.texts, nodes))
 
     def _pass_on(self, node: ast.AST) -> None:
@@ -153,7 +150,6 @@ class _Variables:
                     self._bind(one, value)
 
     def _bind_each(self, target: ast.expr, over: ast.expr) -> None:
-        """Bind the target of a loop to what it runs over."""
         match target, over:
             case ast.Tuple([_, second]), ast.Call(ast.Name("enumerate"), [many, *_]):
                 self._bind_each(second, many)
@@ -171,23 +167,24 @@ class _Variables:
             case _:
                 self._bind(target, over)
 
-    def _compared(self, node: ast.AST, driven: set[str | None]) -> set[Literal]:
-        """The texts with which an expression compares a room."""
+    def _compared(self, node: ast.AST, driven: set[str | None]) -> set[TextLiteral]:
 
         def is_room(side: ast.expr) -> bool:
-            return A_ROOM in self.texts(side) or _name(side) in driven
+            return A_ROOM in self.texts(side) or _variable(side) in driven
 
         match node:
             case ast.Compare(left, _, [right]):
                 sides = ((left, right), (right, left))
                 return {text for one, other in sides if is_room(one) for text in self.texts(other)}
-            case ast.Call(ast.Attribute(value, name), [text]) if name in COMPARING and is_room(value):
+            case ast.Call(ast.Attribute(value, name), [text]) if name in COMPARISON_METHODS and is_room(
+                value
+            ):
                 return self.texts(text)
         return set()
 
 
 def _parts(node: ast.expr) -> list[ast.expr]:
-    """The expressions of which one may be the value of an expression, or among its elements."""
+    """Return the parts of an expression that may be its value or an element of it."""
     parts: list[ast.expr] = []
     match node:
         case ast.List(some) | ast.Tuple(some) | ast.Set(some) | ast.BoolOp(_, some):
@@ -204,18 +201,18 @@ def _parts(node: ast.expr) -> list[ast.expr]:
             parts = [part]
         case ast.Call(ast.Name(name), some) if name in SAME_VALUES:
             parts = some[-1:]
-        case ast.Call(ast.Attribute(part, name)) if name in OF_A_LIST:
+        case ast.Call(ast.Attribute(part, name)) if name in ELEMENT_METHODS:
             parts = [part]
     return parts
 
 
-def _name(node: ast.expr) -> str | None:
-    """The variable that an expression is, or takes something from."""
+def _variable(node: ast.expr) -> str | None:
+    """Return the variable that an expression is or reads from."""
     match node:
         case ast.Name(name):
             return name
         case ast.Subscript(value) | ast.Call(ast.Attribute(value)):
-            return _name(value)
+            return _variable(value)
     return None
 
 

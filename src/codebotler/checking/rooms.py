@@ -1,4 +1,4 @@
-"""The rooms in which a program is checked: those of the caller, or a guess from the program's text."""
+"""Determine the rooms of a check: those of the caller, or a guess from the program's text."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from codebotler.checking.problems import Sample
-from codebotler.checking.room_names import MOST_CHECKED_ROOMS
+from codebotler.checking.room_names import MAX_NAMED_ROOMS
 from codebotler.checking.static import read_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.labels import check_label
@@ -16,7 +16,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.simulator.sampled_robot import RoomMap
 
 DEFAULT_START = "start_loc"  # the paper's prompt gives models this name
-EXAMPLE_ROOMS = ("room 1", "room 2")  # for a program that drives to all rooms and names none
+PLACEHOLDER_ROOMS = ("room 1", "room 2")  # for a program that visits all rooms and names none
 
 
 def room_map_for(
@@ -32,10 +32,10 @@ def room_map_for(
         program: its source.
         rooms: the names of the rooms, in order; None if they are unknown.
         start: where the robot starts; by default `start_loc` if that is a room, or else the first room.
-        skills: what the program may call.
+        skills: the skills that the program may call.
 
     Raises:
-        UserError: the name of a room is no regular expression, or the robot starts in none of the rooms.
+        UserError: a room's name is not a regular expression, or the start is not a room.
     """
     if rooms is not None:
         for room in rooms:
@@ -51,15 +51,15 @@ def room_map_for(
     start = start or DEFAULT_START
     rooms_in_text, lists_all = read_rooms(program, skills)
     named = [room for room in rooms_in_text if room != start]
-    if len(named) < len(EXAMPLE_ROOMS) and lists_all:
-        named += [room for room in EXAMPLE_ROOMS if room not in named]
+    if len(named) < len(PLACEHOLDER_ROOMS) and lists_all:
+        named += [room for room in PLACEHOLDER_ROOMS if room not in named]
     return RoomMap((*named, start), start, guessed=True)
 
 
-def widened(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
-    """Add the rooms to which the program drove although its text does not name them."""
+def add_visited_rooms(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
+    """Add the rooms that the program visited although its text does not name them."""
     requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == GOTO)
     driven = (room_map.room(request) for request in requests)
     found = dict.fromkeys([*room_map.rooms, *(room for room in driven if room is not None)])
-    rooms = [room for room in found if room != room_map.start][:MOST_CHECKED_ROOMS]
+    rooms = [room for room in found if room != room_map.start][:MAX_NAMED_ROOMS]
     return replace(room_map, rooms=(*rooms, room_map.start))

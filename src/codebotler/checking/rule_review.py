@@ -1,4 +1,4 @@
-"""A review of house rules: an example that keeps each and one that breaks it, and likely mistakes."""
+"""Review house rules: an example that keeps each rule, one that breaks it, and likely mistakes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from codebotler.core.skills.kinds import GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Option, Trace
 from codebotler.core.world import World
-from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, Text
+from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, TextPattern
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
@@ -24,9 +24,7 @@ from codebotler.simulator.settings import finds
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
 ALWAYS_BROKEN = "all that a robot can do breaks it"
 IMPOSSIBLE = "nothing can keep it"
-UNDECIDED = (
-    'it is too complex for examples, but still enforced; make a rule of each part that is joined by "and"'
-)
+UNDECIDED = 'it is too complex for examples, but still enforced; split it at "and" into several rules'
 DETECTED = (
     "it can be broken by what a look finds or a person answers, which can only be noticed: "
     "the mission stops right after that"
@@ -37,19 +35,19 @@ ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.
 
 @dataclass(frozen=True)
 class Review:
-    """What there is to say about one rule."""
+    """Examples and warnings for one rule."""
 
     rule: Rule
-    keeps: Trace | None  # a shortest example; if possible, something happens that the rule speaks of
-    breaks: Trace | None  # a shortest one
-    warnings: tuple[str, ...]  # in sentences
+    keeps: Trace | None  # a shortest example; if possible, with an event that the rule mentions
+    breaks: Trace | None  # a shortest example
+    warnings: tuple[str, ...]  # sentences
 
 
-def reviewed(rules: Sequence[Rule], world: World | None = None) -> list[Review]:
-    """Review rules, by all that a robot can do, or by what it can do in the rooms of a world."""
+def review_rules(rules: Sequence[Rule], world: World | None = None) -> list[Review]:
+    """Review rules for a robot anywhere, or in the rooms of a world."""
     found = {rule.name: _review(rule, world) for rule in rules}
     for one, other in combinations(rules, 2):
-        for rule, warning in _of_pair(one, other, world):
+        for rule, warning in _pair_warnings(one, other, world):
             review = found[rule.name]
             found[rule.name] = replace(review, warnings=(*review.warnings, warning))
     return list(found.values())
@@ -59,20 +57,22 @@ def _review(rule: Rule, world: World | None) -> Review:
     warnings = [*_unknown_names(rule, world)]
     try:
         breaks = _trace([Not(rule.formula)], [], world)
-        keeps = _kept(rule, world)
+        keeps = _keeping_trace(rule, world)
     except Undecided:
         return Review(rule, None, None, (*warnings, UNDECIDED))
     if breaks is None:
         warnings.append(NEVER_BROKEN)
-    elif rule.when == "always" and any(_is_by_result(rule, one) for one in _breaks(rule, breaks, world)):
+    elif rule.when == "always" and any(
+        _is_by_result(rule, one) for one in _breaking_traces(rule, breaks, world)
+    ):
         warnings.append(DETECTED)
     if keeps is None:
         warnings.append(ALWAYS_BROKEN if rule.when == "always" else IMPOSSIBLE)
     return Review(rule, keeps, breaks, tuple(warnings))
 
 
-def _breaks(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
-    """Traces that break a rule: a shortest one, and those that end with a result which it names."""
+def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
+    """Yield traces that break a rule: a shortest one, and those that end with a result it mentions."""
     yield shortest
     for element in dict.fromkeys(elements(rule.formula)):
         if element.found is not None or element.answer is not None:
@@ -82,7 +82,7 @@ def _breaks(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]
 
 
 def _is_by_result(rule: Rule, breaks: Trace) -> bool:
-    """Whether the last step is what breaks a rule, and would not if it turned out otherwise."""
+    """Whether the result of the last step, rather than the step itself, breaks the rule."""
     guard = RuleGuard([rule])
     try:
         for event in breaks[:-1]:
@@ -99,7 +99,7 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
     return True
 
 
-def _kept(rule: Rule, world: World | None) -> Trace | None:
+def _keeping_trace(rule: Rule, world: World | None) -> Trace | None:
     spoken_of = [*dict.fromkeys(elements(rule.formula))]
     less = [replace(one, place=None) for one in spoken_of] + [replace(one, holding=None) for one in spoken_of]
     kinds = [EventPattern(kind, Regex(".*")) for kind in dict.fromkeys(one.kind for one in spoken_of)]
@@ -112,7 +112,7 @@ def _kept(rule: Rule, world: World | None) -> Trace | None:
 
 
 def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None) -> Trace | None:
-    """A shortest trace on which formulas hold and rules are kept, if there is one."""
+    """Return a shortest trace on which formulas hold and rules are kept; None if there is none."""
     always = [rule.formula for rule in kept if rule.when == "always"]
     finally_ = [rule.formula for rule in kept if rule.when == "finally"]
     spoken_of = [*wanted, *always, *finally_]
@@ -124,10 +124,10 @@ def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None)
 
 
 def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
-    """The rooms of a world, by name; of those named by a regex, also by words that formulas tell apart."""
+    """Yield the names of rooms; for regexes, also words for the room that formulas distinguish."""
     names = [room.name for room in world.rooms]
     spoken_of = [*chain.from_iterable(map(elements, formulas))]
-    named_texts: list[Text] = [one.text for one in spoken_of if one.kind == GOTO]
+    named_texts: list[TextPattern] = [one.text for one in spoken_of if one.kind == GOTO]
     named_texts += [Regex(one.place_regex.pattern) for one in spoken_of if one.place_regex is not None]
     for name in names:
         yield name
@@ -139,7 +139,7 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
 
 
 def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
-    """For each event in which a robot must hold something: it has picked that up, and not put it down."""
+    """Yield, for each event that requires holding a thing, that the robot has picked it up before."""
     for element in elements(formula):
         if element.holding is not None:
             held = EventPattern(element.kind, Regex(".*"), holding=element.holding)
@@ -150,8 +150,8 @@ def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
 # --- two rules
 
 
-def _of_pair(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule, str]]:
-    """Likely mistakes in two rules together, and which of them has each."""
+def _pair_warnings(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule, str]]:
+    """Yield likely mistakes of two rules together, each with the rule it belongs to."""
     kinds = [{element.kind for element in elements(rule.formula)} for rule in (one, other)]
     if not kinds[0] & kinds[1]:
         return
@@ -177,7 +177,7 @@ def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
 
 
 def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
-    """Whether a rule is kept wherever another one is, which can be broken."""
+    """Whether a rule that can be broken is always kept where another one is."""
     if rule.when == "always" and other.when == "finally":
         return False
     return (
@@ -190,14 +190,14 @@ def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
 
 
 def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
-    """Rooms, things and people that a rule names, and its world lacks."""
+    """Yield a sentence for each room, thing or person that a rule names and its world lacks."""
     if world is None:
         return
     rooms = [room.name for room in world.rooms]
     things = [label for room in world.rooms for label in room.objects]
     people = [person.name for room in world.rooms for person in room.people]
     for element in dict.fromkeys(elements(rule.formula)):
-        named: list[tuple[str, Text | None, list[str]]] = [("thing", element.holding, things)]
+        named: list[tuple[str, TextPattern | None, list[str]]] = [("thing", element.holding, things)]
         named.append(("person", element.to, people))
         named.append(("room", None if element.place is None else Regex(element.place), rooms))
         sorts = {

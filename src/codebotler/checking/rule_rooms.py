@@ -1,4 +1,4 @@
-"""The rooms that house rules name, compared with those that a house has."""
+"""Compare the rooms that house rules name with those of a house."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from codebotler.simulator.settings import is_in_request
 
 
 def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
-    """Refuse rules that name a room which a house lacks, unless they say that they may.
+    """Refuse rules that name a room which the house lacks, unless they allow any room.
 
     Args:
         rules: the rules.
-        rooms: all rooms of the house; none if they are unknown, and then nothing is refused.
+        rooms: all rooms of the house; empty if they are unknown, and then all rules pass.
 
     Raises:
-        UserError: a rule names another room; the sentence has the closest one.
+        UserError: a rule names an unknown room.
     """
     for rule in rules:
         for sentence in unknown_rooms_in(rule, rooms):
@@ -31,20 +31,20 @@ def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
 
 
 def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
-    """A sentence for each room that a rule names and a house lacks; none where no room is known."""
+    """Yield a sentence for each room that a rule names and the house lacks; none if no room is known."""
     if rule.any_room or not rooms:
         return
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
     for pattern in dict.fromkeys(room_patterns(rule)):
         if not may_mean(pattern, rooms) or (pattern in poses and not any(map(Regex(pattern).matches, rooms))):
             yield (
-                f'the rule "{rule.name}" names the room "{pattern}", which is not there'
+                f'the rule "{rule.name}" names the room "{pattern}", which does not exist'
                 f'{closest_room(pattern, rooms)}; correct it, or add "any: true"'
             )
 
 
 def room_patterns(rule: Rule) -> Iterator[str]:
-    """The regexes in a rule that name rooms."""
+    """Yield the regexes in a rule that name rooms."""
     for element in elements(rule.formula):
         if element.place is not None:
             yield element.place
@@ -54,7 +54,7 @@ def room_patterns(rule: Rule) -> Iterator[str]:
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may mean one of these labels; true also if it matches anything, or nothing."""
+    """Whether a regex may mean one of these labels; also true if it matches anything or nothing."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts

@@ -1,4 +1,4 @@
-"""House rules in a file: reads them, and says what is wrong with them."""
+"""Read a file of house rules and report its mistakes."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.house_rule import Rule
 
-EACH_TAG = "{each}"  # in a formula, what the names of `for_each` replace
-MOST_QUOTED_FORMULA = 30  # characters of a formula, from where it is wrong
+EACH_TAG = "{each}"  # the placeholder in a formula for the names of `for_each`
+MAX_QUOTED_CHARACTERS = 30  # of a formula, from the position of its error
 
 
 def _as_name(text: str) -> str:
@@ -50,17 +50,17 @@ class HouseRuleFile(BaseModel):
     for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
 
     def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable) -> Rule:
-        """The rule that it describes, or a UserError."""
+        """Return the rule; raise UserError if it is not valid."""
         if self.always is None and self.finally_ is None:
             raise file.wrong(
                 f'the rule "{self.name}" has no formula; write one after "always" or "finally"', *at
             )
         if self.always is not None and self.finally_ is not None:
-            sentence = f'the rule "{self.name}" has both "always" and "finally"; make two rules of it'
+            sentence = f'the rule "{self.name}" has both "always" and "finally"; split it into two rules'
             raise file.wrong(sentence, *at, "finally")
         if self.always is None:
             if self.refuse:
-                sentence = 'what holds "finally" cannot be refused; remove "refuse", or write "always"'
+                sentence = 'a "finally" rule cannot have "refuse"; remove "refuse" or write "always"'
                 raise file.wrong(sentence, *at, "refuse")
             formula = self._formula(self.finally_ or "", file, (*at, "finally"), skills)
             return Rule(self.name, self.says, formula, "finally", any_room=self.any_)
@@ -73,16 +73,12 @@ class HouseRuleFile(BaseModel):
         return Rule(self.name, self.says, formula, "always", self.refuse, self.any_)
 
     def _formula(self, text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
-        """The formula, or that of each name joined by `and`."""
         if self.for_each is not None and EACH_TAG not in text:
-            raise file.wrong(f'"for_each" needs {EACH_TAG} in the formula, where its names belong', *at)
+            raise file.wrong(f'"for_each" needs {EACH_TAG} in the formula', *at)
         if self.for_each is None and EACH_TAG in text:
-            raise file.wrong(
-                f'{EACH_TAG} in a formula needs "for_each" with the names that belong there', *at
-            )
-        parts = [
-            _parsed(text.replace(EACH_TAG, name), file, at, skills) for name in self.for_each or [EACH_TAG]
-        ]
+            raise file.wrong(f'{EACH_TAG} in a formula needs "for_each" with a list of names', *at)
+        names = self.for_each or [EACH_TAG]
+        parts = [_parse(text.replace(EACH_TAG, name), file, at, skills) for name in names]
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 
 
@@ -99,11 +95,11 @@ def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (
 
     Args:
         path: the file.
-        skills: those that its formulas may name.
-        rooms: all rooms of the house; none if they are unknown, and then rules may name any.
+        skills: the skills that its formulas may name.
+        rooms: all rooms of the house; empty if they are unknown, and then rules may name any.
 
     Raises:
-        UserError: something is wrong; it names the line, and how to mend it.
+        UserError: the file is not valid; the sentence has the line and the fix.
     """
     file = YamlFile.read(path)
     forms = file.validate(HouseRulesFile).rules
@@ -118,11 +114,11 @@ def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (
     return rules
 
 
-def _parsed(text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
+def _parse(text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
     try:
         formula = parse(text, skills=skills.with_skill(POSE_IN_ROOM))
     except RtlSyntaxError as error:
-        there = brief(text[error.column - 1 :], MOST_QUOTED_FORMULA)
+        there = brief(text[error.column - 1 :], MAX_QUOTED_CHARACTERS)
         where = f"column {error.column} of it" + (f", at {there}" if there else "")
         raise file.wrong(f"this is not a formula: {where}: {error.problem}", *at) from None
     for element in elements(formula):

@@ -1,4 +1,4 @@
-"""Runs a program in sampled worlds, and groups its failures into problems."""
+"""Run a program in sampled worlds and group its failures into problems."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import DO_NOTHING, Job, Meanwhile, Worker
 
-SAMPLES, MOST_SAMPLES = 5, 10_000
-EXPLORED = 2  # times as many worlds at most, to meet each fact in every way
-MOST_FURTHER_WORLDS = 20  # worlds in addition, where the program waits in vain in all that were drawn before
-MOST_FACTS = 4
+DEFAULT_SAMPLES, MAX_SAMPLES = 5, 10_000
+EXPLORATION_FACTOR = 2  # times the samples: the most worlds added to try both values of each fact
+MAX_EXTRA_WORLDS = 20  # worlds added while the program waits in vain in all of them
+MAX_SHOWN_FACTS = 4
 
 
 @dataclass(frozen=True)
 class CheckSettings:
-    """How programs are checked."""
+    """Settings of a check."""
 
-    samples: int = SAMPLES
-    seed: int = 0  # of the worlds: the same ones on every machine
-    strict: bool = False  # whether to draw also what the program takes for granted
+    samples: int = DEFAULT_SAMPLES
+    seed: int = 0  # determines the worlds, on every machine
+    strict: bool = False  # whether to randomize even facts that the program takes for granted
     simulation: SimulationSettings = AS_WRITTEN
     skills: SkillTable = SKILLS
-    house_rules: tuple[Rule, ...] = ()  # what a program must keep to in every world
+    house_rules: tuple[Rule, ...] = ()  # to keep in every world
 
     def __post_init__(self) -> None:
-        if not 1 <= self.samples <= MOST_SAMPLES:
-            raise UserError(f"the number of samples must be from 1 to {MOST_SAMPLES:,}, not {self.samples:,}")
+        if not 1 <= self.samples <= MAX_SAMPLES:
+            raise UserError(f"the number of samples must be from 1 to {MAX_SAMPLES:,}, not {self.samples:,}")
 
 
 class SampledRuns:
-    """The runs of one program in some sampled worlds, first as a job for a worker."""
+    """The runs of one program in sampled worlds, which a worker executes as one job."""
 
     def __init__(
         self, program: str, room_map: RoomMap, samplers: Sequence[FactSampler], settings: CheckSettings
@@ -56,12 +56,12 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """What the runs show, of which some are known by number; of worlds that are alike, one may be run."""
+        """Return the samples; reuse known outcomes, and skip worlds that would repeat a run."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:
                 outcome = known[number]
-            elif any(one.is_as_in(sampler) for one in ran):
+            elif any(one.would_repeat_in(sampler) for one in ran):
                 continue
             else:
                 outcome = worker.run_alone(self.program, partial(self._new_robot, number))
@@ -88,7 +88,7 @@ def run_samples(
     *,
     meanwhile: Meanwhile = DO_NOTHING,
 ) -> list[Sample]:
-    """Run a program in sampled worlds; of worlds that are alike to it, only the first may be run."""
+    """Run a program in sampled worlds, and skip worlds that would repeat a run."""
     if not samplers:
         return []
     runs = SampledRuns(program, room_map, samplers, settings)
@@ -103,42 +103,47 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
 
 
 RunInWorlds: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
-"""Runs one program in several worlds, of which it may leave out those that are alike to the program."""
+"""Runs one program in several worlds; may skip worlds that would repeat a run."""
 
 
-def sampled_runs(run: RunInWorlds, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
-    """The runs in so many worlds, and in more to meet each fact both ways, or where all search in vain.
+def run_in_sampled_worlds(
+    run: RunInWorlds, room_map: RoomMap, settings: CheckSettings, width: int
+) -> list[Sample]:
+    """Run a program in the first worlds, then in more to try both values of each fact.
 
-    Worlds that are alike to the program need one run only; `run` is called with at most `width` worlds.
+    Add further worlds while all runs wait or search in vain. Worlds that would repeat a run share its
+    result; `run` is called with at most `width` worlds.
     """
     known: list[Sample] = []
     ran: list[Sample] = []
-    drew: list[FactSampler] = []  # the worlds of those that ran
+    drew: list[FactSampler] = []  # the worlds in which it ran
 
     def add(samplers: Sequence[FactSampler]) -> None:
         drew.extend(samplers)
         for start in range(0, len(samplers), width):
             these = samplers[start : start + width]
-            known.extend(run(room_map, [s for s in these if not any(one.is_as_in(s) for one in known)]))
+            known.extend(
+                run(room_map, [s for s in these if not any(one.would_repeat_in(s) for one in known)])
+            )
             for sampler in these:
-                same = next(one for one in known if one.is_as_in(sampler))
+                same = next(one for one in known if one.would_repeat_in(sampler))
                 ran.append(replace(same, number=len(ran), is_chosen=bool(sampler.forced)))
 
     first = FactSampler(settings.seed, 0, settings.strict)
     add(first_samplers(settings))
-    for more in range(MOST_FURTHER_WORLDS):
+    for more in range(MAX_EXTRA_WORLDS):
         if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
             break
-        # A program that waits in many places needs luck to end; a search, that not all is full of things.
+        # A program that waits in several places only ends in a lucky world; a search may need an empty one.
         add([replace(first, sample=len(ran), lucky=more % 2 == 1)])
-    most = len(ran) + EXPLORED * settings.samples
-    while len(ran) < most and not all(map(_only_computed, ran)) and (new := unexplored(ran, drew)):
+    most = len(ran) + EXPLORATION_FACTOR * settings.samples
+    while len(ran) < most and not all(map(_only_computed, ran)) and (new := unexplored_samplers(ran, drew)):
         add(new[: most - len(ran)])
     return ran
 
 
-def unexplored(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactSampler]:
-    """Worlds that differ from those in which a program ran by one fact, which was never so when it asked."""
+def unexplored_samplers(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactSampler]:
+    """Return worlds that differ from earlier ones in one fact whose value no run has seen."""
     met = {(draw.method, draw.arguments, draw.result) for sample in ran for draw in sample.draws}
     found: list[FactSampler] = []
     for sample, sampler in zip(ran, drew, strict=True):
@@ -151,12 +156,12 @@ def unexplored(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactS
 
 
 def first_samplers(settings: CheckSettings) -> list[FactSampler]:
-    """What draws the facts of the worlds in which a program runs at first."""
+    """Return the samplers of the first worlds."""
     return [FactSampler(settings.seed, number, settings.strict) for number in range(settings.samples)]
 
 
 def _only_computed(sample: Sample) -> bool:
-    """Whether a run used up its processor time, which costs seconds, and is no waiting."""
+    """Whether a run used up its processor time, which takes seconds and is not waiting."""
     error = sample.outcome.error
     return sample.in_vain and error is not None and error.message.endswith(PROCESSOR_TIME)
 
@@ -164,18 +169,20 @@ def _only_computed(sample: Sample) -> bool:
 # --- problems
 
 
-NO_ROOM = re.compile('there is no room "(?P<request>.*)"', re.DOTALL)
-"""The message of a simulated robot that is sent to an unknown room."""
+_NO_ROOM_MESSAGE = re.compile('there is no room "(?P<request>.*)"', re.DOTALL)
+"""The simulated robot's message about an unknown room."""
 
 
-def failures(ran: Sequence[Sample], room_map: RoomMap) -> Iterator[Problem]:
-    """One problem for the runs that ended at the same line in the same way, by the same rule if by one."""
+def group_failures(ran: Sequence[Sample], room_map: RoomMap) -> Iterator[Problem]:
+    """Yield one problem for the runs that failed at the same line with the same error or rule."""
     in_vain = all(sample.in_vain for sample in ran)
     groups: dict[tuple[int | None, str, str], list[Sample]] = {}
     for sample in ran:
         outcome = sample.outcome
         if outcome.error is not None and (in_vain or not sample.in_vain):
-            line = None if outcome.status is Status.TIMEOUT else outcome.line  # any of those where it waits
+            line = (
+                None if outcome.status is Status.TIMEOUT else outcome.line
+            )  # a run stops at any line of a loop
             rule = outcome.error.message.split('"')[1] if outcome.error.kind == VIOLATION else ""
             groups.setdefault((line, outcome.error.kind, rule), []).append(sample)
     for (_, kind, _), same in groups.items():
@@ -190,17 +197,17 @@ def _message(same: Sequence[Sample], ran: Sequence[Sample], room_map: RoomMap) -
         all_or_some = "each" if len(same) == len(ran) else str(len(same))
         often = f"in {all_or_some} of {len(ran)} imagined worlds " if same[0].draws else ""
         return f"the program never ends: {often}it reached a limit, {first.error.message}"
-    found = NO_ROOM.fullmatch(first.error.message)
+    found = _NO_ROOM_MESSAGE.fullmatch(first.error.message)
     return no_room(found["request"], room_map) if found else first.error.message
 
 
 def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:
-    """What some runs have in common that the others have not; by random worlds, if they show it."""
+    """Return the facts that only these runs share; only random worlds count if there are any."""
     if not all(sample.is_chosen for sample in same):
         same, ran = ([sample for sample in those if not sample.is_chosen] for those in (same, ran))
     others = [sample for sample in ran if sample not in same]
     shared = [fact for fact in same[0].drawn if all(fact in sample.drawn for sample in same)]
     telling = [fact for fact in shared if not others or not all(fact in other.drawn for other in others)]
     facts = telling or list(same[0].drawn if others else ())
-    left = len(facts) - MOST_FACTS
-    return listed([*([f"{left} more facts like these"] if left > 0 else []), *facts[-MOST_FACTS:]])
+    left = len(facts) - MAX_SHOWN_FACTS
+    return listed([*([f"{left} more facts like these"] if left > 0 else []), *facts[-MAX_SHOWN_FACTS:]])

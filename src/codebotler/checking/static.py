@@ -1,6 +1,6 @@
-"""Static analysis: certain errors in code that runs unguarded, and misuse of skills.
+"""Static analysis: certain errors in reachable code that no handler catches, and misuse of skills.
 
-Programs are read in a closed process, which nothing in their text can hold up for long.
+An isolated process with a time limit parses the programs.
 """
 
 from __future__ import annotations
@@ -11,7 +11,14 @@ from dataclasses import dataclass, replace
 
 from codebotler.checking.problems import Problem, no_room
 from codebotler.checking.room_names import fixed_drives, lists_rooms, named_rooms
-from codebotler.core.program import TASK_FUNCTION, Flaw, flaws_of, nodes, parsed, tree_of
+from codebotler.core.program import (
+    TASK_FUNCTION,
+    Flaw,
+    find_tree_flaws,
+    nodes,
+    parse_leniently,
+    parse_program,
+)
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import ValueType
@@ -25,14 +32,14 @@ EXAMPLE_PROGRAM = "def task_program():\n    if is_in_rom('mug'):\n        say('a
 
 @dataclass(frozen=True)
 class TextFindings:
-    """The certain errors of a program, found in its text without a run."""
+    """The certain errors of a program, found without running it."""
 
     compiles: bool
     problems: tuple[Problem, ...]
 
 
 def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> TextFindings:
-    """Find the certain errors of a program, one problem a line; that it takes long to read is one."""
+    """Find the certain errors of a program, one problem per line; slow parsing is a problem, too."""
     try:
         compiles, problems = _findings(program, room_map, _without_functions(skills))
     except IsolatedCallError as error:
@@ -42,7 +49,7 @@ def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> TextFin
 
 
 def read_rooms(program: str, skills: SkillTable) -> tuple[tuple[str, ...], bool]:
-    """Find the rooms that a program names, and whether it asks for the list of all rooms."""
+    """Return the rooms that a program names, and whether it asks for the list of all rooms."""
     try:
         rooms, lists_all = _rooms(program, _without_functions(skills))
     except IsolatedCallError:
@@ -54,8 +61,7 @@ def read_rooms(program: str, skills: SkillTable) -> tuple[tuple[str, ...], bool]
 def _findings(
     program: str, room_map: RoomMap, skills: SkillTable
 ) -> tuple[bool, list[tuple[str, str, int | None]]]:
-    """Whether a program compiles, and the kind, the message and the line of each of its problems."""
-    tree = parsed(program, compiled=True)
+    tree = parse_program(program, compiled=True)
     if isinstance(tree, Flaw):
         return False, [(tree.kind, tree.message, tree.line)]
     found = static_problems(program, tree, room_map, skills)
@@ -64,13 +70,12 @@ def _findings(
 
 @isolated(EXAMPLE_PROGRAM, SKILLS)
 def _rooms(program: str, skills: SkillTable) -> tuple[list[str], bool]:
-    """The rooms that a program names, and whether it asks for the list of all rooms."""
-    tree = tree_of(program)
+    tree = parse_leniently(program)
     return list(named_rooms(tree, skills)), lists_rooms(tree)
 
 
 def _without_functions(skills: SkillTable) -> SkillTable:
-    """The same skills without the code of users, which a closed process cannot import."""
+    """Return the skills without users' code, which an isolated process cannot import."""
 
     def plain(value: ValueType) -> ValueType:
         return replace(value, enum=None)
@@ -83,8 +88,8 @@ def _without_functions(skills: SkillTable) -> SkillTable:
 
 
 def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: SkillTable) -> list[Problem]:
-    """The certain errors of a program, one problem a line."""
-    flaws = list(flaws_of(tree, program, skills))
+    """Return the certain errors of a program, one problem per line."""
+    flaws = list(find_tree_flaws(tree, program, skills))
     try:
         if not room_map.guessed:
             flaws += [
@@ -92,8 +97,8 @@ def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: S
                 for line, request in fixed_drives(tree, skills)
                 if room_map.room(request) is None
             ]
-        never = {line for node in _never(tree) for line in _lines([node])}
-        caught = list(_caught(tree))
+        never = {line for node in _unreachable(tree) for line in _lines([node])}
+        caught = list(_guarded_lines(tree))
     except RecursionError:
         never, caught = set(), []
     by_line: dict[int | None, list[Flaw]] = {}
@@ -108,8 +113,8 @@ def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: S
     ]
 
 
-def _never(tree: ast.Module) -> Iterator[ast.stmt]:
-    """The statements that never run: after a return, below what is never true, in functions never named."""
+def _unreachable(tree: ast.Module) -> Iterator[ast.stmt]:
+    """Yield unreachable statements: after a return, under a false condition, in an unused function."""
     named = {node.id for node in nodes(tree) if isinstance(node, ast.Name)} | {TASK_FUNCTION}
     for node in nodes(tree):
         match node:
@@ -126,16 +131,16 @@ def _never(tree: ast.Module) -> Iterator[ast.stmt]:
                 yield from statements[next(ends, len(statements)) + 1 :]
 
 
-def _caught(tree: ast.Module) -> Iterator[tuple[range, frozenset[str]]]:
-    """The lines in a `try` or `with`, and the kinds of errors that it may catch."""
+def _guarded_lines(tree: ast.Module) -> Iterator[tuple[range, frozenset[str]]]:
+    """Yield the lines of each `try` or `with` block, and the kinds of errors that it may catch."""
     for node in nodes(tree):
         if isinstance(node, ast.Try | ast.TryStar) and node.handlers:
-            yield _lines(node.body), frozenset().union(*map(_kinds, node.handlers))
-        elif isinstance(node, ast.With):  # which may swallow anything
+            yield _lines(node.body), frozenset().union(*map(_caught_kinds, node.handlers))
+        elif isinstance(node, ast.With):  # a context manager may suppress any error
             yield _lines(node.body), EVERYTHING
 
 
-def _kinds(handler: ast.ExceptHandler) -> frozenset[str]:
+def _caught_kinds(handler: ast.ExceptHandler) -> frozenset[str]:
     if handler.type is None:
         return EVERYTHING
     return frozenset(node.id for node in ast.walk(handler.type) if isinstance(node, ast.Name))

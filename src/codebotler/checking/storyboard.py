@@ -1,4 +1,4 @@
-"""A trace as numbered steps, and as a storyboard on a terminal."""
+"""Show a trace as numbered steps or as a storyboard on a terminal."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from codebotler.core.skills.kinds import GOTO
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace, option_data, option_from
 
-MOST_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
+MAX_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS = 40, 12, 6
 STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
-    """The events of a trace, counted from 1; with their places if the trace has them."""
+    """Return the events of a trace as plain data, numbered from 1; with places if the trace has them."""
     return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
 
 
@@ -41,21 +41,21 @@ def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]
 
 
 def event_from_step(step: Mapping[str, Any]) -> Event:
-    """The event of a step, without its place."""
+    """Return the event of a step, without its place."""
     options = tuple(map(option_from, step.get("options", ())))
     more = tuple(step.get("more", ()))
     return Event(step["kind"], step["text"], options, step.get("answer"), step.get("found"), more=more)
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Draw the steps room by room; those that explanations need are marked and always shown."""
+    """Draw the steps room by room; steps that explanations need are marked and always shown."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
         return table
     if steps[0]["kind"] != GOTO and "place" in steps[0]:
         table.add_row(Text(), Text(f"in {visible(steps[0]['place'])}", "bold"))
-    for is_shown, some in cut(steps, needed):
+    for is_shown, some in select_steps(steps, needed):
         if is_shown:
             for step in some:
                 indent = 0 if step["kind"] == GOTO else 4
@@ -63,37 +63,25 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
                 mark = Text(f"{STEP_MARK} {number}", "bold red") if is_needed else Text(number, "dim")
                 table.add_row(mark, Padding(step_text(step), (0, 0, 0, indent)))
         else:
-            table.add_row(Text(), Text(f"... {len(some):,} more{_repeating(steps, some)} ...", "dim"))
+            table.add_row(Text(), Text(f"... {len(some):,} more ...", "dim"))
     return table
 
 
-def cut(
+def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Steps in a row, and whether they are shown: of a long trace its ends, and those that are needed."""
+    """Yield runs of steps and whether to show them: of a long trace, both ends and the needed steps."""
 
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
         is_end = number <= FIRST_STEPS or number > len(steps) - LAST_STEPS
-        return len(steps) <= MOST_SHOWN_STEPS or is_end or number in needed
+        return len(steps) <= MAX_SHOWN_STEPS or is_end or number in needed
 
     return ((shown, list(some)) for shown, some in groupby(steps, key=is_shown))
 
 
-def _repeating(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str, Any]]) -> str:
-    def same(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-        return {**a, "step": 0} == {**b, "step": 0}
-
-    first = hidden[0]["step"] - 1
-    for period in range(1, min(LONGEST_PERIOD, first) + 1):
-        if all(same(steps[at], steps[at - period]) for at in range(first, first + len(hidden))):
-            repeated = f"step {first}" if period == 1 else f"steps {first - period + 1} to {first}"
-            return f", repeating {repeated}"
-    return ""
-
-
 def step_text(step: Mapping[str, Any]) -> Text:
-    """A step of `steps_of` as one line."""
+    """Return a step of `steps_of` as one line."""
     if step["kind"] == GOTO:
         return _drive(step)
     return Text(phrase(event_from_step(step), "past", show=shortened))
@@ -112,7 +100,7 @@ def _drive(step: Mapping[str, Any]) -> Text:
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:
-    """A table without lines; columns on the right, for numbers, are never wrapped."""
+    """Return a table without lines; right-aligned columns, for numbers, never wrap."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for side in justify:
         table.add_column(justify=side, no_wrap=side == "right", overflow="fold")

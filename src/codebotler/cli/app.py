@@ -11,7 +11,7 @@ from codebotler.cli import options
 from codebotler.cli.ending import obey
 from codebotler.cli.model_options import inherit_options, model_settings
 from codebotler.cli.operating import connect, missions, robots, run, serve_page, virtual_robot
-from codebotler.core.terminal import note, noting_all
+from codebotler.core.terminal import note, report_problems
 
 
 @inherit_options(model_settings)
@@ -138,7 +138,7 @@ def rules(
 
     For each rule, this finds a short example that keeps it and one that breaks it.
     """
-    from codebotler.checking.rule_review import reviewed
+    from codebotler.checking.rule_review import review_rules
     from codebotler.checking.rules import read_rules
     from codebotler.cli.rules import note_evasions, review_data, review_view
     from codebotler.core.skills.files import skills_from
@@ -152,7 +152,7 @@ def rules(
     if not any(rule.inside for rule in house_rules):
         note("goto covers destinations only; to keep the robot from driving through a room, use inside")
     with busy("looking for examples"):
-        found = reviewed(house_rules, known)
+        found = review_rules(house_rules, known)
     if json:
         print_json(review_data(found))
     else:
@@ -231,7 +231,7 @@ app.command("virtual-robot")(virtual_robot)
 
 def main() -> None:
     """Run the command line."""
-    with noting_all():
+    with report_problems():
         obey(app, "codebotler")
 
 

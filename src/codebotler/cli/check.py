@@ -10,10 +10,10 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from codebotler.checking.problems import Check, Problem, Sample
+from codebotler.checking.problems import CheckResult, Problem, Sample
 from codebotler.checking.storyboard import steps_of, storyboard
 from codebotler.core.errors import UserError
-from codebotler.core.files import MOST_FILE_BYTES, read_text, text_of
+from codebotler.core.files import MAX_FILE_BYTES, decode_text, read_text
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import RunError
 from codebotler.prompts.extract import program_in
@@ -33,13 +33,13 @@ def read_program(name: str) -> str:
         if not text.strip():
             raise UserError("it contains no program", file=name)
         return text
-    text = text_of(sys.stdin.buffer.read(MOST_FILE_BYTES + 1), STANDARD_INPUT)
+    text = decode_text(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), STANDARD_INPUT)
     if not text.strip():
         raise UserError("is empty; pipe a program or a model's reply into it", file=STANDARD_INPUT)
     return program_in(text)
 
 
-def check_view(found: Check, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
+def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
     """Show the verdict, the problems, and the actions in one sampled world, or in one of each kind."""
     parts: list[RenderableType] = [_verdict(found, name)]
     lines = program.rstrip("\n").split("\n")
@@ -54,7 +54,7 @@ def check_view(found: Check, program: str, name: str, *, shows_all: bool = False
     return Group(*parts)
 
 
-def _verdict(found: Check, name: str) -> Text:
+def _verdict(found: CheckResult, name: str) -> Text:
     count = len(found.problems)
     if not count:
         verdict = Text.assemble(("accepted", "bold green"), f": no problem in {visible(name)}")
@@ -83,7 +83,7 @@ def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
         yield Text(f"{mark} {number:{width}} | {text}", style)
 
 
-def _rooms(found: Check) -> Text:
+def _rooms(found: CheckResult) -> Text:
     shown = [f'"{shortened(room, 60)}"' for room in found.rooms[:MAX_ROOMS_SHOWN]]
     left = len(found.rooms) - len(shown)
     rooms = ", ".join([*shown, *([f"and {left} more"] if left > 0 else [])])
@@ -92,7 +92,7 @@ def _rooms(found: Check) -> Text:
     return Text(f"rooms named by the program: {rooms}\nto find misspelled rooms, add --world FILE", "yellow")
 
 
-def _vain_searches(found: Check) -> Iterator[Text]:
+def _vain_searches(found: CheckResult) -> Iterator[Text]:
     count = sum(sample.in_vain for sample in found.samples)
     if 0 < count < len(found.samples):
         often = f"{count} of {len(found.samples)} worlds"
@@ -102,13 +102,13 @@ def _vain_searches(found: Check) -> Iterator[Text]:
         )
 
 
-def _distinct_samples(found: Check) -> list[Sample]:
+def _distinct_samples(found: CheckResult) -> list[Sample]:
     """Return one sample for each different behaviour: problems first, then long successful runs."""
 
     def rank(sample: Sample) -> tuple[bool, bool, bool, int]:
         outcome = sample.outcome
         return (
-            sample.number not in found.showing,
+            sample.number not in found.evidence,
             outcome.error is not None,
             sample.in_vain,
             -len(outcome.trace),

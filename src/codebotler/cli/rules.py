@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from codebotler.checking.evasions import evasions
+from codebotler.checking.evasions import find_evasions
 from codebotler.checking.rule_review import Review
 from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
@@ -41,7 +41,7 @@ def rooms_of(world: World | None) -> list[str]:
 
 def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable) -> None:
     """Note how programs could evade rules; UserError if a rule cannot hold in the rooms of the world."""
-    for sentence in evasions(rules, rooms_of(world), skills):
+    for sentence in find_evasions(rules, rooms_of(world), skills):
         note(sentence)
 
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codebotler.checking.check import check
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.cli.check import check_view, read_program
 from codebotler.cli.generate import note_programless
 from codebotler.cli.views import EventPrinter, ending_view, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
+from codebotler.core.terminal import busy, confirm, note, print_rich, shortened
 from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.missions.log import MissionState
@@ -123,10 +123,10 @@ def tell_missing(robot: Robot) -> None:
         note(f"{robot.name} has no {listed(list(robot.missing))}; models read of its other skills only")
 
 
-def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], Check]:
+def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], CheckResult]:
     """The check of programs for a robot that has these skills."""
 
-    def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> Check:
+    def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> CheckResult:
         return check(program, room_map=room_map, house_rules=rules, skills=skills)
 
     return checked
@@ -166,7 +166,7 @@ def _is_approved(session: MissionSession, view: SessionView, robot: Robot, reque
         anyway = "; --despite-problems runs it anyway" if view.can_run else ""
         note(f"not run because of problems{anyway}")
         return False
-    if not request.yes and not says_yes(f"run the program on the robot {robot.name}?"):
+    if not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")
         note("not run; the robot has not moved")
         return False

@@ -1,4 +1,4 @@
-"""What every room needs: skills, worlds, traces, programs, errors, files, and what is written to a terminal.
+"""Foundations of all rooms: skills, worlds, traces, programs, errors, files and terminal output.
 
-Start with `skills.py` and `world.py`. Nothing here imports another room.
+Start with `skills` and `world.py`. Nothing here imports another room.
 """

@@ -1,4 +1,4 @@
-"""`functools.cached_property` without the lock that it has before Python 3.12."""
+"""`functools.cached_property` without its lock of Python 3.11."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING or sys.version_info >= (3, 12):
 else:
 
     class cached_property:  # noqa: N801 - named as in functools
-        """A property that is computed once; by two threads at the same time, perhaps twice.
+        """A property that is computed once, or twice by simultaneous threads.
 
-        The lock of functools is one for all objects of a class: a process that is forked while a thread
-        holds it would wait for ever.
+        The lock of functools is shared by all objects of a class: a process that forks while another thread
+        holds it would deadlock.
         """
 
         def __init__(self, compute: Callable[[Any], object]) -> None:

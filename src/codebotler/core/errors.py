@@ -1,4 +1,4 @@
-"""What users can mend: a mistake of theirs, with its file and line, and a package that is not installed."""
+"""Errors that users can fix: mistakes, with file and line, and missing packages; errors of a robot."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ EXTRAS = {
     "pyrobosim": "pyrobosim",
     "ray": "ray",
 }
-"""The extra of this distribution that brings each package."""
+"""The extra of this distribution that installs each package."""
 
-LONGEST_SENTENCE = 600  # characters of a sentence; of a longer one, the ends are shown
+MAX_SENTENCE_LENGTH = 600
 
 
 class UserError(ValueError):
-    """Something that a user gave cannot be used; one sentence says what, where, and how to mend it.
+    """A mistake in a user's input; one sentence says what is wrong, where, and how to fix it.
 
     Args:
-        sentence: what is wrong and, where it helps, the mend; put on one line, and a very long one shortened.
-        file: the file it is in.
+        sentence: the problem and the fix; joined to one line, and shortened if very long.
+        file: the file with the mistake.
         line: the line, counted from 1.
     """
 
     def __init__(self, sentence: str, *, file: Path | str | None = None, line: int | None = None) -> None:
-        self.sentence = both_ends(" ".join(sentence.splitlines()), LONGEST_SENTENCE)
+        self.sentence = elide_middle(" ".join(sentence.splitlines()), MAX_SENTENCE_LENGTH)
         self.file, self.line = file, line
         where = "" if file is None else f"{file}: " if line is None else f"{file}, line {line}: "
         super().__init__(where + self.sentence)
@@ -43,8 +43,8 @@ class UserError(ValueError):
         return partial(type(self), file=self.file, line=self.line), (self.sentence,), vars(self)
 
 
-def both_ends(text: str, longest: int) -> str:
-    """A text, or the two ends of a longer one."""
+def elide_middle(text: str, longest: int) -> str:
+    """Return a text, or both ends of a longer one."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"
 
@@ -53,25 +53,25 @@ BadInput = UserError  # the former name, for one version
 
 
 def expect_list(given: Sequence[str] | None, what: str) -> None:
-    """Refuse a single text in place of a list, since Python would take its letters."""
+    """Reject a string in place of a list, since Python would iterate over its characters."""
     if isinstance(given, str):
         raise UserError(f"{what} must be a list, not the single string {given[:40]!r}")
 
 
 def install_command(package: str) -> str:
-    """What to type to install the extra that brings a package."""
+    """Return the command that installs the extra with a package."""
     return f"pip install 'codebotler[{EXTRAS[package]}]'"
 
 
 def missing_package(error: ModuleNotFoundError) -> str:
-    """The package of an extra that an import did not find; empty if it was another."""
+    """Return the package of an extra that an import did not find; empty for any other package."""
     package = (error.name or "").split(".")[0]
     return package if package in EXTRAS else ""
 
 
 @contextmanager
 def installed() -> Iterator[None]:
-    """Import packages of an extra; UserError with the command that installs one that is missing."""
+    """Import packages of an extra; a missing one raises UserError with the command to install it."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -82,16 +82,16 @@ def installed() -> Iterator[None]:
 
 
 VIOLATION = "RuleViolation"
-"""The kind of error by which a house rule ends a run, or refuses a skill."""
+"""The kind of error with which a house rule ends a run or refuses a skill."""
 
 
 class RobotError(Exception):
-    """The robot cannot do what it was asked to do.
+    """A skill that the robot cannot execute.
 
     Args:
         kind: one of the seven kinds of the taxonomy (paper, section V.B, and AskInvalidOptions), or
             RuleViolation.
-        message: why, in a sentence.
+        message: the reason, in a sentence.
     """
 
     def __init__(self, kind: str, message: str) -> None:
@@ -100,7 +100,7 @@ class RobotError(Exception):
 
     @property
     def ends_run(self) -> bool:
-        """Whether the program cannot go on, whatever it catches."""
+        """Whether the run ends even if the program catches the error."""
         return False
 
     def __reduce__(self) -> tuple[object, ...]:

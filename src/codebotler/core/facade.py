@@ -1,8 +1,8 @@
-"""Lazy imports: the public names of a package, each imported when it is first used."""
+"""Lazy imports: the public names of a package, each imported on first use."""
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # what type checkers take for true; importing `typing` would cost what this saves
+TYPE_CHECKING = False  # true for type checkers; importing `typing` would cost what this saves
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 def facade(
     package: str, public: Mapping[str, Sequence[str]]
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """The `__getattr__` and `__dir__` of a package, from its name and the public names of its modules."""
+    """Return `__getattr__` and `__dir__` for a package with these public names of its modules."""
     homes = {name: module for module, names in public.items() for name in names}
 
     def get(name: str) -> object:
@@ -21,7 +21,7 @@ def facade(
         return getattr(import_module(f"{package}.{homes[name]}"), name)
 
     def names() -> list[str]:
-        from sys import modules  # noqa: PLC0415 - as above
+        from sys import modules  # noqa: PLC0415 - only used by dir()
 
         return sorted({*vars(modules[package]), *homes})
 

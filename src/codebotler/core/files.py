@@ -1,4 +1,4 @@
-"""Reading files with clear errors, logs that survive a crash, atomic replacement, and the state folder."""
+"""Read files with clear errors, append to logs safely, replace files atomically, find the state folder."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from typing import Any, BinaryIO
 
 from codebotler.core.errors import UserError
 
-CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # of a file system that does not sync folders
+SYNC_UNSUPPORTED = (errno.EINVAL, errno.ENOTSUP)  # from a file system that does not sync folders
 
-MOST_FILE_BYTES = 5_000_000
+MAX_FILE_BYTES = 5_000_000
 MAX_ROW = 5_000_000
 
 
 # --- whole texts
 
 
-def read_text(path: Path, *, limit: int = MOST_FILE_BYTES) -> str:
-    """The content of a UTF-8 file of at most so many bytes, or a UserError."""
-    return text_of(read_bytes(path, limit + 1), path, limit=limit)
+def read_text(path: Path, *, limit: int = MAX_FILE_BYTES) -> str:
+    """Read a UTF-8 file of at most `limit` bytes, or raise UserError."""
+    return decode_text(read_bytes(path, limit + 1), path, limit=limit)
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """The first bytes of a file, or a UserError."""
-    with _opened(path, path) as file:
+    """Read the first bytes of a file, or raise UserError."""
+    with _open(path, path) as file:
         try:
             return file.read(most)
         except OSError as error:
             raise UserError(f"cannot be read ({error.strerror})", file=path) from None
 
 
-def text_of(data: bytes, name: Path | str, *, limit: int = MOST_FILE_BYTES) -> str:
-    """The text of a file's bytes, with the line ends of any system and without a byte order mark."""
+def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -> str:
+    """Decode a file's bytes; use newlines as line ends and drop a byte order mark."""
     if len(data) > limit:
         raise UserError(f"is larger than {limit:,} bytes", file=name)
     _expect_not_utf_16(data, name)
@@ -53,12 +53,12 @@ def text_of(data: bytes, name: Path | str, *, limit: int = MOST_FILE_BYTES) -> s
 
 
 def _expect_not_utf_16(data: bytes, name: Path | str) -> None:
-    """Refuse the encoding that editors of Windows call Unicode, by the mark with which it begins."""
+    """Reject UTF-16, which editors on Windows call Unicode, by its byte order mark."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise UserError("is UTF-16 text; save it as UTF-8", file=name)
 
 
-def _opened(path: Path, name: Path | str) -> BinaryIO:
+def _open(path: Path, name: Path | str) -> BinaryIO:
     try:
         return path.open("rb")
     except FileNotFoundError:
@@ -75,8 +75,8 @@ def _opened(path: Path, name: Path | str) -> BinaryIO:
 def read_lines(
     path: Path, *, limit: int = MAX_ROW, name: Path | str | None = None
 ) -> Iterator[tuple[int, bytes]]:
-    """The lines of a file with their numbers, counted from 1; a line past the limit is a UserError."""
-    with _opened(path, name or path) as file:
+    """Yield the lines of a file with their numbers from 1; raise UserError for a line over the limit."""
+    with _open(path, name or path) as file:
         for number in count(1):
             line = file.readline(limit + 1)
             if not line:
@@ -89,11 +89,11 @@ def read_lines(
 
 
 def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[str, Any]]]:
-    """The objects in a file of JSON lines and their line numbers; a growing file may end in a torn line."""
+    """Yield the line numbers and objects of a JSON Lines file; a growing file may end in a torn line."""
     for number, line in read_lines(path):
         if line.strip():
             try:
-                row = parsed_row(line)
+                row = parse_row(line)
             except UserError as error:
                 raise UserError(error.sentence, file=path, line=number) from None
             if row is None and growing and not line.endswith(b"\n"):
@@ -103,8 +103,8 @@ def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[
             yield number, row
 
 
-def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
-    """The JSON object of a line; None if the line is not JSON, a UserError if it is no object."""
+def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
+    """Return the JSON object of a line; None if the line is not JSON; UserError if it is not an object."""
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
@@ -116,20 +116,19 @@ def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None
 
 
 def to_line(row: object) -> bytes:
-    """A row as a line of JSON, in UTF-8."""
-    # Half of a surrogate pair, which UTF-8 cannot hold, becomes an escape, which JSON reads.
+    """Encode a row as a line of JSON in UTF-8; lone surrogates become JSON escapes."""
     return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
 def to_text(data: dict[str, Any]) -> bytes:
-    """A JSON file for people to read."""
+    """Encode an indented JSON file for people to read."""
     return json.dumps(data, indent=2, ensure_ascii=False).encode() + b"\n"
 
 
 class Appender:
-    """A file of lines that only grows; a last line that a crash has torn is cut off when it is opened.
+    """A file of lines that only grows; opening it cuts off a last line that a crash has torn.
 
-    If it is exclusive, a BlockingIOError says that another process has locked it.
+    An exclusive one raises BlockingIOError if another process has locked the file.
     """
 
     def __init__(self, path: Path, *, exclusive: bool = False) -> None:
@@ -141,30 +140,30 @@ class Appender:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if is_new:
                 sync_folder(path.parent)
-            self._is_file = path.is_file()  # and no device or pipe
-            if self._is_file and (whole := _whole_length(path)) < path.stat().st_size:
+            self._is_file = path.is_file()  # rather than a device or a pipe
+            if self._is_file and (whole := _intact_length(path)) < path.stat().st_size:
                 self._file.truncate(whole)
         except BaseException:
             self._file.close()
             raise
 
     def append(self, line: bytes) -> None:
-        """Add a line, whole or not at all; an OSError if the disk is full."""
+        """Add a line completely or not at all; OSError if the disk is full."""
         descriptor = self._file.fileno()
         start = os.fstat(descriptor).st_size
-        with naming(self.path):
+        with name_in_errors(self.path):
             try:
                 while line:
                     line = line[os.write(descriptor, line) :]
             except OSError:
-                with suppress(OSError):  # a device has nothing to take back
+                with suppress(OSError):  # a device cannot be truncated
                     self._file.truncate(start)
                 raise
 
     def sync(self) -> None:
         """Flush everything to the disk; may be called from another thread."""
         if self._is_file:
-            with naming(self.path):
+            with name_in_errors(self.path):
                 os.fsync(self._file.fileno())
 
     def close(self) -> None:
@@ -173,8 +172,7 @@ class Appender:
             self.sync()
 
 
-def _whole_length(path: Path) -> int:
-    """The length of a file without a torn last line, in bytes."""
+def _intact_length(path: Path) -> int:
     with path.open("rb") as file:
         if not os.fstat(file.fileno()).st_size:
             return 0
@@ -186,8 +184,8 @@ def _whole_length(path: Path) -> int:
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
-    """Put a file's name into the system's errors, which often lack it."""
+def name_in_errors(path: Path) -> Iterator[None]:
+    """Add a file's name to errors of the system, which often lack it."""
     try:
         yield
     except OSError as error:
@@ -197,18 +195,18 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes | memoryview) -> None:
-    """Replace a file in one step; after a crash it is there whole or as it was."""
-    with written_whole(path) as file:
+    """Replace a file atomically: after a crash it has either the old or the new content."""
+    with open_replacement(path) as file:
         file.write(content)
 
 
 @contextmanager
-def written_whole(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
-    """A file to write to that takes its place when all is written; after an error the old one stays."""
+def open_replacement(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
+    """Open a file that replaces `path` atomically on success; after an error the old one stays."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary or path.with_name(path.name + ".new")
     try:
-        with naming(path):
+        with name_in_errors(path):
             with temporary.open("wb") as file:
                 yield file
                 file.flush()
@@ -220,59 +218,58 @@ def written_whole(path: Path, temporary: Path | None = None) -> Iterator[BinaryI
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush a folder's list of files to the disk, as far as its file system can.
-
-    Without it, a file whose content is on the disk may be gone after a power failure.
-    """
+    """Flush a folder to the disk, so that a new file in it survives a power failure."""
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except PermissionError:  # a folder that may be written but not read
+    except PermissionError:  # the folder is writable but not readable
         return
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in CANNOT_SYNC:
+        if error.errno not in SYNC_UNSUPPORTED:
             raise OSError(error.errno, error.strerror, str(folder)) from None
     finally:
         os.close(descriptor)
 
 
 def expect_replaceable(path: Path, *beginnings: bytes) -> None:
-    """Refuse to overwrite a file that does not begin like one that we write."""
+    """Refuse to overwrite a file that does not begin like ours."""
     if path.is_file():
         with path.open("rb") as file:
             start = file.read(max(map(len, beginnings)))
         if start and not start.startswith(beginnings):
-            raise UserError("this file holds something else; name another one, or remove it", file=path)
+            raise UserError("this file has other content; name another one or remove it", file=path)
 
 
 # --- the state folder
 
 
 def home() -> Path:
-    """The folder of missions and what belongs to them; it need not exist."""
-    named, state = os.environ.get("CODEBOTLER_HOME"), os.environ.get("XDG_STATE_HOME")
-    if named:
-        return Path(named).absolute()
-    try:
-        return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
-    except RuntimeError:  # a user without a home, as in containers
-        raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder") from None
+    """Return the state folder, which holds missions and need not exist."""
+    folder = _user_folder("XDG_STATE_HOME", ".local/state")
+    if folder is None:
+        raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder")
+    return folder
 
 
 def config_file() -> Path | None:
-    """The file of a user's settings, which need not exist; None for a user without a home."""
-    named, config = os.environ.get("CODEBOTLER_HOME"), os.environ.get("XDG_CONFIG_HOME")
-    if named:
-        return Path(named).absolute() / "config.yaml"
+    """Return the file of the user's settings, which need not exist; None without a home folder."""
+    folder = _user_folder("XDG_CONFIG_HOME", ".config")
+    return None if folder is None else folder / "config.yaml"
+
+
+def _user_folder(variable: str, default: str) -> Path | None:
+    if ours := os.environ.get("CODEBOTLER_HOME"):
+        return Path(ours).absolute()
+    base = os.environ.get(variable)
     try:
-        return (Path(config) if config else Path.home() / ".config") / "codebotler" / "config.yaml"
-    except RuntimeError:  # a user without a home, as in containers
+        return (Path(base) if base else Path.home() / default) / "codebotler"
+    except RuntimeError:  # the user has no home folder, as in containers
         return None
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder to write into; a UserError if that is not allowed."""
+    """Create a folder to write into; UserError if that is not allowed."""
     with suppress(PermissionError):
         folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):

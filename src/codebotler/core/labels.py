@@ -1,9 +1,9 @@
-"""Labels of a world are regexes; those whose search may take exponential time are refused by a simple rule.
+"""Validate labels of a world: regexes whose search cannot take exponential time.
 
-Python tries every way to match, and nothing can interrupt it meanwhile. So in a world, a repeat holds single
-characters only, one repeat at most has no limit, and few ways are left to match the same text. That refuses
-some regexes that are quick; names of rooms, things and people, and answers, need no others. `.*` at the start
-or the end of a label changes nothing and costs nothing.
+Python backtracks through every way to match, and nothing can interrupt it. So in a label, a repeat holds
+single characters only, at most one repeat has no limit, and few ways remain to match the same text. This
+simple rule also rejects some quick regexes, which names and answers do not need. `.*` at either end of a
+label is free.
 """
 
 from __future__ import annotations
@@ -16,11 +16,9 @@ from typing import Any
 
 from codebotler.core.regex_flags import scope_flags
 
-PLAIN_LABEL = re.compile(
-    r"[\w ',;:!%@&/-]*"
-)  # texts, most names among them, that are regexes which find themselves
-ENDLESS_REPEATS = 100  # times from which a repeat counts as one without limit
-MOST_WAYS, MOST_BESIDE_ENDLESS = 1_000, 40  # to match one text, the second beside a repeat without limit
+PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
+ENDLESS_REPEATS = 100  # a repeat of more counts as unlimited
+MAX_WAYS, MAX_WAYS_BESIDE_ENDLESS = 1_000, 40  # to match one text; the second with an unlimited repeat
 ANY_LABEL = ".*"
 SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
 REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
@@ -30,14 +28,14 @@ UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
 
 
 class SlowRegexError(Exception):
-    """A regex may take long to find; the text says why, and what to write instead."""
+    """A regex that may be slow to search; the text says why and what to write instead."""
 
 
 def check_label(text: str) -> str:
-    """Return a label, unless it is no regular expression, or one that may take long to find.
+    """Return a label.
 
     Raises:
-        ValueError: it is one of these; the message says which.
+        ValueError: it is not a regular expression, or it may be slow to search.
     """
     if PLAIN_LABEL.fullmatch(text):
         return text
@@ -50,10 +48,10 @@ def check_label(text: str) -> str:
 
 
 def check_regex(text: str) -> str:
-    """Return a regular expression; a ValueError for any other text."""
+    """Return a regular expression; raise ValueError for any other text."""
     try:
         re.compile(text)
-        re.compile(f"(?:{scope_flags(text)})")  # whole words are found by a regex around it
+        re.compile(f"(?:{scope_flags(text)})")  # the pattern for whole words wraps it
     except (re.error, RecursionError, OverflowError) as error:
         raise ValueError(f"it is not a valid regular expression: {error}") from None
     return text
@@ -61,21 +59,21 @@ def check_regex(text: str) -> str:
 
 @lru_cache(maxsize=1024)
 def expect_quick(pattern: str) -> None:
-    """Raise SlowRegexError if a regex breaks the rule above."""
+    """Raise SlowRegexError if a regex breaks the rule of this module."""
     if pattern != ANY_LABEL:
         pattern = pattern.removeprefix(ANY_LABEL)
         pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANY_LABEL)
     ways, endless = _cost(import_module("re._parser").parse(pattern))
     if endless > 1:
         raise SlowRegexError("two repeats have no limit; write a limit, as in .{0,50}")
-    if ways > (MOST_BESIDE_ENDLESS if endless else MOST_WAYS):
+    if ways > (MAX_WAYS_BESIDE_ENDLESS if endless else MAX_WAYS):
         raise SlowRegexError("there are too many ways to match one text; use fewer repeats and choices")
 
 
 def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - of private classes of `re`
-    """In how many ways a part of a regex may match one text, and how many repeats without limit it has."""
+    """Return the ways in which part of a regex may match one text, and its number of unlimited repeats."""
     costs = [(str(op), *_cost_of(str(op), value)) for op, value in tree]
-    # Nothing goes back into what looks ahead or behind: its cost comes beside that of the rest.
+    # Python never backtracks into a lookaround, so its cost is added to that of the rest.
     looks = [(ways, endless) for op, ways, endless in costs if op in LOOK_OPCODES]
     rest = [(ways, endless) for op, ways, endless in costs if op not in LOOK_OPCODES]
     return (

@@ -1,4 +1,4 @@
-"""Events in English: what a robot does, to what, and with which result."""
+"""Describe events in English, with objects and results."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from codebotler.core.trace import Event, Option
 from codebotler.core.words import brief
 
 NO_ANSWER = "no answer"
-MOST_BRACKETED = 20  # options
+MAX_BRACKETED_OPTIONS = 20  # options
 
 
 def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, quote: str = '"') -> str:
-    """An event, such as `looked for "mug": found`, `picking up "mug"` or `asked "Tea?" [yes | no] → yes`.
+    """Describe an event, such as `looked for "mug": found` or `asked "Tea?" [yes | no] → yes`.
 
-    The result is added if there is one: to a verb in a sentence's middle (`base`, `ing`) in parentheses.
+    The result, if any, follows the verb; for the forms `base` and `ing` in parentheses.
 
     Args:
-        event: what the robot did or is doing.
-        form: of the verb.
-        show: cuts texts and makes them fit for where they are shown.
-        quote: the mark around texts.
+        event: the event.
+        form: the form of the verb.
+        show: shortens and escapes texts for the output.
+        quote: the quotation mark around texts.
     """
     answer = None if event.answer is None else show(event.answer)
     if form == "ing" and answer is not None:
@@ -34,27 +34,29 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
         result = f"answer {quote}{answer}{quote}" if answer is not None else result_words(event)
         return f"{words} ({result})" if result else words
     if event.options:
-        words += f" {bracketed(event.options, show)}"
+        words += f" {bracket_options(event.options, show)}"
     if form == "past" and (answer is not None or is_question(event.kind)):
         return f"{words} → {NO_ANSWER if answer is None else answer}"
     return f"{words}: {result}" if (result := result_words(event)) else words
 
 
 def verb_phrase(kind: str, form: VerbForm, given: Sequence[str], quote: str = '"') -> str:
-    """A form of the verb of a kind of event, and what its skill was given."""
-    is_bare = not given or (not given[0] and by_event(kind) is None) or takes_nothing(kind)
+    """Return a form of the verb of a kind of event with the arguments of its skill."""
+    is_bare = not given or (not given[0] and by_event(kind) is None) or has_no_text(kind)
     return verb(kind).with_object(getattr(verb(kind), form), [] if is_bare else given, quote)
 
 
 def result_words(event: Event) -> str:
-    """The yes or no of an event in the words of its skill, such as `not found`; empty if it has none."""
+    """Return the result of an event in words, such as `not found`; empty if it has none."""
     return "" if event.found is None else verb(event.kind).results[event.found]
 
 
-def bracketed(options: Sequence[Option], show: Callable[[str], str] = brief) -> str:
-    """The options of a question, such as `[yes | no]`."""
-    shown = [f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in options[:MOST_BRACKETED]]
-    more = len(options) - MOST_BRACKETED
+def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brief) -> str:
+    """Return the options of a question, such as `[yes | no]`."""
+    shown = [
+        f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in options[:MAX_BRACKETED_OPTIONS]
+    ]
+    more = len(options) - MAX_BRACKETED_OPTIONS
     return f"[{' | '.join(shown + [f'{more:,} more'] * (more > 0))}]"
 
 
@@ -66,20 +68,20 @@ def verb(kind: str) -> Verb:
     return Verb(f"do {shown}", f"does {shown}", f"did {shown}", f"doing {shown}", f"did {shown}")
 
 
-def takes_nothing(kind: str) -> bool:
-    """Whether events of a kind have no text, since their skill has no arguments."""
+def has_no_text(kind: str) -> bool:
+    """Whether events of a kind have no text because their skill has no parameters."""
     recording = _recording(kind)
     return recording is not None and not recording.text
 
 
 def is_spoken(kind: str) -> bool:
-    """Whether the text of an event is said aloud."""
+    """Whether events of a kind are spoken."""
     recording = _recording(kind)
     return recording is not None and recording.is_spoken
 
 
 def is_question(kind: str) -> bool:
-    """Whether an event offers options."""
+    """Whether events of a kind offer options."""
     recording = _recording(kind)
     return recording is not None and recording.options is not None
 

@@ -1,7 +1,7 @@
-"""Programs as text: parsing, the skills they call, and certain errors.
+"""Parse programs, and find the skills they call and certain errors.
 
-Parsing takes linear time, but for texts in which CPython 3.11 is quadratic, so it has a bound. Compiling,
-`symtable` and pyflakes have no bound of their own: on text that others wrote, they run only in isolated
+A limit on the length bounds the time to parse, which is quadratic for some texts in CPython 3.11. Nothing
+bounds the time to compile and to run `symtable` and pyflakes: apply them to untrusted text only in isolated
 processes (`codebotler.simulator.isolated_call`).
 """
 
@@ -22,20 +22,22 @@ from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill, SkillTable
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.core.words import counted, listed
 
 TASK_FUNCTION = "task_program"
-LONGEST_PROGRAM = 20_000  # characters of a program that is parsed: at most a tenth of a second
-MOST_NAMES, LONGEST_MISSPELT_NAME, MOST_HINTS = 1_000, 60, 10  # of a program, for hints about misspelt ones
-NAME_CUTOFF = 0.65  # the least likeness of a name that may have been meant, from 0 to 1
+MAX_PROGRAM_LENGTH = 20_000  # characters; parsing them takes at most a tenth of a second
+MAX_KNOWN_NAMES, MAX_MISSPELT_LENGTH, MAX_HINTS = 1_000, 60, 10  # limits of hints about misspelt names
+NAME_CUTOFF = 0.65  # the least similarity of a suggested name, from 0 to 1
 GIVEN_MODULES = ("time", "sys")  # modules that every program finds imported
-FILE = "<program>"
+SOURCE_NAME = "<program>"
 
-warnings.filterwarnings("ignore", module=FILE)  # about invalid escapes such as "\d" in the programs of models
+warnings.filterwarnings(
+    "ignore", module=SOURCE_NAME
+)  # about invalid escapes such as "\d" in the programs of models
 
-# CPython before 3.13 counts the depth of all trees in the making together: where two threads parse at the
-# same time, one of them gets a SystemError. A forked process must not find the lock closed.
+# CPython before 3.13 adds up the depths of the trees that all threads are building: of two threads that
+# parse at the same time, one gets a SystemError. A forked process must not inherit a locked lock.
 _PARSING = threading.Lock()
 os.register_at_fork(
     before=_PARSING.acquire, after_in_parent=_PARSING.release, after_in_child=_PARSING.release
@@ -47,9 +49,9 @@ class Flaw:
     """A certain error of a program."""
 
     line: int | None  # counted from 1; None where no line is to blame
-    kind: str  # of the failure that it leads to, such as `NameError` or `AskEmptyOptions`
+    kind: str  # the kind of failure it leads to, such as `NameError` or `AskEmptyOptions`
     message: str  # one plain sentence
-    is_misuse: bool = False  # of a skill, which an `except` for all errors hides, and does not make right
+    is_misuse: bool = False  # whether it misuses a skill, which a broad `except` hides but does not fix
 
 
 @dataclass(frozen=True)
@@ -71,16 +73,16 @@ class Program:
 
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """The syntax tree of a source, which nobody may change, with the errors of `ast.parse`."""
+    """Return the syntax tree of a source, which callers must not change; raise as `ast.parse` does."""
     with _PARSING:
-        return ast.parse(composed(source), FILE)
+        return ast.parse(compose(source), SOURCE_NAME)
 
 
 @lru_cache(maxsize=8)
 def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
-    """All nodes of a program's tree, in the order of `ast.walk`."""
+    """Return all nodes of a program's tree, in the order of `ast.walk`."""
     found: list[ast.AST] = [tree]
-    for node in found:  # which grows meanwhile
+    for node in found:  # the list grows as the loop runs
         for name in node._fields:
             part = getattr(node, name, None)
             if isinstance(part, ast.AST):
@@ -91,45 +93,45 @@ def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
 
 
 def parse_expression(source: str) -> ast.expr:
-    """The syntax tree of an expression, with the errors of `ast.parse`."""
+    """Return the syntax tree of an expression; raise as `ast.parse` does."""
     with _PARSING:
-        return ast.parse(source, FILE, mode="eval").body
+        return ast.parse(source, SOURCE_NAME, mode="eval").body
 
 
-def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
-    """The syntax tree of any text, or why there is none; hostile nesting ends in CPython's own exceptions.
+def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
+    """Return the syntax tree of any text, or the flaw that prevents parsing.
 
-    If `compiled` is set, the compiler looks for further errors, such as a stray `return`. On text that others
-    wrote, only a closed process may do that.
+    With `compiled`, also find errors of the compiler, such as a stray `return`; only an isolated process may
+    do that with untrusted text.
     """
-    if "\0" in source or len(source) > LONGEST_PROGRAM:
-        return _unreadable(source)
+    if "\0" in source or len(source) > MAX_PROGRAM_LENGTH:
+        return _text_flaw(source)
     try:
         tree = parse(source)
         if compiled:
             with _PARSING:
-                compile(tree, FILE, "exec", dont_inherit=True)
+                compile(tree, SOURCE_NAME, "exec", dont_inherit=True)
     except SyntaxError as error:
         return Flaw(error.lineno or None, type(error).__name__, f"the program does not parse: {error.msg}")
     except UnicodeEncodeError as error:
         line = source[: error.start].count("\n") + 1
         return Flaw(line, type(error).__name__, "the program contains a lone surrogate")
     except (RecursionError, MemoryError) as error:
-        return _too_deep(error)
+        return _nesting_flaw(error)
     except (ValueError, OverflowError, SystemError) as error:
         return Flaw(None, type(error).__name__, f"the program cannot be read: {error}")
     return tree
 
 
-def _unreadable(source: str) -> Flaw:
-    if len(source) > LONGEST_PROGRAM:
-        return Flaw(None, "MemoryError", f"the program is longer than {LONGEST_PROGRAM:,} characters")
+def _text_flaw(source: str) -> Flaw:
+    if len(source) > MAX_PROGRAM_LENGTH:
+        return Flaw(None, "MemoryError", f"the program is longer than {MAX_PROGRAM_LENGTH:,} characters")
     line = source[: source.index("\0")].count("\n") + 1
     return Flaw(line, "SyntaxError", "the program contains a null character")
 
 
 def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth values, lists of them
-    """The value of a literal; a ValueError for others, and for dictionaries and sets: keys may collide."""
+    """Evaluate a literal; raise ValueError for other nodes, dictionaries and sets (hash collisions)."""
     try:
         if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
             return ast.literal_eval(node)
@@ -138,21 +140,21 @@ def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth valu
     raise ValueError("it is a dictionary or a set")
 
 
-def tree_of(source: str) -> ast.Module:
-    """The syntax tree of a source; an empty one if it does not parse."""
-    tree = parsed(source)
+def parse_leniently(source: str) -> ast.Module:
+    """Return the syntax tree of a source; an empty tree if it does not parse."""
+    tree = parse_program(source)
     return ast.Module([], []) if isinstance(tree, Flaw) else tree
 
 
-def _too_deep(error: Exception) -> Flaw:
+def _nesting_flaw(error: Exception) -> Flaw:
     return Flaw(None, type(error).__name__, "the program is nested too deeply to be checked")
 
 
 # --- what a program defines and calls
 
 
-def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """The definitions of `task_program` directly in the module."""
+def task_definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """Return the definitions of `task_program` at module level."""
     return [
         node
         for node in tree.body
@@ -160,19 +162,19 @@ def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     ]
 
 
-def bound_names(source: str) -> set[str]:
-    """The names that a source defines or imports at module level; none if it does not compile."""
-    return set() if isinstance(parsed(source, compiled=True), Flaw) else _bound_in_module(source)
+def module_bound_names(source: str) -> set[str]:
+    """Return the names that a source binds at module level; none if it does not compile."""
+    return set() if isinstance(parse_program(source, compiled=True), Flaw) else _bound_in_module(source)
 
 
 def _bound_in_module(source: str) -> set[str]:
     with _PARSING:
-        symbols = symtable.symtable(source, FILE, "exec").get_symbols()
+        symbols = symtable.symtable(source, SOURCE_NAME, "exec").get_symbols()
     return {s.get_name() for s in symbols if s.is_assigned() or s.is_imported()}
 
 
-def names_bound(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """The names that a program defines anywhere, in whatever scope; `*` after `from x import *`."""
+def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
+    """Return the names that a program binds in any scope; `*` after `from x import *`."""
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -191,8 +193,8 @@ def names_bound(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """The skills that a program names, unless it redefines them, each with the first line."""
-    rebound = names_bound(tree)
+    """Return the skills that a program uses and does not redefine, each with its first line."""
+    rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
         if isinstance(node, ast.Name) and node.id in skills and node.id not in rebound:
@@ -201,14 +203,14 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
-    """The line and name of each use of an undefined name, and whether it is a local one used too early."""
+    """Return line and name of each undefined name, and whether it is a local variable used too early."""
     messages, names_in = _pyflakes()
-    # Names in annotations that are texts are never looked up when a program runs.
+    # Names in string annotations are never looked up at run time.
     spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
     with _PARSING:
         found = names_in(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
     return [
-        # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
+        # pyflakes gives the bare name, not a tuple, where a local variable hides a builtin
         (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
         for m in found
         for is_local in [isinstance(m, messages.UndefinedLocal)]
@@ -218,16 +220,13 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
 
 @cache
 def _pyflakes() -> tuple[Any, Callable[..., Any]]:
-    """What pyflakes says, and what looks for it.
-
-    Imported where it is used: it takes a tenth of a second, which every command line would pay.
-    """
-    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - see above
-    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - the same
+    """Import pyflakes on first use, since that takes a tenth of a second."""
+    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - slow
+    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
     class Names(Checker):  # type: ignore[misc]  # which has no types
         def addBinding(self, node: ast.AST | None, value: Any) -> None:  # noqa: ANN401, N802 - pyflakes' own
-            if node is None:  # built in, like some 170 others of each program
+            if node is None:  # one of some 170 builtins, for which the quick way suffices
                 self.scope[value.name] = value
             else:
                 super().addBinding(node, value)
@@ -238,32 +237,31 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
 # --- certain errors
 
 
-def flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """Find the certain errors of a program, by line; it is compiled, and not run.
+def find_flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
+    """Find the certain errors of a program, sorted by line, without running it.
 
     Args:
-        source: its text, from a trusted author or in a closed process.
-        skills: what the program may call.
+        source: the program; untrusted text only in an isolated process.
+        skills: the skills that the program may call.
     """
-    tree = parsed(source, compiled=True)
-    return (tree,) if isinstance(tree, Flaw) else flaws_of(tree, source, skills)
+    tree = parse_program(source, compiled=True)
+    return (tree,) if isinstance(tree, Flaw) else find_tree_flaws(tree, source, skills)
 
 
-def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """The certain errors of a program that compiles, by line."""
+def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
+    """Find the certain errors of a program that compiles, sorted by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:
-        found = [_too_deep(error)]
+        found = [_nesting_flaw(error)]
     return tuple(sorted(dict.fromkeys(found), key=lambda flaw: flaw.line or 0))
 
 
 def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
-    """Whether `task_program` is there and can be called without arguments."""
     if TASK_FUNCTION not in _bound_in_module(source):
         yield Flaw(None, "NameError", f"the program defines no {TASK_FUNCTION} at module level")
-    found = entries(tree)
-    if not found or found[-1].decorator_list or TASK_FUNCTION in names_bound(tree, ignoring=found):
+    found = task_definitions(tree)
+    if not found or found[-1].decorator_list or TASK_FUNCTION in all_bound_names(tree, ignoring=found):
         return
     entry = found[-1]
     if isinstance(entry, ast.AsyncFunctionDef):
@@ -280,7 +278,9 @@ def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
 
 def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
     undefined = undefined_names(tree, skills)
-    hints = _meant(tree, dict.fromkeys(name for _, name, is_local in undefined if not is_local), skills)
+    hints = _suggest_names(
+        tree, dict.fromkeys(name for _, name, is_local in undefined if not is_local), skills
+    )
     called = {n.func.id for n in nodes(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
     for line, name, is_local in undefined:
         if is_local:
@@ -295,13 +295,13 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
             yield Flaw(line, "NameError", message, is_misuse=name in called)
 
 
-def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
-    """The names that may be meant by undefined ones, as far as that is quickly found."""
-    known = sorted({*names_bound(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
+def _suggest_names(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
+    """Suggest known names for undefined ones, within a short time."""
+    known = sorted({*all_bound_names(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
-    if len(known) > MOST_NAMES:
+    if len(known) > MAX_KNOWN_NAMES:
         return found
-    for name in islice((one for one in undefined if len(one) <= LONGEST_MISSPELT_NAME), MOST_HINTS):
+    for name in islice((one for one in undefined if len(one) <= MAX_MISSPELT_LENGTH), MAX_HINTS):
         alike = get_close_matches(name, (other for other in known if other != name), n=1, cutoff=NAME_CUTOFF)
         if alike:
             found[name] = alike[0]
@@ -309,22 +309,20 @@ def _meant(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> di
 
 
 def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
-    """Calls of skills that cannot succeed."""
-    rebound = names_bound(tree)
+    rebound = all_bound_names(tree)
     if "*" in rebound:
         return
     for node in nodes(tree):
         match node:
             case ast.Call(ast.Name(name)) if name in skills and name not in rebound:
                 is_own = name not in SKILLS
-                yield from (replace(flaw, is_misuse=is_own) for flaw in _wrong_call(node, skills[name]))
+                yield from (replace(flaw, is_misuse=is_own) for flaw in _check_call(node, skills[name]))
 
 
-def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
-    is_open = any(isinstance(a, ast.Starred) for a in node.args) or any(k.arg is None for k in node.keywords)
-    if is_open:
+def _check_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
+    if any(isinstance(a, ast.Starred) for a in node.args) or any(k.arg is None for k in node.keywords):
         return
-    message = _mismatch(node, skill)
+    message = _describe_mismatch(node, skill)
     if message:
         yield Flaw(node.lineno, "TypeError", message)
         return
@@ -332,13 +330,12 @@ def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
     given |= {k.arg: k.value for k in node.keywords if k.arg}
     for parameter in skill.parameters:
         if parameter.is_options:
-            yield from _wrong_options(given[parameter.name], skill, parameter)
+            yield from _check_options(given[parameter.name], skill, parameter)
         elif skill.name not in SKILLS:
-            yield from _wrong_value(given[parameter.name], skill, parameter)
+            yield from _check_value(given[parameter.name], skill, parameter)
 
 
-def _mismatch(node: ast.Call, skill: Skill) -> str | None:
-    """Why the arguments do not fit the skill's parameters, in a sentence."""
+def _describe_mismatch(node: ast.Call, skill: Skill) -> str | None:
     names = [p.name for p in skill.parameters]
     takes = f"{skill.name} takes {listed(names) or 'no arguments'}"
     keywords = [k.arg for k in node.keywords if k.arg]
@@ -353,8 +350,7 @@ def _mismatch(node: ast.Call, skill: Skill) -> str | None:
     return f"{takes}, but got {counted(count, 'argument') if count else 'none'}"
 
 
-def _wrong_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
-    """A value that is written where it is passed, and that a skill does not take."""
+def _check_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
     try:
         value = ast.literal_eval(node)
     except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):
@@ -365,12 +361,12 @@ def _wrong_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator
         yield Flaw(node.lineno, "ValueError" if is_choice else "TypeError", message)
 
 
-def _wrong_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
+def _check_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
     what = f"the {parameter.name} of {skill.name}"
     if isinstance(node, ast.List):
         if not node.elts:
             yield Flaw(node.lineno, "AskEmptyOptions", f"{what} are an empty list")
-    elif given := _literal(node):
+    elif given := _name_literal(node):
         yield Flaw(node.lineno, "TypeError", f"{what} must be a list, but {given} is given")
 
 
@@ -383,8 +379,7 @@ _LITERALS: dict[type[ast.expr], str] = {
 }
 
 
-def _literal(node: ast.expr) -> str | None:
-    """The kind of a literal, in words; None for other expressions."""
+def _name_literal(node: ast.expr) -> str | None:
     if isinstance(node, ast.Constant):
         return "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"
     return _LITERALS.get(type(node))

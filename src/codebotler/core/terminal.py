@@ -1,4 +1,4 @@
-"""All output of the commands; control characters are escaped, so that no terminal obeys them."""
+"""All output of the commands, with control characters escaped."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-WIDEST = 10_000
-QUIET_S = 2.0  # after which a command says what it is doing
+MAX_PIPE_WIDTH = 10_000
+QUIET_S = 2.0  # before a command says what it is doing
 
 
 @contextmanager
-def noting_all() -> Iterator[None]:
-    """Print logs, warnings and tracebacks as notes while a command runs; an unknown error exits with 1."""
+def report_problems() -> Iterator[None]:
+    """Print logs, warnings and tracebacks as notes; exit with 1 after an unexpected error."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # what the terminal cannot show ends no command
+        sys.stdout.reconfigure(errors="backslashreplace")  # for terminals without Unicode
     before = logging.lastResort, warnings.showwarning, threading.excepthook
     logging.lastResort = _Notes(logging.WARNING)
     warnings.showwarning = _note_warning
     threading.excepthook = lambda args: _note_error(args.exc_value)
     try:
         yield
-    except Exception as error:  # noqa: BLE001 - whatever it is
+    except Exception as error:  # noqa: BLE001 - a last resort
         _note_error(error)
         raise SystemExit(1) from None
     finally:
@@ -57,24 +57,24 @@ def _note_error(error: BaseException | None) -> None:
 
 
 def open_streams() -> None:
-    """Let closed standard streams lead nowhere, since files that we open would take their numbers."""
+    """Open closed standard streams on /dev/null, or files that we open would take their numbers."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
 def flush_output() -> None:
-    """Flush the output."""
+    """Flush stdout."""
     sys.stdout.flush()
 
 
 def drop_output() -> None:
-    """Discard the rest of the output."""
+    """Discard the rest of stdout."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def console(*, stderr: bool = False, highlight: bool = True) -> Console:
-    """A rich console that writes no control characters but its own."""
+    """Return a rich console that escapes control characters in texts."""
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
 
@@ -90,7 +90,7 @@ def console(*, stderr: bool = False, highlight: bool = True) -> Console:
 
 
 def progress(*columns: ProgressColumn) -> Progress:
-    """A progress bar on stderr; nothing without a terminal."""
+    """Return a progress bar on stderr, disabled without a terminal."""
     from rich.progress import Progress
 
     where = console(stderr=True)
@@ -98,7 +98,7 @@ def progress(*columns: ProgressColumn) -> Progress:
 
 
 def print_rich(what: RenderableType) -> None:
-    """Draw on the terminal, or plainly into a pipe, with lines of any length unless COLUMNS is set."""
+    """Print to a terminal, or plainly to a pipe with lines of any length unless COLUMNS is set."""
     from rich.measure import Measurement
 
     drawing = console()
@@ -106,7 +106,7 @@ def print_rich(what: RenderableType) -> None:
         drawing.print(what, crop=False)
         return
     if "COLUMNS" not in os.environ:
-        natural = Measurement.get(drawing, drawing.options.update(max_width=WIDEST), what).maximum
+        natural = Measurement.get(drawing, drawing.options.update(max_width=MAX_PIPE_WIDTH), what).maximum
         drawing.width = max(drawing.width, natural)
     with drawing.capture() as drawn:
         drawing.print(what, crop=False)
@@ -115,7 +115,7 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show what a command is doing: with a timer on a terminal, elsewhere in one line after a while."""
+    """Show what a command is doing: a timer on a terminal, elsewhere a line after two seconds."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     line = Timer(QUIET_S, note, [f"{doing} ..."])
@@ -137,7 +137,7 @@ def print_json(data: object) -> None:
 
 
 def print_source(text: str) -> None:
-    """Print a program: visibly on a terminal, as it is into a file or a pipe."""
+    """Print a program, escaped on a terminal and unchanged to a file or a pipe."""
     if sys.stdout.isatty():
         text = visible_lines(text)
     print(text, end="" if text.endswith("\n") else "\n")
@@ -149,38 +149,38 @@ def print_text(text: str) -> None:
 
 
 def note(sentence: str) -> None:
-    """Print to stderr, so that results stay apart on stdout."""
+    """Print to stderr, apart from results on stdout."""
     print(visible_lines(sentence), file=sys.stderr)
 
 
-def says_yes(question: str) -> bool:
-    """Ask a question on stderr; anything but yes means no."""
+def confirm(question: str) -> bool:
+    """Ask a question on stderr; return True only for yes."""
     print(f"{visible(question)} [y/N] ", end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
 
 
 def system_sentence(error: OSError) -> str:
-    """An error of the system as a sentence with the file, and the mend for a full disk."""
+    """Describe a system error in a sentence with the file, and the fix for a full disk."""
     where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))
     mend = "; free some disk space and try again" if error.errno in DISK_FULL else ""
     return f"{where}: {error.strerror}{mend}"
 
 
 def visible(text: str) -> str:
-    """A text with unprintable characters, such as ESC, written out as escapes."""
+    """Escape unprintable characters, such as ESC."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def visible_lines(text: str) -> str:
-    """A text made visible line by line, with tabs as spaces."""
+    """Escape unprintable characters in each line; expand tabs."""
     if text.isprintable():
         return text
     return "\n".join(visible(line.expandtabs(4)) for line in re.split("\r\n?|\n", text))
 
 
 def shortened(text: str, most: int = 500, shown: Callable[[str], str] = visible) -> str:
-    """A text made visible, and cut where it is too long to read."""
+    """Escape a text and shorten it for reading."""
     left = len(text) - most
     return shown(text) if left <= 0 else f"{shown(text[:most])}... {left:,} more characters"

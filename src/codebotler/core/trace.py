@@ -1,4 +1,4 @@
-"""Events, traces and outcomes of runs, and their form as plain data."""
+"""Events, traces and outcomes of runs, and their conversion to plain data."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class Option(NamedTuple):
 
     Args:
         text: the option as text.
-        is_text: False where the program offered something else, such as a number; RTL refuses to judge it.
+        is_text: False if the program offered another type, such as a number, which RTL does not judge.
     """
 
     text: str
     is_text: bool = True
 
 
-def options_of(values: Iterable[object]) -> tuple[Option, ...]:
-    """Options as events have them, from what a question offers; options stay as they are."""
+def to_options(values: Iterable[object]) -> tuple[Option, ...]:
+    """Convert the options of a question for events; keep existing `Option` values."""
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
     )
@@ -38,16 +38,16 @@ class Event:
 
     Args:
         kind: goto, say, ask, check, pick or place, or the kind of a further skill.
-        text: the program's request, without spaces at its ends.
-        options: what a question offered; empty for other kinds.
-        answer: the text of the chosen option; None without an answer, and for other kinds.
-        found: what a look, or another skill that answers yes or no, has returned; None for other kinds.
-        place: the room where it happened, as the world names it (for a drive, the room where it started).
+        text: the program's request, stripped.
+        options: the options of a question; empty for other kinds.
+        answer: the text of the chosen option; None without an answer and for other kinds.
+        found: the result of a look or another yes-or-no skill; None for other kinds.
+        place: the world's name of the room where it happened (for a drive, where it started).
         time: simulated seconds since the start of the run.
-        holding: what the robot held when it began; empty for nothing.
-        to: whom a question was for, as the program said; None for other kinds.
-        more: what else a skill with several arguments was given, as texts.
-        destination: the room where a drive ended; None for a drive that failed, and for other kinds.
+        holding: what the robot held at its start; empty for nothing.
+        to: the addressee of a question; None for other kinds.
+        more: further arguments, as texts.
+        destination: the room where a drive ended; None for a failed drive and for other kinds.
     """
 
     kind: str
@@ -62,7 +62,7 @@ class Event:
     more: tuple[str, ...] = ()
     destination: str | None = field(default=None, compare=False)
 
-    def __init__(  # noqa: PLR0917 - as the generated one would have it
+    def __init__(  # noqa: PLR0917 - like the generated one
         self,
         kind: str,
         text: str,
@@ -76,14 +76,14 @@ class Event:
         more: tuple[str, ...] = (),
         destination: str | None = None,
     ) -> None:
-        values = self.__dict__  # by far the quickest way to fill what is frozen, and a trace has many events
+        values = self.__dict__  # the quickest way to fill a frozen object; traces have many events
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
         values["holding"], values["to"], values["more"] = holding, to, more
         values["destination"] = destination
 
 
-def attempted(
+def attempted_event(
     skill: Skill,
     arguments: Sequence[Scalar | tuple[Option, ...] | tuple[Scalar, ...]],
     *,
@@ -91,7 +91,7 @@ def attempted(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """Return the event that a skill leaves if it runs now; None for skills without one."""
+    """Return the event that a skill records if it runs now, if any."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))
@@ -102,7 +102,7 @@ def attempted(
 
 
 Trace: TypeAlias = tuple[Event, ...]
-"""The events of one run, in the order in which they happened."""
+"""The events of one run, in order."""
 
 
 class Status(StrEnum):
@@ -125,13 +125,13 @@ class RunError:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run of a program in a world ended, and what the robot did until then.
+    """The end and the trace of a run.
 
     Args:
         status: how it ended.
-        trace: what the robot did.
-        error: None exactly when the status is finished.
-        line: the line of the program at which it ended, counted from 1; None where there is none.
+        trace: the robot's actions.
+        error: None if and only if the status is `finished`.
+        line: the line of the program where it ended, counted from 1, if known.
     """
 
     status: Status
@@ -144,9 +144,9 @@ class Outcome:
 
 
 def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
-    """A trace as a list of events.
+    """Convert a trace to plain data.
 
-    An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`; where a skill has
+    An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`; for a skill with
     several arguments, `[kind, text, more]` or `[kind, text, more, found]`.
     """
     asking = frozenset(kind for kind, recording in skills.recordings.items() if recording.options is not None)
@@ -154,12 +154,12 @@ def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
 
 
 def trace_from(data: Iterable[object]) -> Trace:
-    """The trace that `trace_data` gave as data, with nothing else known of it; a UserError if it is none."""
+    """Convert the data of `trace_data` back to a trace; raise UserError for other data."""
     return tuple(map(_event_from, data))
 
 
 def outcome_data(outcome: Outcome, skills: SkillTable = SKILLS) -> dict[str, Any]:
-    """An outcome as a mapping with `status`, `error` (`kind` and `message`, or None), `line` and `trace`."""
+    """Convert an outcome to `status`, `error` (`kind` and `message`, or None), `line` and `trace`."""
     error = None if outcome.error is None else {"kind": outcome.error.kind, "message": outcome.error.message}
     return {
         "status": outcome.status.value,
@@ -197,12 +197,12 @@ def _event_from(element: object) -> Event:
 
 
 def option_data(option: Option) -> object:
-    """An option as data: its text, or a mapping for anything else than a text."""
+    """Convert an option to its text, or to a mapping if it is not a text."""
     return option.text if option.is_text else {"no text": option.text}
 
 
 def option_from(data: object) -> Option:
-    """The option that `option_data` gave as data; a UserError if it is none."""
+    """Convert the data of `option_data` back to an option; raise UserError for other data."""
     match data:
         case str(text):
             return Option(text)

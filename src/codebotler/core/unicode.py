@@ -1,7 +1,7 @@
-"""One form of Unicode for all texts that are compared: a letter with its accent is one character (NFC).
+"""Normalize all texts that are compared to NFC, in which a letter and its accent are one character.
 
-Texts are composed where they enter: programs where they are parsed, files and worlds where they are read,
-formulas, instructions and replies, and a robot's answers where they arrive.
+This happens where texts enter: where programs are parsed, files and worlds read, and where formulas,
+instructions, replies and a robot's answers arrive.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from unicodedata import normalize
 Composed = TypeVar("Composed")
 
 
-def composed(value: Composed) -> Composed:
-    """Compose a text, or the texts in a list or a tuple; other values stay."""
+def compose(value: Composed) -> Composed:
+    """Compose a text, or the texts in a list or a tuple; return other values unchanged."""
     if isinstance(value, str):
         return normalize("NFC", value)  # type: ignore[return-value]  # a text, too
     if isinstance(value, list):
-        return [composed(one) for one in value]  # type: ignore[return-value]
-    if isinstance(value, tuple) and type(value) is tuple:  # a named one has texts of ours
-        return tuple(composed(one) for one in value)  # type: ignore[return-value]
+        return [compose(one) for one in value]  # type: ignore[return-value]
+    if isinstance(value, tuple) and type(value) is tuple:  # a named tuple has composed texts already
+        return tuple(compose(one) for one in value)  # type: ignore[return-value]
     return value
 
 
 def compose_fields(frozen: object) -> None:
-    """Compose the texts in a frozen data class, after its fields are set."""
+    """Compose the texts in a frozen data class after initialization."""
     for name, value in vars(frozen).items():
-        object.__setattr__(frozen, name, composed(value))
+        object.__setattr__(frozen, name, compose(value))

@@ -1,4 +1,4 @@
-"""Worlds: rooms, objects, people with scripted answers, and where the robot starts."""
+"""Worlds: rooms, objects, people with scripted answers, and the robot's start."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # su
 Point: TypeAlias = tuple[float, float]
 
 Answer: TypeAlias = str | int
-"""A regex for the option that is chosen, or its position: 1 is the first, -1 the last."""
+"""A regex for the chosen option, or its position: 1 is the first, -1 the last."""
 
 
 @dataclass(frozen=True)
 class Person:
     """A person in a room who answers questions."""
 
-    name: str  # a regex for the names they answer to
-    answers: tuple[Answer, ...] = ()  # one a question, and the last one again; without any, all fail
-    topics: tuple[tuple[str, Answer], ...] = ()  # regexes for questions, and their answers instead
-    after_looks: int = 0  # how often the robot looks in vain before they come
-    leaves: bool = False  # whether they go after their last answer
+    name: str  # a regex for their names
+    answers: tuple[Answer, ...] = ()  # one per question, then the last one again; if empty, questions fail
+    topics: tuple[tuple[str, Answer], ...] = ()  # regexes for questions with their own answers
+    after_looks: int = 0  # the number of looks in vain before they arrive
+    leaves: bool = False  # whether they leave after their last answer
 
     def __post_init__(self) -> None:
         compose_fields(self)
@@ -37,14 +37,14 @@ class Person:
 
 @dataclass(frozen=True)
 class Room:
-    """A place the robot can drive to.
+    """A room that the robot can drive to.
 
     Args:
-        name: a regex that is looked for in what a program asks for.
-        objects: labels of what lies there, in order.
-        people: who is there, in order.
+        name: a regex to find in a program's request.
+        objects: the labels of its objects, in order.
+        people: the people there, in order.
         footprint: its corners in metres; None if unknown.
-        stand_at: where the robot stops in it, in metres.
+        stand_at: the point where the robot stops, in metres.
     """
 
     name: str
@@ -62,11 +62,11 @@ class World:
     """An initial state of the world (paper, section IV.A).
 
     Args:
-        rooms: at least one, in the order in which the robot knows them, with unique names.
-        robot: the room in which the robot starts.
-        about: what is special here, in a few words.
-        may_wait_forever: whether a program may wait here for something that never comes.
-        truths: what else is true or false here, and what calls of a user's own skills return.
+        rooms: at least one, with unique names, in the robot's order.
+        robot: the room where the robot starts.
+        about: a short description.
+        may_wait_forever: whether a program may wait here for something that never happens.
+        truths: further facts, and results of custom skills.
     """
 
     rooms: tuple[Room, ...]
@@ -82,13 +82,13 @@ class World:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
 
     def to_yaml(self) -> str:
-        """This world as the text of a world file."""
+        """Return the text of a world file."""
         import yaml
 
         return yaml.safe_dump(self.to_data(), sort_keys=False, allow_unicode=True, width=100)
 
     def to_data(self) -> dict[str, object]:
-        """The content of a world file for this world."""
+        """Return the content of a world file."""
         data = {
             "about": self.about,
             "robot": self.robot,
@@ -106,7 +106,6 @@ SQUARE = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
 
 
 def _squared(room: Room) -> Room:
-    """A room that has a footprint if it has a standing point."""
     if room.footprint is not None or room.stand_at is None:
         return room
     x, y = room.stand_at
@@ -114,10 +113,10 @@ def _squared(room: Room) -> Room:
 
 
 def laid_out(world: World) -> World:
-    """The world with a footprint and a standing point for every room: a grid on both sides of a hallway.
+    """Give every room a footprint and a standing point, in a grid on both sides of a hallway.
 
-    Rooms with a footprint keep it; around a mere standing point it is a square of a metre, and other rooms
-    are placed to the right.
+    Existing footprints stay; a room with only a standing point becomes a square metre around it, and other
+    rooms follow to the right.
     """
     known = [_squared(room) for room in world.rooms]
     taken = [x for room in known for x, _ in room.footprint or ()]
@@ -139,7 +138,7 @@ def laid_out(world: World) -> World:
     return replace(world, rooms=tuple(rooms))
 
 
-_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
+_EDGE_TOLERANCE = 1e-9  # relative to the size of a footprint; decimal fractions are rarely exact
 
 
 def is_within(point: Point, corners: Sequence[Point]) -> bool:
@@ -147,13 +146,12 @@ def is_within(point: Point, corners: Sequence[Point]) -> bool:
     x, y = point
     size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
     edges = zip(corners, [*corners[1:], corners[0]], strict=True)
-    if any(_distance(point, *edge) <= _ON_EDGE * size for edge in edges):
+    if any(_distance(point, *edge) <= _EDGE_TOLERANCE * size for edge in edges):
         return True
     return sum(x < crossing for crossing in crossings(y, corners)) % 2 == 1
 
 
 def _distance(point: Point, start: Point, end: Point) -> float:
-    """How far a point is from a line between two others."""
     (x, y), (x1, y1), (x2, y2) = point, start, end
     dx, dy = x2 - x1, y2 - y1
     square = dx * dx + dy * dy
@@ -161,25 +159,25 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
-SHORTEST_PART = 1e-9  # part of a way, or metres; less is an error of rounding
+MIN_PART = 1e-9  # of a way, or metres; less is a rounding error
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
-    """The names of the rooms that hold each part of a straight way, from its start to its end."""
-    here, way = complex(*start), complex(*end) - complex(*start) or SHORTEST_PART
-    edges = {}  # of each room, where the way crosses them, by the share of the way that lies before
+    """Yield the names of the rooms that contain each part of a straight way, from start to end."""
+    here, way = complex(*start), complex(*end) - complex(*start) or MIN_PART
+    edges = {}  # for each room, the fractions of the way at which it crosses an edge
     for room in rooms:
         corners = [(complex(*corner) - here) / way for corner in room.footprint or ()]
         edges[room.name] = crossings(0.0, [(corner.real, corner.imag) for corner in corners])
     cuts = {0.0, 1.0, *(edge for each in edges.values() for edge in each if 0 < edge < 1)}
     for one, other in pairwise(sorted(cuts)):
-        if other - one > SHORTEST_PART:
+        if other - one > MIN_PART:
             middle = (one + other) / 2
             yield tuple(name for name, each in edges.items() if sum(edge > middle for edge in each) % 2)
 
 
 def crossings(y: float, corners: Sequence[Point]) -> list[float]:
-    """Where the edges of a polygon cross a horizontal line, from left to right."""
+    """Return where the edges of a polygon cross a horizontal line, from left to right."""
     edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
     return sorted(
         a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)

@@ -1,4 +1,4 @@
-"""Reads world files (a world as YAML, alone or inside a task), and says what is wrong with them."""
+"""Read worlds in YAML, alone or inside a task, and report mistakes in them."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ from codebotler.core.yaml_files import YamlFile, YamlPath
 
 
 def read_world(path: Path, skills: SkillTable | None = None) -> World:
-    """Read a world file; a UserError names the line of what is wrong, and how to mend it.
+    """Read a world file; a UserError has the line of a mistake and the fix.
 
     Args:
-        path: of the file.
-        skills: of which it may say what their calls return; None if that is not to be checked.
+        path: the file.
+        skills: the skills whose results it may define; None to allow any.
     """
     file = YamlFile.read(path)
     return file.validate(WorldFile).world(file, skills=skills)
@@ -68,7 +68,7 @@ def _not_zero(option: int) -> int:
 
 
 class OptionFile(_Form):
-    """An answer by its position among the options, in a world file."""
+    """An answer in a world file, as the position of an option."""
 
     option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
 
@@ -92,7 +92,7 @@ class PersonFile(_Form):
     leaves: Annotated[bool, Field(strict=True)] = False
 
     def person(self) -> Person:
-        """The person that it describes."""
+        """Return the person."""
         topics = tuple((topic, _answer(answer)) for topic, answer in self.topics.items())
         answers = tuple(map(_answer, self.answers))
         return Person(self.name, answers, topics, self.after_looks, self.leaves)
@@ -103,7 +103,7 @@ def _answer(form: AnswerFile) -> Answer:
 
 
 class RoomFile(_Form):
-    """A room in a world file: its name alone, or with geometry."""
+    """A room in a world file: a name alone or with geometry."""
 
     name: NamePattern
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
@@ -137,13 +137,13 @@ class WorldFile(_Form):
             yield asked, tuple(value) if isinstance(value, list) else value
 
     def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
-        """The world that it describes, or a UserError about a room, a regex or a truth."""
-        names: dict[str, str] = {}  # without capitals, and as they are
+        """Return the world; raise UserError about a room, a regex or a truth."""
+        names: dict[str, str] = {}  # by lower-case name
         for index, room in enumerate(self.rooms):
             if other := names.get(room.name.lower()):
                 sentence = f'the room "{other}" is listed twice; remove one'
                 if room.name != other:
-                    sentence = f'the rooms "{other}" and "{room.name}" differ in capitals only; rename one'
+                    sentence = f'the rooms "{other}" and "{room.name}" differ only in case; rename one'
                 raise file.wrong(sentence, *at, "rooms", index)
             names[room.name.lower()] = room.name
             if room.stand_at and room.footprint and not is_within(room.stand_at, room.footprint):
@@ -180,7 +180,7 @@ _CALL = re.compile(r"\w+\(.*\)")
 
 
 def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
-    """A statement as skills ask for it; a ValueError if its value is none that it can have."""
+    """Return a statement in the form that skills use; raise ValueError if its value is impossible."""
     if not _CALL.fullmatch(statement):
         if not isinstance(value, bool):
             raise ValueError(f'"{statement}" is {value!r}; write true or false')
@@ -194,7 +194,7 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
         case ast.Call(ast.Name(name), arguments, []) if len(arguments) == len(given):
             pass
         case _:
-            raise ValueError(f'"{statement}" is no call; write it as in read_gauge("boiler")')
+            raise ValueError(f'"{statement}" is not a call; write it as in read_gauge("boiler")')
     if skills is not None and len(skills) > len(SKILLS):
         _expect_possible(name, given, value, skills)
         taken = zip(skills[name].parameters, given, strict=True)
@@ -203,13 +203,13 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
 
 
 def _expect_possible(name: str, given: list[object], value: object, skills: SkillTable) -> None:
-    """A ValueError if a call cannot come to a value, or the world does not decide that."""
+    """Raise ValueError if a call cannot return a value, or code decides its result."""
     if name not in skills:
         alike = get_close_matches(name, skills, 1)
         raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
     row = skills[name]
-    if not row.is_by_lot:
-        raise ValueError(f"the code of {name} decides what comes of it; say what is true of what it asks for")
+    if not row.is_random:
+        raise ValueError(f"the code of {name} decides its result; set the truths that it asks for")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):
@@ -218,4 +218,4 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
     if value in kinds or (row.returns.base is not None and row.returns.fits(value)):
         return
     returned = [] if row.returns.base is None else [row.returns.words]
-    raise ValueError(f"{name} cannot come to {value!r}; write {listed([*returned, *kinds], 'or')}")
+    raise ValueError(f"{name} cannot return {value!r}; write {listed([*returned, *kinds], 'or')}")

@@ -1,4 +1,4 @@
-"""Reads YAML with the line of everything in it, for error messages."""
+"""Read YAML with line numbers for error messages."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from codebotler.core.errors import UserError, both_ends
+from codebotler.core.errors import UserError, elide_middle
 from codebotler.core.files import read_text
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 
 YamlPath: TypeAlias = tuple[str | int, ...]
 """A path of keys and positions in a file."""
@@ -27,8 +27,8 @@ FileModel = TypeVar("FileModel", bound=BaseModel)
 Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MAX_DEPTH = 50
 MAX_PLACES = 100_000
-MAX_NUMBER = 1_000  # characters; PyYAML takes quadratic time for numbers such as 1:59:59
-LONGEST_VALUE = 80  # characters of a value that a message quotes
+MAX_NUMBER_LENGTH = 1_000  # characters; PyYAML takes quadratic time for numbers such as 1:59:59
+MAX_QUOTED_VALUE = 80  # characters of a value in a message
 TEXT_TAG = "tag:yaml.org,2002:str"
 SMALL_NUMBER = re.compile(r"\d{1,4}", re.ASCII)
 SYNTAX_MENDS = {
@@ -40,7 +40,7 @@ SYNTAX_MENDS = {
 class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chosen above
     """A loader that stops before the nesting overflows the C stack."""
 
-    yaml_implicit_resolvers = {  # noqa: RUF012 - as in its base class; without "<<" and "=", which are texts
+    yaml_implicit_resolvers = {  # noqa: RUF012 - like the base class, but "<<" and "=" are texts
         first: forms for first, forms in Loader.yaml_implicit_resolvers.items() if first not in {"<", "="}
     }
     depth = 0
@@ -56,12 +56,14 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
         super().ascend_resolver()
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - theirs
-        is_long = isinstance(node, yaml.ScalarNode) and node.tag != TEXT_TAG and len(node.value) > MAX_NUMBER
+        is_long = (
+            isinstance(node, yaml.ScalarNode) and node.tag != TEXT_TAG and len(node.value) > MAX_NUMBER_LENGTH
+        )
         with suppress(ValueError, LookupError, AttributeError, OverflowError):  # an impossible date, say
             if not is_long:
                 made = super().construct_object(node, deep)
-                return composed(made) if isinstance(made, str) else made  # a list is filled later
-        problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
+                return compose(made) if isinstance(made, str) else made  # a list is filled later
+        problem = f"{_quoted(node.value)} is not a valid {node.tag.rpartition(':')[2]}"
         raise _fault(f"{problem}; put quotes around the text", node)
 
 
@@ -70,11 +72,11 @@ def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
 
 
 def _quoted(value: object) -> str:
-    return both_ends(f'"{value}"' if isinstance(value, str) else str(value), LONGEST_VALUE)
+    return elide_middle(f'"{value}"' if isinstance(value, str) else str(value), MAX_QUOTED_VALUE)
 
 
 class YamlFile:
-    """A parsed YAML file that knows the line of everything in it; a UserError if it is not valid."""
+    """A parsed YAML file with the lines of all its parts; raises UserError if it is not valid."""
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
@@ -91,25 +93,25 @@ class YamlFile:
 
     @classmethod
     def read(cls, path: Path) -> YamlFile:
-        """Read and parse a file, or raise a UserError."""
+        """Read and parse a file, or raise UserError."""
         return cls(read_text(path), path)
 
     def line(self, place: Sequence[str | int]) -> int | None:
-        """The line of a place, or of the nearest thing around it."""
+        """Return the line of a place, or of the nearest part around it."""
         path = tuple(place)
         while path not in self._lines:
             if not path:
                 return None
-            *around, last = path  # a number may be a key, which is kept as it is spelt
+            *around, last = path  # a number may be a key, which is stored as text
             path = (*around, str(last)) if isinstance(last, int) else tuple(around)
         return self._lines[path]
 
     def part(self, key: str, data: object) -> YamlFile:
-        """The value of a key as a file of its own, with the same line numbers.
+        """Return the value of a key as a separate file with the same line numbers.
 
         Args:
-            key: of the whole.
-            data: what is there, perhaps with other texts.
+            key: a key of the file.
+            data: its value, possibly with other texts.
         """
         found = copy(self)
         found.data, lines = data, self._lines.items()
@@ -117,15 +119,15 @@ class YamlFile:
         return found
 
     def wrong(self, sentence: str, *place: str | int) -> UserError:
-        """The error for a place in this file."""
+        """Return an error about a place in this file."""
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
-        """The content, or the part of it at a place, as a model; a UserError about the first fault."""
+        """Validate the content, or the part at a place, as a model; raise UserError for the first mistake."""
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
-            first, hint = _first(error.errors(include_url=False))
+            first, hint = _select_error(error.errors(include_url=False))
             place = (*at, *first["loc"])
             raise self.wrong(_sentence(first, self._name(place)) + hint, *place) from None
 
@@ -143,7 +145,7 @@ class YamlFile:
             problem = f"the character U+{error.character:04X} is not allowed"
             line = self._text.encode()[: error.position].count(b"\n") + 1
         else:
-            line = min(mark.line + 1, len(self._text.splitlines()))  # it may be behind the end
+            line = min(mark.line + 1, len(self._text.splitlines()))  # the mark may be behind the end
         sentence = ", ".join(part for part in (context, problem) if part).replace(", but", " but")
         mend = f"; {SYNTAX_MENDS[problem]}" if problem in SYNTAX_MENDS else ""
         return UserError(f"not valid YAML: {sentence}{mend}", file=self.name, line=line)
@@ -160,15 +162,15 @@ class YamlFile:
                 if not isinstance(key, yaml.ScalarNode):
                     raise _fault("this key is not text; write one word or put quotes around it", key)
                 if key.tag != TEXT_TAG and not SMALL_NUMBER.fullmatch(key.value):  # hashes may collide
-                    raise _fault(f"the key {_quoted(key.value)} is not a text; put quotes around it", key)
-                inner = (*place, composed(key.value))
+                    raise _fault(f"the key {_quoted(key.value)} is not text; put quotes around it", key)
+                inner = (*place, compose(key.value))
                 if inner in self._lines:
                     raise _fault(f'the key "{key.value}" is repeated; keep one of them', key)
                 self._remember(value, inner)
                 self._lines[inner] = key.start_mark.line + 1
 
 
-# --- what pydantic finds, in plain English
+# --- errors of pydantic in plain English
 
 EXPECTED_TYPES = {
     "string_type": "a text",
@@ -188,7 +190,7 @@ FAULT_WORDS = {
     "too_long": "{name} has too many entries; it takes {max_length}",
     "finite_number": "{name} is not a finite number",
 }
-WHAT = (
+VALUE_KINDS = (
     (bool, "a truth value"),
     (int | float, "a number"),
     (str, "a text"),
@@ -198,8 +200,8 @@ WHAT = (
 )
 
 
-def _first(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
-    """The error to report, and a hint: a key that is missing may be there, but misspelt."""
+def _select_error(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
+    """Return the error to report and a hint: a missing key may be present but misspelt."""
     first = errors[0]
     *around, missing = first["loc"] or ("",)
     for other in errors[1:] if first["type"] == "missing" else ():
@@ -218,17 +220,17 @@ def _sentence(error: ErrorDetails, name: str) -> str:
             return f'the key "{last}" is missing'
         return f"this entry has too few values; it needs at least {last + 1}"
     if kind in EXPECTED_TYPES:
-        return f"{name} {_instead_of(EXPECTED_TYPES[kind], value)}"
+        return f"{name} {_describe_mismatch(EXPECTED_TYPES[kind], value)}"
     if kind in FAULT_WORDS:
         return FAULT_WORDS[kind].format(name=name, **error.get("ctx", {}))
     plain = error["msg"].removeprefix("Value error, ").replace("Input should be", "it should be")
     return f"{name} is {_quoted(value)}, but {plain[:1].lower()}{plain[1:]}"
 
 
-def _instead_of(expected: str, value: object) -> str:
+def _describe_mismatch(expected: str, value: object) -> str:
     if value is None:
         return "is empty; fill it in or remove it"
-    sentence = f"is {next(word for kind, word in WHAT if isinstance(value, kind))}, not {expected}"
+    sentence = f"is {next(word for kind, word in VALUE_KINDS if isinstance(value, kind))}, not {expected}"
     if expected == "a list" and isinstance(value, Mapping):
         return f'{sentence}; begin each entry with "- "'
     if expected != "a text" or not isinstance(value, int | float | date):

@@ -14,7 +14,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills import kinds
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
-from codebotler.core.trace import Event, Option, Trace, attempted, trace_data
+from codebotler.core.trace import Event, Option, Trace, attempted_event, trace_data
 from codebotler.core.world import Point
 from codebotler.missions.progress import POSITION_FEEDBACK
 from codebotler.missions.stop import StopButton
@@ -109,7 +109,7 @@ class LiveRobot:
         is_drive = row.is_drive
         if is_drive:  # so that rules judge the very text that the robot gets
             arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
-        event = attempted(row, arguments, place=self._place, time=self.now, holding=self._held)
+        event = attempted_event(row, arguments, place=self._place, time=self.now, holding=self._held)
         room = "" if event is None else self._judge(event, is_drive=is_drive)
         if event and row.recording and row.recording.when_tried:
             self._events.append(event)

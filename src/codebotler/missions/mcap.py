@@ -14,7 +14,7 @@ from uuid import uuid4
 from mcap.writer import Writer
 
 from codebotler import __version__
-from codebotler.core.files import expect_replaceable, written_whole
+from codebotler.core.files import expect_replaceable, open_replacement
 from codebotler.core.world import Point, World
 from codebotler.missions import foxglove
 from codebotler.missions.foxglove import FLOAT, INTEGER, SECOND_NS, TEXT, Message, Schema
@@ -238,5 +238,5 @@ def export_mcap(
         path.write_bytes(whole.getvalue())
         return
     temporary = path.with_name(f".{uuid4().hex}.mcap")
-    with written_whole(path, temporary) as file:
+    with open_replacement(path, temporary) as file:
         file.write(whole.getvalue())

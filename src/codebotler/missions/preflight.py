@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from codebotler.checking.problems import no_room
 from codebotler.checking.room_names import named_rooms
 from codebotler.core.errors import RobotError
-from codebotler.core.program import called_skills, tree_of
+from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
@@ -100,7 +100,7 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
     def is_part(name: str) -> bool:
         return any(name.casefold() in room.casefold() for room in room_map.rooms)
 
-    named = named_rooms(tree_of(program), skills)
+    named = named_rooms(parse_leniently(program), skills)
     return [no_room(name, room_map) for name in named if room_map.room(name) is None and not is_part(name)]
 
 
@@ -110,7 +110,7 @@ def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
 
     def is_possible(program: str) -> bool:
-        has_rooms = bool(named_rooms(tree_of(program)))
+        has_rooms = bool(named_rooms(parse_leniently(program)))
         return room_map is None or (has_rooms and not unknown_rooms(program, room_map))
 
     return {instruction: program for instruction, program in known.items() if is_possible(program)}
@@ -124,7 +124,7 @@ def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) 
 
 def missing_skills(program: str, robot: Robot) -> list[str]:
     """Return a sentence for each skill in the program that the connected robot lacks."""
-    called = called_skills(tree_of(program), robot.skills)
+    called = called_skills(parse_leniently(program), robot.skills)
     return [
         f"line {line}: this robot has no `{skill}` skill: {visible(robot.missing[skill])}"
         for skill, line in sorted(called.items(), key=lambda item: item[1])

@@ -14,8 +14,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from codebotler.checking.evasions import evasions
-from codebotler.checking.problems import Check
+from codebotler.checking.evasions import find_evasions
+from codebotler.checking.problems import CheckResult
 from codebotler.checking.rule_rooms import expect_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
@@ -59,7 +59,7 @@ class MissionSession:
         order: MissionOrder,
         *,
         open_model: Callable[[str], Model],
-        check: Callable[[str, RoomMap | None, tuple[Rule, ...]], Check],
+        check: Callable[[str, RoomMap | None, tuple[Rule, ...]], CheckResult],
         rules: tuple[Rule, ...] = (),
         changed: Callable[[], None] = lambda: None,
         number: int = 1,
@@ -227,7 +227,7 @@ class MissionSession:
         regexes = () if room_map is None or room_map.plain else rooms
         expect_rooms(rules, rooms)
         expect_poses(rules, self._robot, room_map)
-        for sentence in evasions(rules, regexes, self._robot.skills):
+        for sentence in find_evasions(rules, regexes, self._robot.skills):
             self._add_remark(sentence)
         return room_map, place
 

@@ -6,12 +6,12 @@ import hashlib
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
 from codebotler.missions.log import MissionState
 from codebotler.missions.progress import Progress
-from codebotler.prompts import stated
+from codebotler.prompts import clean_instruction
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -34,7 +34,7 @@ class MissionOrder:
 
     def __post_init__(self) -> None:
         if not self.has_program:
-            stated(self.instruction)
+            clean_instruction(self.instruction)
 
     @property
     def has_program(self) -> bool:
@@ -61,7 +61,7 @@ class SessionView:
     programless: ProgramlessReply | None = None  # the model's last reply, if it contains no program
     author: str = ""  # the model that wrote the program; empty for a person
     is_written: bool = False  # whether a model is writing now
-    check: Check | None = None  # of exactly this program
+    check: CheckResult | None = None  # of exactly this program
     missing_skills: tuple[str, ...] = ()  # sentences about skills that the robot lacks
     unknown_rooms: tuple[str, ...] = ()  # sentences about rooms that the robot does not know
     room_map: RoomMap | None = None  # the robot's rooms, if it lists them

@@ -6,12 +6,12 @@ import ast
 from collections.abc import Callable, Mapping
 
 from codebotler.core.phrases import phrase
-from codebotler.core.program import nodes, tree_of
+from codebotler.core.program import nodes, parse_leniently
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.values import written_call
 from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.terminal import shortened, visible
-from codebotler.core.trace import attempted, options_of, trace_from
+from codebotler.core.trace import attempted_event, to_options, trace_from
 from codebotler.core.words import brief
 from codebotler.missions.log import LogLine, MissionSummary
 
@@ -39,8 +39,8 @@ def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
     if skill is None or skill.verb is None:
         return ""
     given = zip(skill.parameters, line["arguments"].values(), strict=True)
-    arguments = [options_of(value) if parameter.is_options else value for parameter, value in given]
-    event = attempted(skill, arguments, place="", time=0.0)
+    arguments = [to_options(value) if parameter.is_options else value for parameter, value in given]
+    event = attempted_event(skill, arguments, place="", time=0.0)
     if event is None:
         return str(getattr(skill.verb, form))
     return phrase(event, form, show=lambda text: shortened(text, most))
@@ -70,7 +70,7 @@ def title(summary: MissionSummary) -> str:
         return summary.instruction
     calls = [
         node
-        for node in nodes(tree_of(summary.program))
+        for node in nodes(parse_leniently(summary.program))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and by_name(node.func.id)
     ]
     calls.sort(key=lambda call: (call.lineno, call.col_offset))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, TypeAlias, get_args
 
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.prompts.extract import defines_task
 from codebotler.simulator.isolated_call import IsolatedCallError
 
@@ -74,7 +74,7 @@ def classify_reply(
 def _ends_in_code(reply: str, program: str) -> bool:
     """Whether a reply ends inside its program, or inside a later fence with a better version."""
     last = program.rstrip().rpartition("\n")[2].strip()
-    _, _, rest = composed(reply).rpartition(last)
+    _, _, rest = compose(reply).rpartition(last)
     fences = sum(line.lstrip().startswith(("```", "~~~")) for line in rest.splitlines())
     return not rest.strip() or (fences > 0 and fences % 2 == 0)
 

@@ -1,12 +1,12 @@
-"""The prompts of models, made from text files in this folder, and the programs in their replies."""
+"""Prompts for models, from text files in this folder, and programs in their replies."""
 
 from codebotler.prompts.rendering import (
     PictureMessage,
     Prompt,
     PromptMessage,
+    clean_instruction,
     prompt_for,
-    stated,
     template_hash,
 )
 
-__all__ = ["PictureMessage", "Prompt", "PromptMessage", "prompt_for", "stated", "template_hash"]
+__all__ = ["PictureMessage", "Prompt", "PromptMessage", "clean_instruction", "prompt_for", "template_hash"]

@@ -1,7 +1,7 @@
-"""Extracts the program from a model's reply, without fixing or completing it.
+"""Extract the program from a model's reply, without fixing or completing it.
 
-A reply is split into thoughts, fenced code and text; fences and text into blocks of code, without prose and
-without what is left of chat templates; of these blocks, one is the program.
+Split the reply into thoughts, fenced code and text, then fences and text into blocks of code without prose
+and marks of chat templates, and choose one block as the program.
 """
 
 from __future__ import annotations
@@ -12,24 +12,30 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from codebotler.core.program import TASK_FUNCTION, Program, bound_names, entries, undefined_names
+from codebotler.core.program import (
+    TASK_FUNCTION,
+    Program,
+    module_bound_names,
+    task_definitions,
+    undefined_names,
+)
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.unicode import composed
-from codebotler.prompts.lines import goes_on, is_code, is_prose, tree_of, trimmed, without_residue
+from codebotler.core.unicode import compose
+from codebotler.prompts.lines import continues_prose, is_code, is_prose, parse_lines, trim, without_residue
 from codebotler.prompts.segments import Segment, answer_of
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
-HELPER_ROUNDS = 20  # helpers of helpers, of which a reply to one instruction has two or three
+MAX_HELPER_DEPTH = 20  # helpers of helpers; replies have two or three levels
 
 
 @dataclass(frozen=True)
 class ReplyContent:
-    """What a model's reply holds.
+    """The parts of a model's reply.
 
     Args:
-        program: the text of the program; the rest of the reply where there is none.
-        reasoning: what the model thought aloud between markers; empty where it did not.
-        has_code: whether any of it, thoughts aside, may be code; False is certain.
+        program: the text of the program, or all of the reply without reasoning.
+        reasoning: the model's reasoning between markers; may be empty.
+        has_code: whether the reply apart from reasoning may have code; False is certain.
     """
 
     program: str
@@ -38,12 +44,12 @@ class ReplyContent:
 
 
 def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
-    """Find the program, the reasoning and any code in a model's whole reply; see `program_of`.
+    """Split a model's complete reply into program and reasoning; see `program_of`.
 
     Raises:
         EngineError: no isolated process can be started.
     """
-    reply = composed(reply)
+    reply = compose(reply)
     try:
         return ReplyContent(*extract(reply, continues=continues))
     except IsolatedCallError:
@@ -51,18 +57,18 @@ def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
 
 
 def program_of(reply: str, *, continues: bool = False) -> Program:
-    """The program in a model's whole reply.
+    """Return the program in a model's complete reply.
 
-    Of several definitions of `task_program`, the last complete one counts. Thoughts between markers such as
-    `<think>` and `</think>` are left out; any other pair of markers is one of thoughts if a program follows
-    it. Whole lines are kept or dropped, and of lines only the marks of chat templates and fences: only what
-    is certainly no code is dropped. A program that was cut off stays cut off.
+    Of several definitions of `task_program`, the last complete one counts. Reasoning between markers such as
+    `<think>` and `</think>` is dropped; other pairs of markers also count if a program follows. Only lines
+    that are certainly not code, and marks of chat templates and fences, are dropped. A program that was cut
+    off stays cut off.
 
     Args:
         reply: code with or without fences and prose, or the indented body of `task_program` alone. One that
-            takes seconds to read is taken for the program as it is.
-        continues: whether a base model wrote it, which goes on from the prompt: then the first version
-            counts, and a next example that follows it is dropped.
+            takes seconds to parse is returned unchanged.
+        continues: whether a base model continued the prompt: then the first version counts, and further
+            examples are dropped.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -71,11 +77,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
 
 
 def program_in(text: str) -> str:
-    """Find the program in a text that may be one, or a model's reply; see `program_of`.
-
-    Args:
-        text: a program that defines `task_program`, in whatever way, stays as it is.
-    """
+    """Return a text that defines `task_program`, or else the program in it; see `program_of`."""
     try:
         return text if defines_task(text) else program_of(text).source
     except IsolatedCallError:
@@ -85,32 +87,32 @@ def program_in(text: str) -> str:
 @isolated("def task_program():\n    say('hello')\n")
 def defines_task(text: str) -> bool:
     """Whether a text compiles and binds `task_program` at module level."""
-    return TASK_FUNCTION in bound_names(text)
+    return TASK_FUNCTION in module_bound_names(text)
 
 
 @isolated(
     "Here it is:\n```python\ndef task_program():\n    greet()\n```\n```\ndef greet():\n    say('hello')\n```"
 )
 def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
-    """The text of the program in a reply, the reasoning, and whether there is any code."""
+    """Return the program and the reasoning in a reply, and whether there is any code."""
     lines = re.split(r"\r\n|\r|\n", reply.removeprefix("\ufeff"))
     if _is_program(lines, continues=continues):
-        return _joined([lines]), "", True
+        return _join([lines]), "", True
     answer, reasoning = answer_of("\n".join(lines), lambda code: _block(code, fenced=True).tree is not None)
     blocks = [block for segment in answer for block in _blocks(segment, continues=continues)]
-    chosen = _chosen(blocks, continues=continues)
+    chosen = _choose(blocks, continues=continues)
     program = "".join(s.text for s in answer) if chosen is None else _with_helpers(chosen, blocks)
     return program, reasoning, bool(blocks)
 
 
 def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
-    """Whether all of a reply is the program, whatever its texts look like."""
-    tree = tree_of(lines)
-    is_one = tree is not None and not (continues and len(entries(tree)) > 1)
+    """Whether the complete reply is the program, whatever its strings look like."""
+    tree = parse_lines(lines)
+    is_one = tree is not None and not (continues and len(task_definitions(tree)) > 1)
     return (
         is_one
-        and len(trimmed(lines)) == len(_stripped(lines))
-        and TASK_FUNCTION in bound_names("\n".join(lines))
+        and len(trim(lines)) == len(_strip_blank_lines(lines))
+        and TASK_FUNCTION in module_bound_names("\n".join(lines))
     )
 
 
@@ -121,10 +123,10 @@ def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
 class _Block:
     """Lines of a reply that belong together as code."""
 
-    lines: Sequence[str]  # without the indentation they share
+    lines: Sequence[str]  # without common indentation
     tree: ast.Module | None  # None if they do not parse
     fenced: bool
-    headless: bool  # a body, in front of which `def task_program():` was put
+    headless: bool  # whether it was a body, and `def task_program():` was added
 
     @property
     def defines_task(self) -> bool:
@@ -132,8 +134,10 @@ class _Block:
 
     @property
     def is_outline(self) -> bool:
-        """Whether its program is nothing but a docstring, `...` or `pass`."""
-        return self.tree is not None and any(all(map(_is_idle, e.body)) for e in entries(self.tree)[-1:])
+        """Whether its program has only a docstring, `...` or `pass`."""
+        return self.tree is not None and any(
+            all(map(_is_idle, e.body)) for e in task_definitions(self.tree)[-1:]
+        )
 
 
 def _is_idle(statement: ast.stmt) -> bool:
@@ -146,36 +150,35 @@ _ENTRY = re.compile(rf"(?:async\s+)?def\s+{TASK_FUNCTION}\b|{TASK_FUNCTION}\s*=(
 
 
 def _blocks(segment: Segment, *, continues: bool) -> Iterator[_Block]:
-    """All code of a segment, in order: all of it if it parses, and otherwise whatever is no prose."""
+    """Yield the blocks of a segment: all of it if it parses, else the parts that are not prose."""
     fenced = segment.kind == "fence"
     whole = _block(segment.code, fenced=fenced)
-    found = [whole] if whole.tree else [_block(run, fenced=fenced) for run in _runs(segment.code)]
+    found = [whole] if whole.tree else [_block(run, fenced=fenced) for run in _code_runs(segment.code)]
     for block in found:
         if _code_of(block.lines):
-            yield from _versions(block, continues=continues)
+            yield from _split_versions(block, continues=continues)
 
 
 def _block(lines: Sequence[str], *, fenced: bool) -> _Block:
-    """The lines as a block, without what is left of a chat template if they parse only then."""
-    block = _block_as_written(trimmed(lines), fenced=fenced)
+    """Make a block, without marks of a chat template if the lines parse only then."""
+    block = _block_as_written(trim(lines), fenced=fenced)
     if block.tree:
         return block
-    without = _block_as_written(trimmed([without_residue(line) for line in lines]), fenced=fenced)
+    without = _block_as_written(trim([without_residue(line) for line in lines]), fenced=fenced)
     return without if without.tree else block
 
 
 def _block_as_written(lines: Sequence[str], *, fenced: bool) -> _Block:
-    headless = _headless(lines)
-    lines = headless or _dedented(lines)
-    return _Block(lines, tree_of(lines), fenced, headless is not None)
+    headless = _as_body(lines)
+    lines = headless or _dedent(lines)
+    return _Block(lines, parse_lines(lines), fenced, headless is not None)
 
 
-def _runs(lines: Sequence[str]) -> Iterator[list[str]]:
-    """The stretches of lines between paragraphs of prose."""
+def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
     run: list[str] = []
     in_prose = False
     for line in lines:
-        in_prose = goes_on(line) if in_prose else is_prose(line)
+        in_prose = continues_prose(line) if in_prose else is_prose(line)
         if not in_prose:
             run.append(line)
         elif run:
@@ -184,10 +187,10 @@ def _runs(lines: Sequence[str]) -> Iterator[list[str]]:
     yield run
 
 
-def _headless(lines: Sequence[str]) -> list[str] | None:
-    """The lines as the body of `task_program`; None if they are none.
+def _as_body(lines: Sequence[str]) -> list[str] | None:
+    """Add a header to the lines if they are the body of `task_program`, else return None.
 
-    A body may lack the indentation of its first line, because the prompt ended with it.
+    The first line may lack its indentation, since the prompt may end with it.
     """
     code = _code_of(lines)
     if not code or is_prose(lines[code[0]].strip()):
@@ -199,7 +202,7 @@ def _headless(lines: Sequence[str]) -> list[str] | None:
             return None
         return [f"def {TASK_FUNCTION}():", *lines]
     inner = code[1 : next((n for n, i in enumerate(code) if n and not _indent(lines[i])), None)]
-    if not inner or start in (code[0], *inner) or tree_of(lines) is not None:
+    if not inner or start in (code[0], *inner) or parse_lines(lines) is not None:
         return None
     margin = min((_indent(lines[i]) for i in inner), key=len)
     if head.rstrip()[-1] in ":([{,\\" and _indent(lines[inner[0]]) == margin:
@@ -207,14 +210,15 @@ def _headless(lines: Sequence[str]) -> list[str] | None:
     return [f"def {TASK_FUNCTION}():", *lines[: code[0]], margin + head, *lines[code[0] + 1 :]]
 
 
-def _versions(block: _Block, *, continues: bool) -> list[_Block]:
-    """A block cut in front of each further definition of `task_program` and the comment that introduces it.
+def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
+    """Split a block before each further definition of `task_program` and its comment.
 
-    In a chat, one that parses stays whole, as its last definition counts. A base model goes on with examples.
+    A chat model's block that parses stays whole, as its last definition counts; a base model may continue
+    with further examples.
     """
     lines = block.lines
     starts = [i for i, line in enumerate(lines) if _ENTRY.match(line) and "=" not in line.split("(", 1)[0]]
-    if len(starts) <= 1 or (block.tree and (not continues or len(entries(block.tree)) <= 1)):
+    if len(starts) <= 1 or (block.tree and (not continues or len(task_definitions(block.tree)) <= 1)):
         return [block]
     cuts = [0, *(_introduction(lines, start) for start in starts[1:]), len(lines)]
     parts = [_block(lines[start:end], fenced=block.fenced) for start, end in pairwise(cuts)]
@@ -222,7 +226,7 @@ def _versions(block: _Block, *, continues: bool) -> list[_Block]:
 
 
 def _introduction(lines: Sequence[str], start: int) -> int:
-    """The first line of the comments and decorators in front of a definition."""
+    """Return the first line of the comments and decorators before a definition."""
     while start and (not lines[start - 1].strip() or lines[start - 1].startswith(("#", "@"))):
         start -= 1
     return start
@@ -231,11 +235,11 @@ def _introduction(lines: Sequence[str], start: int) -> int:
 # --- from blocks to the program
 
 
-def _chosen(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
-    """The block that is the program: one that defines it, or else one that could be meant as it.
+def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
+    """Choose the block that defines the program, or else one that may be the program.
 
-    What a base model writes first goes on from the prompt; in a chat, the last complete one counts that is
-    more than an outline.
+    A base model's first block continues the prompt; in a chat, the last complete block that is more than an
+    outline counts.
     """
     if continues and blocks and blocks[0].defines_task:
         return blocks[0]
@@ -250,20 +254,17 @@ def _chosen(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
 
 
 def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
-    """The chosen block with the other blocks that define, at top level, what it lacks.
-
-    An earlier version may hold it, whose `task_program` is then defined anew.
-    """
+    """Add the blocks, possibly earlier versions, that define names which the chosen block lacks."""
     at = blocks.index(chosen)
     kept = {at}
     tree = chosen.tree
     defined: dict[int, set[str]] = {}
-    for _ in range(HELPER_ROUNDS):
+    for _ in range(MAX_HELPER_DEPTH):
         missing = _undefined(tree)
         if missing and not defined:
             others = [i for i, block in enumerate(blocks) if not block.defines_task]
             others += [i for i, block in enumerate(blocks[:at]) if block.defines_task and not block.headless]
-            defined = {i: bound_names("\n".join(blocks[i].lines)) for i in others}
+            defined = {i: module_bound_names("\n".join(blocks[i].lines)) for i in others}
         found = set()
         for i, names in defined.items():
             if i not in kept and names & missing:
@@ -272,8 +273,8 @@ def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
         if not found:
             break
         kept |= found
-        tree = tree_of([_joined(blocks[i].lines for i in sorted(kept))])
-    return _joined(blocks[i].lines for i in sorted(kept))
+        tree = parse_lines([_join(blocks[i].lines for i in sorted(kept))])
+    return _join(blocks[i].lines for i in sorted(kept))
 
 
 def _undefined(tree: ast.Module | None) -> set[str]:
@@ -287,7 +288,6 @@ def _undefined(tree: ast.Module | None) -> set[str]:
 
 
 def _code_of(lines: Sequence[str]) -> list[int]:
-    """The indices of the lines that are not blank."""
     return [i for i, line in enumerate(lines) if line.strip()]
 
 
@@ -295,18 +295,15 @@ def _indent(line: str) -> str:
     return line[: len(line) - len(line.lstrip())]
 
 
-def _dedented(lines: Sequence[str]) -> list[str]:
-    """The lines without the indentation of the first one; a line that lacks it stays as it is."""
+def _dedent(lines: Sequence[str]) -> list[str]:
     margin = next((_indent(line) for line in lines if line.strip()), "")
     return [line.removeprefix(margin) for line in lines]
 
 
-def _stripped(lines: Sequence[str]) -> Sequence[str]:
-    """The lines without the blank ones at both ends."""
+def _strip_blank_lines(lines: Sequence[str]) -> Sequence[str]:
     code = _code_of(lines)
     return lines[code[0] : code[-1] + 1] if code else []
 
 
-def _joined(parts: Iterable[Sequence[str]]) -> str:
-    """The parts as one text, each without the blank lines at its ends."""
-    return "\n\n\n".join("\n".join(_stripped(lines)) for lines in parts) + "\n"
+def _join(parts: Iterable[Sequence[str]]) -> str:
+    return "\n\n\n".join("\n".join(_strip_blank_lines(lines)) for lines in parts) + "\n"

@@ -1,4 +1,4 @@
-"""Tells code, prose and what is left of chat templates apart, line by line."""
+"""Distinguish code, prose and marks of chat templates, line by line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 
-from codebotler.core.program import Flaw, parsed
+from codebotler.core.program import Flaw, parse_program
 
 MARKUP = r"(?:</?[A-Za-z][\w:.-]*>|<[|\uff5c][^<>\n]*[|\uff5c]>|\[/\w+\]|\[[A-Z_]{3,}\])"
 RESIDUE_LINE = re.compile(rf"(?:{MARKUP}\s*)*(?:[Pp]ython3?|py|[Aa]ssistant|model)?")
@@ -17,7 +17,7 @@ RESIDUE = re.compile(
 )
 KEYWORDS = "|".join((*(word for word in keyword.kwlist if word.islower()), "match", "case", "print", "exec"))
 WORD = rf"(?!(?:{KEYWORDS})\b)[^\W\d_][\w'\u2019-]*"
-ADJACENT_WORDS = re.compile(rf"\b{WORD}\s+{WORD}")  # side by side, as nowhere in code
+ADJACENT_WORDS = re.compile(rf"\b{WORD}\s+{WORD}")  # never adjacent in code
 STRING = re.compile(r"""("|').*?(?:\1|$)|\#.*""")
 STATEMENT = re.compile(
     r"""\s*(?:
@@ -39,21 +39,21 @@ INTERJECTION = re.compile(r" ?[A-Z][a-z]+\s*$")
 
 
 def is_prose(line: str) -> bool:
-    """Whether a line can only be prose; in doubt it is code, so that no code is ever lost."""
+    """Whether a line is certainly prose; in doubt it is code, so that no code is lost."""
     line = without_residue(line)
     if INTERJECTION.match(line) or (line.strip() and is_residue(line)):
         return True
     is_sentence = PROSE.match(line) or (re.match(r" ?\S", line) and _has_words(line))
-    return bool(is_sentence) and not is_code(line) and tree_of([line.strip()]) is None
+    return bool(is_sentence) and not is_code(line) and parse_lines([line.strip()]) is None
 
 
-def goes_on(line: str) -> bool:
-    """Whether a paragraph of prose goes on with a line, which may look like anything."""
+def continues_prose(line: str) -> bool:
+    """Whether a line continues a paragraph of prose."""
     return bool(line.strip()) and not is_code(without_residue(line))
 
 
 def is_code(line: str) -> bool:
-    """Whether a line begins like code, and is no sentence about a call."""
+    """Whether a line begins like code and is not a sentence about a call."""
     return bool(STATEMENT.match(line) or (CALL_START.match(line) and not _has_words(line)))
 
 
@@ -62,29 +62,29 @@ def _has_words(line: str) -> bool:
 
 
 def is_residue(line: str) -> bool:
-    """Whether a line is blank, or left of a chat template."""
+    """Whether a line is blank or a mark of a chat template."""
     return bool(RESIDUE_LINE.fullmatch(line.strip()))
 
 
-def trimmed(lines: Sequence[str]) -> Sequence[str]:
-    """Lines without those at both ends that are blank or left of a chat template."""
+def trim(lines: Sequence[str]) -> Sequence[str]:
+    """Drop blank lines and marks of chat templates at both ends."""
     kept = [i for i, line in enumerate(lines) if not is_residue(line)]
     return lines[kept[0] : kept[-1] + 1] if kept else []
 
 
 def without_residue(line: str) -> str:
-    """A line without marks of a chat template at its ends, and without a fence at its last one."""
+    """Drop marks of a chat template at the ends of a line, and a fence at its end."""
     while (shorter := RESIDUE.sub("", line)) != line:
         line = shorter
     return line
 
 
-def tree_of(lines: Sequence[str]) -> ast.Module | None:
-    """The syntax tree of lines; None if they do not parse."""
-    return _tree_of("\n".join(lines))
+def parse_lines(lines: Sequence[str]) -> ast.Module | None:
+    """Return the syntax tree of lines; None if they do not parse."""
+    return _parse_text("\n".join(lines))
 
 
-@lru_cache(maxsize=64)  # more than the texts of a reply that are tried, so that each is parsed once
-def _tree_of(text: str) -> ast.Module | None:
-    tree = parsed(text)
+@lru_cache(maxsize=64)  # enough for all parts of a reply
+def _parse_text(text: str) -> ast.Module | None:
+    tree = parse_program(text)
     return None if isinstance(tree, Flaw) else tree

@@ -1,4 +1,4 @@
-"""Prompts: an instruction as chat messages, and as one text for base models to go on from."""
+"""Render an instruction as chat messages, and as a text that base models continue."""
 
 from __future__ import annotations
 
@@ -14,16 +14,19 @@ from string import Template
 from typing import Literal
 
 from codebotler.core.errors import UserError, expect_list
-from codebotler.core.program import TASK_FUNCTION, Flaw, called_skills, parsed, tree_of
+from codebotler.core.program import TASK_FUNCTION, Flaw, called_skills, parse_leniently, parse_program
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.core.words import listed
 
 PROMPT_FOLDER = Path(__file__).parent
 OPENING = f"def {TASK_FUNCTION}():\n"
-MAX_LENGTH, MAX_TRIES = 100_000, 20  # of a reply, within which the end of its function is looked for
-STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI's endpoint takes no more than four
+MAX_SEARCHED_LENGTH, MAX_END_TRIES = (
+    100_000,
+    20,
+)  # of a reply, within which the end of its function is looked for
+STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI accepts at most four
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class PictureMessage(PromptMessage):
 
 @dataclass(frozen=True)
 class Example:
-    """An instruction and a right program for it, shown to the model in every prompt."""
+    """An instruction with a correct program, for prompts."""
 
     instruction: str
     program: str
@@ -52,20 +55,20 @@ class Example:
 
 @dataclass(frozen=True)
 class Prompt:
-    """A request for a program, in the form for chat models and in the form for base models."""
+    """A request for a program, for chat models and for base models."""
 
     instruction: str
     messages: tuple[PromptMessage, ...] = field(repr=False)  # for chat models
     text: str = field(repr=False)  # for base models; ends with `opening`
     stop: tuple[str, ...]  # texts before which base models stop
-    opening: str  # the beginning of the program that base models go on with
+    opening: str  # the start of the program that base models continue
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
-        """The request to write a program again without its problems, each of which is a sentence."""
+        """Return a request to rewrite a program without these problems, in sentences."""
         listed = "\n".join(f"- {problem}" for problem in problems)
-        answer = PromptMessage("assistant", _fenced(program))
-        repair = PromptMessage("user", _filled("repair", problems=listed))
-        text = _filled(
+        answer = PromptMessage("assistant", _fence(program))
+        repair = PromptMessage("user", _fill("repair", problems=listed))
+        text = _fill(
             "completion-repair", program=_comment(program), problems=_comment(listed), opening=self.opening
         )
         return replace(
@@ -75,40 +78,38 @@ class Prompt:
         )
 
     def after_no_program(self, why: str) -> Prompt:
-        """The request once more after a reply without a program; base models get the same one again.
-
-        Args:
-            why: what was wrong with the reply, in a sentence.
-        """
+        """Repeat the request after a reply without a program, with the reason for chat models."""
         *before, request = self.messages
-        asked = f"{request.text}\n\n{_filled('no-program', why=why)}"
+        asked = f"{request.text}\n\n{_fill('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
 
     def program_from(self, reply: str) -> str:
-        """The program in a base model's continuation of `text`, without whatever follows it."""
+        """Return the program in a base model's continuation of `text`."""
         if re.match(rf"\s*(```|(async )?def {TASK_FUNCTION}\b)", reply):
-            return reply  # it began anew
+            return reply  # the model started again
         return self.opening + reply[: task_end(self.opening, reply, self.stop)]
 
 
 def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
-    """The index at which the function that `opening` begins ends in a reply.
+    """Return the index in a reply at which the function that `opening` begins ends.
 
-    It ends before a line without indentation, unless that line belongs to an open bracket or string.
+    It ends before a line without indentation, unless a bracket or string is open there.
     """
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
-    for found in islice(re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_LENGTH)]), MAX_TRIES):
-        if not isinstance(parsed(opening + reply[: found.start()]), Flaw):
+    for found in islice(
+        re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_SEARCHED_LENGTH)]), MAX_END_TRIES
+    ):
+        if not isinstance(parse_program(opening + reply[: found.start()]), Flaw):
             return found.start()
     return end
 
 
-def stated(instruction: str) -> str:
-    """An instruction without space around it; UserError if it says nothing."""
-    if not (said := composed(instruction.strip())):
+def clean_instruction(instruction: str) -> str:
+    """Strip and normalize an instruction; UserError if it is empty."""
+    if not (instruction := compose(instruction.strip())):
         raise UserError("the instruction is empty; say what the robot should do")
-    return said
+    return instruction
 
 
 def prompt_for(
@@ -118,35 +119,34 @@ def prompt_for(
     rules: Sequence[str] = (),
     skills: SkillTable = SKILLS,
 ) -> Prompt:
-    """The request for a program that carries out an instruction.
+    """Return the prompt for an instruction.
 
     Args:
-        instruction: what the robot is to do, in plain words.
-        rooms: the names of all rooms, if they are known.
-        rules: what every program must keep to, in sentences.
-        skills: the skills that a program may call; examples that call others are left out.
+        instruction: the robot's task, in plain words.
+        rooms: the names of all rooms, if known.
+        rules: sentences that every program must obey.
+        skills: the skills that a program may call; examples with others are omitted.
 
     Raises:
-        UserError: the instruction is empty, or the rooms are a single text.
+        UserError: the instruction is empty, or `rooms` is a string.
     """
     expect_list(rooms, "the rooms")
-    instruction = stated(instruction)
-    about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
-    about_rules = _filled("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
+    instruction = clean_instruction(instruction)
+    about_rooms = _fill("rooms", rooms=", ".join(rooms)) if rooms else ""
+    about_rules = _fill("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
     wish = "\n\n".join(filter(None, (instruction, about_rooms, about_rules)))
     stubs = [stub(skill) for skill in skills.values()]
     shown = [example for example in examples() if example.skills <= skills.keys()]
-    messages = [PromptMessage("system", _filled("system", skills="\n\n".join(stubs)))]
+    messages = [PromptMessage("system", _fill("system", skills="\n\n".join(stubs)))]
     for example in shown:
         messages.append(PromptMessage("user", example.instruction))
-        messages.append(PromptMessage("assistant", _fenced(example.program)))
+        messages.append(PromptMessage("assistant", _fence(example.program)))
     messages.append(PromptMessage("user", wish))
-    text = _filled(
+    text = _fill(
         "completion",
         skills="\n\n\n".join(stubs),
         examples="\n\n\n".join(
-            _filled("completion-example", instruction=e.instruction, program=e.program.rstrip())
-            for e in shown
+            _fill("completion-example", instruction=e.instruction, program=e.program.rstrip()) for e in shown
         ),
         instruction=_comment(instruction.strip()).removeprefix("# "),
         rooms="".join(_comment(about) + "\n" for about in (about_rooms, about_rules) if about),
@@ -156,7 +156,7 @@ def prompt_for(
 
 
 def stub(skill: Skill) -> str:
-    """A skill as models are shown it; one of a user's own with an example, and when it fails."""
+    """Return the stub of a skill; a custom skill gets an example and its failures."""
     lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")
@@ -170,18 +170,18 @@ def stub(skill: Skill) -> str:
 
 @cache
 def examples() -> tuple[Example, ...]:
-    """The examples in the order of their files."""
+    """Return the examples in the order of their files."""
     files = (path.read_text(encoding="utf-8") for path in sorted((PROMPT_FOLDER / "examples").glob("*.txt")))
     parts = (text.partition("\n\n") for text in files)
     return tuple(
-        Example(instruction, program, frozenset(called_skills(tree_of(program))))
+        Example(instruction, program, frozenset(called_skills(parse_leniently(program))))
         for instruction, _, program in parts
     )
 
 
 @cache
 def template_hash(skills: SkillTable = SKILLS) -> str:
-    """The SHA-256, in hexadecimal, of all that shapes a prompt except the instruction."""
+    """Return the hexadecimal SHA-256 of everything in a prompt except the instruction."""
     plain = prompt_for("INSTRUCTION", skills=skills)
     with_rooms = prompt_for("INSTRUCTION", rooms=("ROOM", "OTHER ROOM"), skills=skills)
     shapes = [plain, with_rooms, plain.after("PROGRAM", ["PROBLEM", "OTHER PROBLEM"])]
@@ -193,11 +193,11 @@ def _template(name: str) -> Template:
     return Template((PROMPT_FOLDER / f"{name}.txt").read_text(encoding="utf-8"))
 
 
-def _filled(name: str, **values: str) -> str:
+def _fill(name: str, **values: str) -> str:
     return _template(name).substitute(values).rstrip("\n")
 
 
-def _fenced(program: str) -> str:
+def _fence(program: str) -> str:
     longest = max((len(run) for run in re.findall("`{3,}", program)), default=2)
     fence = "`" * (longest + 1)
     return f"{fence}python\n{program.strip(chr(10))}\n{fence}"

@@ -1,4 +1,4 @@
-"""Cuts a model's reply into its thoughts and its answer, and this into fenced code and the text around it."""
+"""Split a model's reply into reasoning and answer, and the answer into fenced code and text."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import Literal, TypeAlias
 from codebotler.core.program import TASK_FUNCTION
 from codebotler.prompts.lines import is_code, is_residue
 
-FENCE_MARGIN = 3  # columns by which the last fence may be indented
-MAX_ENDS = 5  # of a fence, which are tried until its code parses
-MAX_MARKERS = 9  # at the beginning of a line
+FENCE_MARGIN = 3  # columns of indentation of a closing fence
+MAX_ENDS = 5  # ends of a fence to try until its code parses
+MAX_MARKERS = 9  # at the start of a line
 MARKER = re.compile(
     r"""(?ix) <\|channel\|?> \s* (?P<channel>[a-z]+) (?:<\|message\|>)?
     | [<\[\u25c1] (?P<left>[|\uff5c])? (?P<slash>/)?
@@ -34,17 +34,17 @@ NEXT_TURN = re.compile(
     r"|^(?:user|human):"
 )
 
-Parses: TypeAlias = Callable[[Sequence[str]], bool]
-"""Whether lines are a program's, or the body of one."""
+ParseTest: TypeAlias = Callable[[Sequence[str]], bool]
+"""Whether lines are a program or the body of one."""
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of a reply.
+    """A part of a reply.
 
     Args:
-        kind: `fence`, `thought` between two markers, `end` for the last marker of a pair alone, and `text`.
-        text: all of it; of a thought, without its markers.
+        kind: `fence`, `thought` between two markers, `end` for a closing marker alone, or `text`.
+        text: the text; of a thought, without its markers.
         code: the lines that may be code.
     """
 
@@ -53,11 +53,11 @@ class Segment:
     code: Sequence[str] = ()
 
 
-def answer_of(reply: str, parses: Parses) -> tuple[list[Segment], str]:
-    """The fences and texts of a reply's answer, and its thoughts.
+def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
+    """Return the fences and texts of a reply's answer, and its reasoning.
 
-    All in front of the last marker of a pair is a thought, as the prompt may hold the first one; but where
-    nothing follows it, and thoughts ended before, it has no meaning.
+    Everything before a closing marker alone is reasoning, as the prompt may have the opening one; a closing
+    marker at the end after other reasoning is ignored.
     """
     segments = [*_segments(_first_turn(reply), parses)]
     answer: list[Segment] = []
@@ -74,16 +74,16 @@ def answer_of(reply: str, parses: Parses) -> tuple[list[Segment], str]:
 
 
 def _first_turn(reply: str) -> str:
-    """A reply up to where a model that did not stop asks for the next program itself."""
+    """Cut a reply where a model that did not stop asks for the next program itself."""
     for turn in NEXT_TURN.finditer(reply):
         if DEFINITION.search(reply[: turn.start()]):
             return reply[: turn.start()]
     return reply
 
 
-def _segments(reply: str, parses: Parses) -> Iterator[Segment]:
+def _segments(reply: str, parses: ParseTest) -> Iterator[Segment]:
     while reply:
-        start, segment, end = next(_marked(reply, parses), (len(reply), None, len(reply)))
+        start, segment, end = next(_find_marked(reply, parses), (len(reply), None, len(reply)))
         if text := reply[:start]:
             yield Segment("text", text, text.split("\n"))
         if segment:
@@ -91,15 +91,15 @@ def _segments(reply: str, parses: Parses) -> Iterator[Segment]:
         reply = reply[end:]
 
 
-def _marked(reply: str, parses: Parses) -> Iterator[tuple[int, Segment, int]]:
-    """Where each fence and each thought starts, what it is, and where it ends; only the first is certain."""
+def _find_marked(reply: str, parses: ParseTest) -> Iterator[tuple[int, Segment, int]]:
+    """Yield start, segment and end of fences and thoughts; only the first one is certain."""
     for line in WHOLE_LINE.finditer(reply):
         start, end, text = line.start(), line.end(), line[0]
         if (fence := FENCE_LINE.match(text)) and not _is_in_code(fence, reply[:start]):
-            code, length = _fenced(fence, reply[end:], parses)
+            code, length = _read_fence(fence, reply[end:], parses)
             yield start, Segment("fence", reply[start : end + length], code), end + length
         for marker in _markers_at_ends(text):
-            if found := _thought(marker, reply[start:]):
+            if found := _read_thought(marker, reply[start:]):
                 segment, length = found
                 yield start + marker.start, segment, start + length
 
@@ -108,17 +108,17 @@ def _marked(reply: str, parses: Parses) -> Iterator[tuple[int, Segment, int]]:
 
 
 def _is_in_code(fence: re.Match[str], before: str) -> bool:
-    """Whether an indented fence is in code without fences, such as in a docstring, instead of in a list."""
+    """Whether an indented fence is in code, such as in a docstring, rather than in a list."""
     lines = reversed(before.split("\n"))
     head = next((line for line in lines if line and not line[0].isspace()), "")
     return not fence["indent"].strip() and len(fence["indent"]) > FENCE_MARGIN and is_code(head)
 
 
-def _fenced(fence: re.Match[str], rest: str, parses: Parses) -> tuple[Sequence[str], int]:
-    """The code behind a fence, and its length with the fence that closes it.
+def _read_fence(fence: re.Match[str], rest: str, parses: ParseTest) -> tuple[Sequence[str], int]:
+    """Return the code after a fence, and its length with the closing fence.
 
-    A text in the code may hold a fence, and the last fence may follow on a line of code. So the first end
-    counts at which the code parses; where there is none, the next fence ends it.
+    A string may contain a fence, and the closing fence may be on a line of code. So the first end at which
+    the code parses counts, or else the next fence.
     """
     lines = rest.split("\n")
     indent = re.sub(r"\S", " ", fence["indent"])
@@ -138,7 +138,7 @@ def _fenced(fence: re.Match[str], rest: str, parses: Parses) -> tuple[Sequence[s
 
 
 def _interrupts(line: str) -> bool:
-    """Whether a line shows that a fence was not closed: it opens another one, or ends a thought."""
+    """Whether a line shows that a fence was not closed: it opens another or ends a thought."""
     fence = FENCE_LINE.match(line)
     is_end = any(
         marker.is_last and marker.is_thought and marker.is_at_edge(line) for marker in _markers(line)
@@ -157,9 +157,9 @@ def _length(lines: Sequence[str]) -> int:
 class _Marker:
     """One of a pair of markers, such as `<think>`, `[/THINK]` or `<|END_THINKING|>`."""
 
-    name: str  # without what makes it the first or the last one
-    is_last: bool
-    is_token: bool  # of a chat template, as bars say
+    name: str  # without words such as `begin` and `end`
+    is_last: bool  # whether it closes the pair
+    is_token: bool  # of a chat template, by its bars
     start: int
     end: int
 
@@ -168,12 +168,12 @@ class _Marker:
         return bool(THOUGHT_TAG.search(self.name))
 
     def ends_with(self, other: _Marker) -> bool:
-        """Whether the other is the last one of this pair."""
+        """Whether the other marker closes this one."""
         names = {self.name, "", "channel"} if self.is_token else {self.name}
         return other.is_last and (other.name in names or (self.is_thought and other.is_thought))
 
     def is_at_edge(self, text: str) -> bool:
-        """Whether it begins or ends a line of the text that it is in."""
+        """Whether it begins or ends a line of its text."""
         before = text[text.rfind("\n", 0, self.start) + 1 : self.start]
         return not before.strip() or not text[self.end :].partition("\n")[0].strip()
 
@@ -192,10 +192,10 @@ def _markers_at_ends(line: str) -> Iterator[_Marker]:
     yield from deque(markers, maxlen=1)
 
 
-def _thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:
-    """The thought that a marker of the first line begins or ends, and where it ends; None if it does neither.
+def _read_thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:
+    """Return the thought that a marker of the first line begins or ends, and its end, if any.
 
-    A thought without an end was cut off. A pair of any other name holds a thought if a program follows.
+    A thought without an end was cut off. A pair with another name is a thought if a program follows.
     """
     if marker.is_last:
         is_end = marker.is_thought and marker.is_at_edge(rest)

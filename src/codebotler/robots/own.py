@@ -14,7 +14,7 @@ from traceback import extract_tb
 from typing import Any
 
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills.files import loaded
+from codebotler.core.skills.files import load_skill_module
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import plain
 from codebotler.core.words import listed
@@ -232,7 +232,7 @@ def _run(loop: asyncio.AbstractEventLoop) -> None:
 
 def _make_body(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
     """Create an object of a class in a file; UserError if it cannot be a robot."""
-    module = loaded(path)
+    module = load_skill_module(path)
     classes = [
         n for n, one in vars(module).items() if inspect.isclass(one) and one.__module__ == module.__name__
     ]

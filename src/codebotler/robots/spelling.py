@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.robots.base import Feedback, Robot, RobotArgument, RobotResult, ignore_feedback
 
 
@@ -26,6 +26,6 @@ class SpellingRobot:
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)
         for text in result if isinstance(result, list) else [result]:
-            if isinstance(text, str) and composed(text) != text:
-                self._spellings[composed(text)] = text
-        return composed(result)
+            if isinstance(text, str) and compose(text) != text:
+                self._spellings[compose(text)] = text
+        return compose(result)

@@ -1,4 +1,4 @@
-"""The Robot Temporal Logic of the paper: parse a formula, test it on a trace, and say why it fails."""
+"""The Robot Temporal Logic of the paper: parse formulas, evaluate them on traces, explain failures."""
 
 from codebotler.rtl.explanation import Explanation, explain
 from codebotler.rtl.formulas import (
@@ -16,7 +16,7 @@ from codebotler.rtl.formulas import (
     Regex,
     Scope,
     Test,
-    Text,
+    TextPattern,
     Without,
     Words,
 )
@@ -46,7 +46,7 @@ __all__ = [
     "RtlSyntaxError",
     "Scope",
     "Test",
-    "Text",
+    "TextPattern",
     "Time",
     "Without",
     "Words",

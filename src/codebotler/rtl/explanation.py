@@ -1,4 +1,4 @@
-"""Why a formula does not hold on a trace, in one sentence."""
+"""Explain in one sentence why a formula fails on a trace."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from codebotler.core.words import brief, listed, times
 from codebotler.rtl import formulas
 from codebotler.rtl.semantics import (
     Inconclusive,
-    bound,
+    bounding_event,
     during_stays,
     first_stay,
     holds,
-    matches,
-    narrowed,
-    scoped,
+    is_match,
+    narrow,
+    positions_in_scopes,
 )
-from codebotler.rtl.wording import deed, few, happening, is_any, is_plain, room
+from codebotler.rtl.wording import describe_action, describe_event, elide_list, is_any, is_plain, room
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why a formula fails.
+    """The reason why a formula fails.
 
     Args:
-        clause: the smallest part of the formula, or its negation, that makes it fail; all of it where an
-            option is no text.
-        event: the position in the trace of the event that makes it fail; None for an absence.
-        sentence: the reason for a reader, counting steps from 1.
+        clause: the smallest part of the formula, or its negation, that fails; all of it if an option is not
+            a text.
+        event: the position of the event that makes it fail; None if an event is missing.
+        sentence: the reason in words, with steps counted from 1.
     """
 
     clause: formulas.Formula
@@ -41,12 +41,7 @@ class Explanation:
 
 
 def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
-    """Why a formula fails on a trace; None if it holds.
-
-    Args:
-        formula: what was required.
-        trace: what the robot did.
-    """
+    """Explain why a formula fails on a trace; return None if it holds."""
     try:
         if holds(formula, trace):
             return None
@@ -55,15 +50,14 @@ def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
         problem = f"is not a string but {brief(error.option.text)}, so the requirement cannot be judged"
         return Explanation(formula, error.event, f"{option} {problem}")
     clause = _failing_part(formula, trace)
-    deciding = _deciding(clause, trace, is_true=False)
+    deciding = _deciding_tests(clause, trace, is_true=False)
     facts = [_fact(test, trace, is_true=is_true) for test, is_true in deciding]
     event = max((fact.event for fact in facts if fact.event is not None), default=None)
-    text = _together([*{fact.text: fact for fact in facts}.values()])
+    text = _join_facts([*{fact.text: fact for fact in facts}.values()])
     return Explanation(clause, event, " ".join(f"the robot {text}".split()))
 
 
-def _together(facts: Sequence[_Fact]) -> str:
-    """Facts that are wrong together; the words `the robot` stand before them."""
+def _join_facts(facts: Sequence[_Fact]) -> str:
     if len(facts) == 1:
         return f"{facts[0].text}{facts[0].ending}{facts[0].detail}"
     missing = [fact for fact in facts if fact.is_missing]
@@ -89,28 +83,28 @@ def _failing_part(formula: formulas.Formula, trace: Trace) -> formulas.Formula:
     return formula
 
 
-def _deciding(
+def _deciding_tests(
     formula: formulas.Formula, trace: Trace, *, is_true: bool
 ) -> Iterator[tuple[formulas.Test, bool]]:
-    """The tests that make a formula true or false, each with whether it is true itself."""
+    """Yield the tests that decide a formula, each with its own truth."""
     mention = _as_mention(formula)
     if mention is not None and not is_true and not holds(mention, trace):
         yield mention, False
         return
     match formula:
         case formulas.Not(part):
-            yield from _deciding(part, trace, is_true=not is_true)
+            yield from _deciding_tests(part, trace, is_true=not is_true)
         case formulas.And(parts) | formulas.Or(parts):
             needs_all = isinstance(formula, formulas.And) == is_true
             deciding = parts if needs_all else [next(one for one in parts if holds(one, trace) == is_true)]
             for part in deciding:
-                yield from _deciding(part, trace, is_true=is_true)
+                yield from _deciding_tests(part, trace, is_true=is_true)
         case _:
             yield formula, is_true
 
 
 def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
-    """The one test that `ask(t, ".*") or ask(".*", t)` comes to."""
+    """Return the test with `mention` that is equivalent to `ask(t, ".*") or ask(".*", t)`."""
     match formula:
         case formulas.Or((one, other)) if isinstance(one, formulas.PresenceTest) and isinstance(
             other, formulas.PresenceTest
@@ -125,19 +119,19 @@ def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     return None
 
 
-_MOST_QUOTED = 3  # of what the robot did instead
+_MAX_QUOTED = 3  # other events
 _AtPlace = formulas.ActAtFirst | formulas.ActAtSome
 
 
 class _Fact(NamedTuple):
-    """Whether a test is true, in English; the words `the robot` stand before it."""
+    """The result of a test in English, as a predicate of `the robot`."""
 
     event: int | None
     text: str
-    ending: str = ""  # what was required instead, unless other facts follow
-    detail: str = ""  # what came nearest
-    is_missing: bool = False  # whether it is that the robot did not do something
-    short: str = ""  # the text without what other facts tell already
+    ending: str = ""  # the requirement, unless other facts follow
+    detail: str = ""  # the closest event
+    is_missing: bool = False  # whether the robot failed to do something
+    short: str = ""  # the text without parts that other facts repeat
 
 
 def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
@@ -152,16 +146,22 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
 
 
 def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
-    at = next(at for at in _positions(test, trace) if matches(test.element, trace, at))
+    at = next(at for at in _positions(test, trace) if is_match(test.element, trace[at], at))
     element = replace(test.element, place=None)
-    done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
+    done, did = (
+        f"{verb(element.kind).past} {describe_event(trace[at], element)}",
+        describe_action(element, "past"),
+    )
     place = "" if test.element.place is None else f" in {room(formulas.Regex(test.element.place))}"
     stay = f" in {room(test.arrival.text)}" if isinstance(test, _AtPlace) else ""
     step = f"{place}{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
     where = _where(test.scopes, trace, is_true=True)
     if is_plain(element):
         return _Fact(at, f"{done}{step}{where}", ", which it must not do", short=f"{done}{step}")
-    text, short = deed(element, "past", when=step, where=where), deed(element, "past", when=step)
+    text, short = (
+        describe_action(element, "past", when=step, where=where),
+        describe_action(element, "past", when=step),
+    )
     return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}", short=short)
 
 
@@ -169,74 +169,80 @@ def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     element, where = test.element, _where(test.scopes, trace, is_true=False)
     here = [*_positions(test, trace)]
     if (missing := _missing_bound(test.scopes, trace)) is not None:
-        text = f"never {deed(missing.element, 'past', negated=True)}"
+        text = f"never {describe_action(missing.element, 'past', negated=True)}"
         when = "before" if missing.is_before else "after"
-        return _Fact(None, text, f", {when} which it was to {deed(element, 'base')}")
+        return _Fact(None, text, f", {when} which it was to {describe_action(element, 'base')}")
     if isinstance(test, formulas.Exists):
-        event, detail = _instead(element, trace, here)
-        return _Fact(event, f"never {deed(element, 'past', negated=True, where=where)}", detail=detail)
+        event, detail = _describe_instead(element, trace, here)
+        return _Fact(
+            event, f"never {describe_action(element, 'past', negated=True, where=where)}", detail=detail
+        )
     if isinstance(test, formulas.Last):
         return _not_last(element, where, trace, here)
-    span = scoped(test.scopes, trace)
-    arrivals = [at for at in span if matches(test.arrival, trace, at)]
+    span = positions_in_scopes(test.scopes, trace)
+    arrivals = [at for at in span if is_match(test.arrival, trace[at], at)]
     if not arrivals:
-        _, detail = _instead(test.arrival, trace, span)
-        never = f"never {deed(test.arrival, 'past', negated=True)}"
-        ending = f", where it was to {deed(element, 'base')}{where and ','}{where}"
+        _, detail = _describe_instead(test.arrival, trace, span)
+        never = f"never {describe_action(test.arrival, 'past', negated=True)}"
+        ending = f", where it was to {describe_action(element, 'base')}{where and ','}{where}"
         return _Fact(None, never, ending, detail)
     first = isinstance(test, formulas.ActAtFirst)
     there = "during that stay" if first and len(arrivals) > 1 else "there"
-    event, detail = _instead(element, trace, here)
+    event, detail = _describe_instead(element, trace, here)
     if not detail:
         kinds = dict.fromkeys(trace[at].kind for at in here if trace[at].kind != GOTO)
         only = listed([verb(kind).alone for kind in kinds])
         detail = f": it only {only}" if only else ": it did nothing there"
     visits = arrivals[:1] if first else arrivals
-    rooms = dict.fromkeys(happening(trace[at], test.arrival) for at in visits)
-    failed = f"did not {deed(element, 'base', negated=True, when=f' {there}', where=where)}"
+    rooms = dict.fromkeys(describe_event(trace[at], test.arrival) for at in visits)
+    failed = f"did not {describe_action(element, 'base', negated=True, when=f' {there}', where=where)}"
     stay = f" in {room(test.arrival.text)}"
-    short = f"did not {deed(element, 'base', negated=True, when=stay, where=where)}"
-    text = f"went to {listed(few([*rooms]))} at {_steps(visits)} but {failed}"
+    short = f"did not {describe_action(element, 'base', negated=True, when=stay, where=where)}"
+    text = f"went to {listed(elide_list([*rooms]))} at {_steps(visits)} but {failed}"
     return _Fact(arrivals[0] if event is None else event, text, detail=detail, short=short)
 
 
 def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Sequence[int]) -> _Fact:
-    text = f"did not {deed(element, 'base', negated=True, when=' last', where=where)}"
+    text = f"did not {describe_action(element, 'base', negated=True, when=' last', where=where)}"
     if not here:
         return _Fact(None, text, detail=": it did nothing")
     (at,) = here
     kind, event = trace[at].kind, trace[at]
     wanted = element if kind == element.kind else formulas.EventPattern(kind, formulas.Regex(".*"))
-    return _Fact(at, text, detail=f": it last {verb(kind).past} {happening(event, wanted)} (step {at + 1})")
+    return _Fact(
+        at, text, detail=f": it last {verb(kind).past} {describe_event(event, wanted)} (step {at + 1})"
+    )
 
 
 def _missing_bound(scopes: tuple[formulas.Scope, ...], trace: Trace) -> formulas.Scope | None:
-    """The first scope that leaves nothing of a trace, since what bounds it never happened."""
+    """Return the first scope that is empty because its bounding event never happened."""
     span = range(len(trace))
     for scope in scopes:
-        at = bound(scope, trace, span)
+        at = bounding_event(scope, trace, span)
         if at is None and scope.is_only:
             return scope
-        span = narrowed(scope, at, span)
+        span = narrow(scope, at, span)
     return None
 
 
 def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
     where, number = _where(test.scopes, trace, is_true=is_true), test.number
     exactly, is_missing = isinstance(test, formulas.Count), not is_true
-    span = scoped(test.scopes, trace)
-    found = [at for at in span if _is_match(test.element, trace, at)]
+    span = positions_in_scopes(test.scopes, trace)
+    found = [at for at in span if _is_conclusive_match(test.element, trace, at)]
     if found:
-        text = deed(test.element, "past", when=f" {times(len(found))} ({_steps(found)})", where=where)
+        text = describe_action(
+            test.element, "past", when=f" {times(len(found))} ({_steps(found)})", where=where
+        )
     else:
-        text = f"never {deed(test.element, 'past', negated=True, where=where)}"
+        text = f"never {describe_action(test.element, 'past', negated=True, where=where)}"
     if is_true:
         limit = (
             f"must not do so exactly {times(number)}" if exactly else f"may do so {times(number - 1)} at most"
         )
         return _Fact(found[-1] if found else None, text, f", but {limit}")
     if not found:
-        _, detail = _instead(test.element, trace, span)
+        _, detail = _describe_instead(test.element, trace, span)
         ending = f", but should have {'' if exactly else 'at least '}{times(number)}"
         return _Fact(None, text, ending, detail, is_missing)
     ending = f" instead of {'' if exactly else 'at least '}{times(number)}"
@@ -244,8 +250,7 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
 
 
 def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
-    """The positions of the events that a test looks at."""
-    span = scoped(test.scopes, trace)
+    span = positions_in_scopes(test.scopes, trace)
     match test:
         case formulas.Exists():
             return span
@@ -257,28 +262,30 @@ def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
 
 
 def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -> str:
-    """The scopes that bound what is left of a trace, such as ` after going to the lobby (step 1)`.
+    """Describe the scopes, such as ` after going to the lobby (step 1)`.
 
-    Where something is missing, the reader also needs to know after what it was to happen.
+    For a missing event, include bounds that never happened.
     """
     span, ends = range(len(trace)), {"after": "", "before": ""}
     for scope in scopes:
-        at = bound(scope, trace, span)
+        at = bounding_event(scope, trace, span)
         when = "before" if scope.is_before else "after"
         if at is not None:
             bare = replace(scope.element, place=None, options=None, mention=False)
-            ends[when] = f"{verb(bare.kind).ing} {happening(trace[at], bare)} (step {at + 1})"
+            ends[when] = f"{verb(bare.kind).ing} {describe_event(trace[at], bare)} (step {at + 1})"
         elif not is_true and not scope.is_before:
-            ends[when] = f"{deed(scope.element, 'ing')} (which never happened)"
-        span = narrowed(scope, at, span)
+            ends[when] = f"{describe_action(scope.element, 'ing')} (which never happened)"
+        span = narrow(scope, at, span)
     if all(ends.values()):
         return f" between {ends['after']} and {ends['before']}"
     return "".join(f" {when} {end}" for when, end in ends.items() if end)
 
 
-def _instead(element: formulas.EventPattern, trace: Trace, here: Sequence[int]) -> tuple[int | None, str]:
-    """What the robot did instead of an element: the same elsewhere, or other things of this kind here."""
-    done = [at for at in range(len(trace)) if _is_match(element, trace, at)]
+def _describe_instead(
+    element: formulas.EventPattern, trace: Trace, here: Sequence[int]
+) -> tuple[int | None, str]:
+    """Describe a matching event elsewhere, or other events of this kind here."""
+    done = [at for at in range(len(trace)) if _is_conclusive_match(element, trace, at)]
     if done:
         return done[0], f": it did so only at {_steps(done)}"
     alike = [at for at in here if trace[at].kind == element.kind]
@@ -286,19 +293,19 @@ def _instead(element: formulas.EventPattern, trace: Trace, here: Sequence[int]) 
         return None, "" if trace else ": it did nothing at all"
     only = f": it only {verb(element.kind).past}"
     if element.kind == GOTO:
-        rooms = dict.fromkeys(happening(trace[at], element) for at in alike)
-        return None, f"{only} {listed(few([*rooms]))}"
-    shown = [f"{happening(trace[at], element)} (step {at + 1})" for at in alike]
-    return alike[0], f"{only} {listed(few(shown, _MOST_QUOTED))}"
+        rooms = dict.fromkeys(describe_event(trace[at], element) for at in alike)
+        return None, f"{only} {listed(elide_list([*rooms]))}"
+    shown = [f"{describe_event(trace[at], element)} (step {at + 1})" for at in alike]
+    return alike[0], f"{only} {listed(elide_list(shown, _MAX_QUOTED))}"
 
 
-def _is_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
+def _is_conclusive_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
     try:
-        return matches(element, trace, at)
+        return is_match(element, trace[at], at)
     except Inconclusive:
         return False
 
 
 def _steps(found: Sequence[int]) -> str:
-    numbers = few([str(at + 1) for at in found])
+    numbers = elide_list([str(at + 1) for at in found])
     return f"step{'s' * (len(found) > 1)} {listed(numbers)}"

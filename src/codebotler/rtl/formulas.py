@@ -1,4 +1,4 @@
-"""The formulas of RTL as immutable values; `str` writes one as text that `parse` reads."""
+"""The formulas of RTL as immutable values; `str` writes text that `parse` reads."""
 
 from __future__ import annotations
 
@@ -27,11 +27,7 @@ ScopeName: TypeAlias = Literal[
 
 @dataclass(frozen=True)
 class Regex(Matcher):
-    """A text in which a regex is found, ignoring case.
-
-    Args:
-        pattern: the regex; `.` is any character, a line break too.
-    """
+    """Matches texts in which a regex is found, ignoring case; `.` also matches line breaks."""
 
     pattern: str
 
@@ -49,11 +45,7 @@ class Regex(Matcher):
 
 @dataclass(frozen=True)
 class Without(Matcher):
-    """A text in which a regex is not found as a whole word.
-
-    Args:
-        pattern: the regex.
-    """
+    """Matches texts in which a regex is not found as a whole word."""
 
     pattern: str
 
@@ -71,13 +63,9 @@ class Without(Matcher):
 
 @dataclass(frozen=True)
 class Words(Matcher):
-    """A text in which all parts are found, in any order.
+    """Matches texts in which all of one or more parts are found, in any order."""
 
-    Args:
-        parts: one or more texts.
-    """
-
-    parts: tuple[Text, ...]
+    parts: tuple[TextPattern, ...]
 
     def _matches(self, text: str) -> bool:
         return all(part.matches(text) for part in self.parts)
@@ -86,40 +74,39 @@ class Words(Matcher):
         return f"words({', '.join(map(str, self.parts))})"
 
 
-Text: TypeAlias = Regex | Words | Without | Number | Time | Claim
+TextPattern: TypeAlias = Regex | Words | Without | Number | Time | Claim
 
 
 @dataclass(frozen=True)
 class EventPattern:
-    """The events of one kind whose text, options, answer and room match.
+    """A pattern for events of one kind.
 
     Args:
-        kind: the kind of the event, such as `goto`.
-        text: what the event's text must match.
-        options: what at least one option of a question must match; None if options do not matter.
-        mention: whether `text` may also be found in an option instead of in the question.
-        place: a regex that the room's name must hold as a whole word; None for anywhere.
-        answer: what the answer to a question must match; None if the answer does not matter.
-        found: whether a look must have succeeded or failed; None if that does not matter.
-        holding: what the robot must have held when it began; None if that does not matter.
-        to: what the person must match whom a question was for; None if that does not matter.
-        more: what the further arguments of a skill that has several must match, in order.
-        offers: how many options a question must offer, at least and at most; None for any number.
-        has_text: whether such events have a text: False if their skill has no arguments.
-        means: what its texts come to, after the verb in a sentence, such as `that nobody is coming`; None
-            where the texts are plain enough.
+        kind: the kind of event, such as `goto`.
+        text: matches the event's text.
+        options: matches at least one option of a question; None for any options.
+        mention: whether `text` may match an option instead of the question.
+        place: a regex to find as a whole word in the room's name; None for any room.
+        answer: matches the answer to a question; None for any answer.
+        found: the result of a look or another yes-or-no skill; None for any result.
+        holding: matches what the robot held at the start of the event; None for anything.
+        to: matches the addressee of a question; None for anyone.
+        more: match further arguments, in order.
+        offers: the least and the greatest number of options; None for any number.
+        has_text: whether such events have a text: False if their skill has no parameters.
+        means: the meaning of its texts after a verb, such as `that nobody is coming`; None for plain texts.
     """
 
     kind: str
-    text: Text
-    options: Text | None = None
+    text: TextPattern
+    options: TextPattern | None = None
     mention: bool = False
     place: str | None = None
-    answer: Text | None = None
+    answer: TextPattern | None = None
     found: bool | None = None
-    holding: Text | None = None
-    to: Text | None = None
-    more: tuple[Text, ...] = ()
+    holding: TextPattern | None = None
+    to: TextPattern | None = None
+    more: tuple[TextPattern, ...] = ()
     offers: tuple[int, int | None] | None = None
     has_text: bool = True
     means: str | None = field(default=None, compare=False)
@@ -131,7 +118,7 @@ class EventPattern:
 
     @cached_property
     def is_about_more(self) -> bool:
-        """Whether more than the texts and the room matters."""
+        """Whether it has conditions on more than text, options and room."""
         wanted = self.answer, self.found, self.holding, self.to, self.offers
         return bool(self.more) or any(one is not None for one in wanted)
 
@@ -159,12 +146,12 @@ class EventPattern:
 
 @dataclass(frozen=True)
 class Scope:
-    """The part of a trace before or after the first or last event that an element matches.
+    """The part of a trace before or after the first or last matching event.
 
     Args:
-        name: which part; the event itself is in none.
-        element: the event that bounds the part; where none matches, the scope is the whole trace, or nothing
-            if the name begins with `Only`.
+        name: the part, which excludes the event itself.
+        element: matches the bounding event; without a match, the scope is the whole trace, or empty if the
+            name begins with `Only`.
     """
 
     name: ScopeName
@@ -172,12 +159,12 @@ class Scope:
 
     @property
     def is_only(self) -> bool:
-        """Whether nothing is left where no event matches."""
+        """Whether the scope is empty if no event matches."""
         return self.name.startswith("Only")
 
     @property
     def is_before(self) -> bool:
-        """Whether it is the part before the event."""
+        """Whether the scope is before the event."""
         return "Before" in self.name
 
     def __str__(self) -> str:
@@ -186,12 +173,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class _OfEvent:
-    """About one event.
-
-    Args:
-        element: what the event must match.
-        scopes: where to look, each within the one before.
-    """
+    """A test of one event, in nested scopes."""
 
     element: EventPattern
     scopes: tuple[Scope, ...] = ()
@@ -210,13 +192,7 @@ class Last(_OfEvent):
 
 @dataclass(frozen=True)
 class _ActAtPlace:
-    """An event matches during a stay at a place.
-
-    Args:
-        place: a regex for the room.
-        element: what the event must match.
-        scopes: where to look, each within the one before.
-    """
+    """A test for an event during a stay in a room whose name the regex `place` matches."""
 
     place: str
     element: EventPattern
@@ -224,12 +200,12 @@ class _ActAtPlace:
 
     @cached_property
     def arrival(self) -> EventPattern:
-        """The move that begins a stay."""
+        """Matches the move that begins a stay."""
         return EventPattern(GOTO, Regex(self.place))
 
     @cached_property
     def departure(self) -> EventPattern:
-        """The move that ends a stay."""
+        """Matches the move that ends a stay."""
         return EventPattern(GOTO, Without(self.place))
 
     def __str__(self) -> str:
@@ -246,13 +222,7 @@ class ActAtSome(_ActAtPlace):
 
 @dataclass(frozen=True)
 class _Counting:
-    """How many events match.
-
-    Args:
-        element: what the events must match.
-        number: how many, 0 or more.
-        scopes: where to look, each within the one before.
-    """
+    """A test of the number of matching events."""
 
     element: EventPattern
     number: int
@@ -263,20 +233,16 @@ class _Counting:
 
 
 class Count(_Counting):
-    """Exactly so many events match."""
+    """Exactly `number` events match."""
 
 
 class AtLeast(_Counting):
-    """So many events match, or more."""
+    """At least `number` events match."""
 
 
 @dataclass(frozen=True)
 class And:
-    """All parts hold.
-
-    Args:
-        parts: two or more, evaluated from the left until one fails.
-    """
+    """All of two or more parts hold; evaluation stops at the first that fails."""
 
     parts: tuple[Formula, ...]
 
@@ -286,11 +252,7 @@ class And:
 
 @dataclass(frozen=True)
 class Or:
-    """Some part holds.
-
-    Args:
-        parts: two or more, evaluated from the left until one holds.
-    """
+    """One of two or more parts holds; evaluation stops there."""
 
     parts: tuple[Formula, ...]
 
@@ -300,11 +262,7 @@ class Or:
 
 @dataclass(frozen=True)
 class Not:
-    """A formula does not hold.
-
-    Args:
-        part: the formula.
-    """
+    """A formula does not hold."""
 
     part: Formula
 

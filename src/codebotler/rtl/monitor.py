@@ -1,4 +1,4 @@
-"""`Monitor`: whether a formula is true of what has happened so far, one event at a time."""
+"""Monitor a formula, one event at a time."""
 
 from __future__ import annotations
 
@@ -13,20 +13,18 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.automaton import Automaton, Letter, Undecided, machine_of
 from codebotler.rtl.semantics import is_match
 
-MOST_REMEMBERED_STEPS = 4_000  # that are remembered of a formula
+MAX_CACHED_STEPS = 4_000  # per formula
 
 
 class Monitor:
-    """Tells after each event whether a formula holds on all events so far.
+    """Evaluates a formula on the events so far; `holds` is the result.
 
-    Each event takes the same time and the same memory, however many there were. With `events`, the monitor
-    also knows whether that is for good, whichever of these events may follow.
+    Each event takes constant time and memory. With `events`, the monitor also knows whether the result is
+    final.
 
     Args:
-        formula: what to watch.
-        events: all that can happen, as far as the formula tells events apart; None for anything.
-
-    `holds` says whether the formula is true of the events so far.
+        formula: the formula.
+        events: all possible events, one for each way in which the formula distinguishes them; None for any.
     """
 
     def __init__(self, formula: formulas.Formula, events: Iterable[Event] | None = None) -> None:
@@ -40,20 +38,20 @@ class Monitor:
 
     @property
     def state(self) -> object:
-        """What counts of the past: monitors of one formula with equal states say the same from now on."""
+        """The state of the automaton; equal states give equal results from now on."""
         return self._state
 
     @property
     def is_final(self) -> bool | None:
-        """Whether no events can change that; None if `events` are not given, or it would take too long."""
+        """Whether the result is final; None without `events`, or if that takes too long to decide."""
         return None if self._future is None else self._future.is_final
 
     def feed(self, event: Event) -> bool:
-        """Take the next event, and return whether the formula holds now.
+        """Process the next event, and return whether the formula holds now.
 
         Raises:
-            Inconclusive: an option is no text; the event does not count.
-            ValueError: the event is not one of `events`; it does not count.
+            Inconclusive: an option is not a text; the event is ignored.
+            ValueError: the event is not one of `events`; it is ignored.
         """
         mask = self._machine.mask(event, self._seen)
         if self._future is not None:
@@ -64,16 +62,16 @@ class Monitor:
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
-        """Whether the formula would hold if this came next; Inconclusive if an option of it is no text."""
+        """Whether the formula would hold after this event; Inconclusive if an option is not a text."""
         machine = self._machine
         mask = machine.mask(event, self._seen)
         return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
 
 
 class _Machine:
-    """The automaton of a formula, which remembers steps; shared by all monitors of the formula.
+    """The automaton of a formula with cached steps, shared by all its monitors.
 
-    Letters are numbers, with a bit for each element of the formula that matches.
+    Letters are bit masks of the matching patterns of the formula.
     """
 
     def __init__(self, formula: formulas.Formula) -> None:
@@ -88,13 +86,11 @@ class _Machine:
     @classmethod
     @lru_cache(maxsize=256)
     def of(cls, formula: formulas.Formula) -> _Machine:
-        """That of a formula."""
         return cls(formula)
 
     def mask(self, event: Event, at: int) -> int:
-        """The letter of an event."""
         wanted = self._by_kind.get(event.kind)
-        if wanted is None:  # which is so for most rules and events
+        if wanted is None:  # the usual case
             return 0
         found = 0
         for bit, element in wanted:
@@ -103,21 +99,17 @@ class _Machine:
         return found
 
     def letter(self, mask: int) -> Letter:
-        """The elements of a letter."""
         return frozenset(one for bit, one in enumerate(self._elements) if mask >> bit & 1)
 
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
-        """The state after a letter, and whether the formula holds there."""
         after = self._machine.step(state, self.letter(mask))
         found = after, self._machine.accepts(after)
-        if len(self.steps) < MOST_REMEMBERED_STEPS:
+        if len(self.steps) < MAX_CACHED_STEPS:
             self.steps[state, mask] = found
         return found
 
 
 class _Future:
-    """What may still become of a formula when events are of certain letters."""
-
     def __init__(self, automaton: Automaton, letters: tuple[Letter, ...]) -> None:
         self._automaton, self._letters = automaton, letters
         self._opposite = replace(automaton, accepts=tuple(not accepted for accepted in automaton.accepts))

@@ -1,4 +1,4 @@
-"""The words of a regex: the plain texts that it finds, for readers who do not know regexes."""
+"""Find the plain texts that a regex matches, for readers who do not know regexes."""
 
 from __future__ import annotations
 
@@ -11,19 +11,17 @@ from codebotler.rtl.pattern import Tree, parse_tree
 
 MATCH_ALL_PATTERNS = frozenset({"", ".*", ".+", "^.*$"})
 UNCLEAR = "(…)"
-_MOST = 40  # texts that one regex may find
-_FEWEST_IN_A_ROW = 3  # whole numbers that are named by the first and the last of them
-_SHOWN = 5
+_MAX_TEXTS = 40  # of one regex
+_MIN_RANGE = 3  # more consecutive numbers are shown as a range
+_MAX_SHOWN = 5
 
 
 @lru_cache(maxsize=4096)
 def choices(pattern: str) -> tuple[str, ...] | None:
-    """The texts that a regex finds, such as `bread` and `toast`, each in its shortest form.
+    """Return the texts that a regex finds, such as `bread` and `toast`, each in its shortest form.
 
-    Whole words and numbers in a row count as they are read: `7[3-9]` finds `73 to 79`.
-
-    Returns:
-        None if the texts are too many, or the regex says what must not be there.
+    Combine consecutive numbers: `7[3-9]` gives `73 to 79`. Return None if there are too many texts, or if the
+    regex has no certain ones.
     """
     try:
         found = [" ".join(text.split()) for text in _texts(parse_tree(pattern))]
@@ -32,7 +30,7 @@ def choices(pattern: str) -> tuple[str, ...] | None:
     distinct = tuple(dict.fromkeys(found))
     if not all(text.strip("…, ") for text in distinct):
         return None
-    if len(distinct) > _FEWEST_IN_A_ROW and all(text.isdecimal() and text.isascii() for text in distinct):
+    if len(distinct) > _MIN_RANGE and all(text.isdecimal() and text.isascii() for text in distinct):
         numbers = sorted(map(int, distinct))
         if numbers[-1] - numbers[0] == len(numbers) - 1:
             return (f"{numbers[0]} to {numbers[-1]}",)
@@ -40,14 +38,14 @@ def choices(pattern: str) -> tuple[str, ...] | None:
 
 
 def one_of(texts: tuple[str, ...], quote: str = '"') -> str:
-    """Texts to choose from, such as `"bread" or "toast"`, without the last of many."""
-    left = len(texts) - _SHOWN
-    shown = [f"{quote}{brief(text)}{quote}" for text in texts[: _SHOWN if left > 1 else None]]
+    """Join alternatives, such as `"bread" or "toast"`, and count those after the fifth."""
+    left = len(texts) - _MAX_SHOWN
+    shown = [f"{quote}{brief(text)}{quote}" for text in texts[: _MAX_SHOWN if left > 1 else None]]
     return listed([*shown, f"{left} more"] if left > 1 else shown, "or")
 
 
 def first_choice(pattern: str) -> str:
-    """The first plain text that a regex finds, for a reader; `(…)` if there is none for certain."""
+    """Return the first plain text that a regex finds; `(…)` if it has no certain one."""
     first = "anything" if pattern in MATCH_ALL_PATTERNS else (choices(pattern) or (UNCLEAR,))[0]
     return pattern if first == pattern.strip() or not pattern else first
 
@@ -61,7 +59,7 @@ def _texts(tree: Tree) -> list[str]:
     for op, arguments in tree:
         each = _node_texts(str(op), arguments)
         texts = [text + part for text, part in product(texts, each)]
-        if len(texts) > _MOST:
+        if len(texts) > _MAX_TEXTS:
             raise _UnclearError
     return texts
 
@@ -77,7 +75,7 @@ def _node_texts(op: str, arguments: Any) -> list[str]:  # noqa: ANN401 - as Pyth
     if op.endswith("REPEAT"):
         return _repeat_texts(*arguments)
     if op == "ASSERT_NOT":
-        _texts(arguments[-1])  # `cheese` is what a regex for cheese that is not grilled finds
+        _texts(arguments[-1])  # a regex for cheese that is not grilled finds `cheese`
     elif op not in {"AT", "ANY"}:
         raise _UnclearError
     return ["…" if op == "ANY" else ""]
@@ -103,12 +101,12 @@ def _is_category(tree: Tree, *names: str) -> bool:
 
 
 def _set_texts(members: Any) -> list[str]:  # noqa: ANN401 - as in `_node_texts`
-    """The characters of a set; the first of signs, which differ in how they are written only."""
+    """Return the characters of a set; only the first one of punctuation, which is a mere variant."""
     characters: list[str] = []
     for op, value in members:
         if str(op) not in {"LITERAL", "RANGE"}:
             raise _UnclearError
         start, end = value if str(op) == "RANGE" else (value, value)
-        characters += map(chr, range(start, min(end, start + _MOST) + 1))
+        characters += map(chr, range(start, min(end, start + _MAX_TEXTS) + 1))
     characters = [*dict.fromkeys(character.lower() for character in characters)]
     return characters if all(map(str.isalnum, characters)) else characters[:1]

@@ -1,7 +1,6 @@
-"""Whether a formula holds on a trace, in time linear in the trace.
+"""Evaluate formulas on traces in linear time.
 
-Scopes are ranges of positions, never copies. A test looks at the events once, from the first to the last, and
-stops at the event that settles it.
+Scopes are ranges of positions. A test reads the events once, in order, and stops as soon as it is decided.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from codebotler.rtl import formulas
 
 
 class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a third verdict
-    """A question had to be judged, but one of its options is no text.
+    """A formula depends on an option of a question that is not a text.
 
     Args:
         event: the question's position in the trace.
@@ -37,12 +36,8 @@ class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a
 def holds(formula: formulas.Formula, trace: Trace) -> bool:
     """Whether a formula is true of a trace.
 
-    Args:
-        formula: what to test.
-        trace: what the robot did.
-
     Raises:
-        Inconclusive: an option that is no text had to be compared.
+        Inconclusive: the formula depends on an option that is not a text.
     """
     if isinstance(formula, formulas.Not):
         return not holds(formula.part, trace)
@@ -54,24 +49,24 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
 
 
 def visible(trace: Trace) -> tuple[object, ...]:
-    """All that formulas can tell of a trace: all but times. Where it is equal, traces are judged alike."""
+    """Return all of a trace that formulas can distinguish, which is everything but times."""
     return tuple(
         (e.kind, e.text, e.options, e.answer, e.found, e.place, e.holding, e.to, e.more) for e in trace
     )
 
 
 def _test_holds(test: formulas.Test, trace: Trace) -> bool:
-    span = scoped(test.scopes, trace)
+    span = positions_in_scopes(test.scopes, trace)
     match test:
         case formulas.Exists(element):
             return first(element, trace, span) is not None
         case formulas.Last(element):
-            return len(span) > 0 and matches(element, trace, span[-1])
+            return len(span) > 0 and is_match(element, trace[span[-1]], span[-1])
         case formulas.ActAtFirst(_, element):
             stay = first_stay(test, trace, span)
             return stay is not None and first(element, trace, stay) is not None
         case formulas.ActAtSome(_, element):
-            return any(matches(element, trace, at) for at in during_stays(test, trace, span))
+            return any(is_match(element, trace[at], at) for at in during_stays(test, trace, span))
         case formulas.AtLeast(element, number):
             return at_least(element, number, trace, span) == number
         case formulas.Count(element, number):
@@ -79,17 +74,12 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
     assert_never(test)
 
 
-def matches(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
-    """Whether an element matches the event at a position.
+def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
+    """Whether a pattern matches an event at a position of its trace.
 
     Raises:
-        Inconclusive: an option that is no text comes before the first that matches, whatever the question is.
+        Inconclusive: an option that is not a text precedes the first match.
     """
-    return is_match(element, trace[at], at)
-
-
-def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
-    """Whether an element matches an event, which is at a position of its trace."""
     if event.kind != element.kind:
         return False
     if element.place_regex is not None and element.place_regex.search(event.place) is None:
@@ -104,7 +94,7 @@ def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
 
 
 def _fits(element: formulas.EventPattern, event: Event) -> bool:
-    """Whether answer, find, what is held, who is asked and how many options are as an element wants them."""
+    """Whether result, answer, held object, addressee, further arguments and number of options match."""
     least, most = element.offers or (0, None)
     if not least <= len(event.options) <= (len(event.options) if most is None else most):
         return False
@@ -129,8 +119,8 @@ def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
 
 
 def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> Iterator[int]:
-    """The positions of all events that match, each found when it is asked for."""
-    kind = element.kind  # of most events it is another, for which no function need be called
+    """Yield the positions of matching events."""
+    kind = element.kind  # most events have another kind and need no call
     for at in span:
         event = trace[at]
         if event.kind == kind and is_match(element, event, at):
@@ -138,38 +128,38 @@ def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> It
 
 
 def first(element: formulas.EventPattern, trace: Trace, span: range) -> int | None:
-    """The position of the first event that matches."""
+    """Return the position of the first matching event."""
     return next(occurrences(element, trace, span), None)
 
 
 def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: range) -> int:
-    """How many events match, up to a number at which counting stops."""
+    """Count matching events up to `number`."""
     return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
 
 
-def scoped(scopes: tuple[formulas.Scope, ...], trace: Trace) -> range:
-    """The positions of a trace that are within all scopes."""
+def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> range:
+    """Return the positions of a trace within all scopes."""
     span = range(len(trace))
     for scope in scopes:
-        span = narrowed(scope, bound(scope, trace, span), span)
+        span = narrow(scope, bounding_event(scope, trace, span), span)
     return span
 
 
-def bound(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
-    """The position of the event that bounds a scope."""
+def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
+    """Return the position of the event that bounds a scope."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
-def narrowed(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """What is left of a span by a scope whose bound is at a position; all of it, or nothing, without one."""
+def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
+    """Restrict a span to a scope bounded at a position, or not bounded if None."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)
 
 
 def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> range | None:
-    """The positions between the first arrival at the place of a test and the next departure."""
+    """Return the positions between the first arrival at the place of a test and the next departure."""
     arrival = first(test.arrival, trace, span)
     if arrival is None:
         return None
@@ -179,13 +169,13 @@ def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, spa
 
 
 def during_stays(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> Iterator[int]:
-    """The positions of the events during all stays at the place of a test.
+    """Yield the positions during all stays at the place of a test.
 
-    The move that ends a stay is not among them; the one that begins it only if it is part of an earlier stay.
+    A stay excludes the move that ends it; the move that begins it counts only within an earlier stay.
     """
-    there = False
+    is_there = False
     for at in span:
-        there = there and not matches(test.departure, trace, at)
-        if there:
+        is_there = is_there and not is_match(test.departure, trace[at], at)
+        if is_there:
             yield at
-        there = there or matches(test.arrival, trace, at)
+        is_there = is_there or is_match(test.arrival, trace[at], at)

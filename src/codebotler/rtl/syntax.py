@@ -1,4 +1,4 @@
-"""The parser of RTL; it reads a formula as a Python expression and never runs it."""
+"""Parse RTL formulas as Python expressions, without running them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import TRUTH_TYPE, ValueType, as_text
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
@@ -27,23 +27,20 @@ ANSWERED = "answered"
 QUESTIONS = ("mention", ANSWERED)
 LOOK_RESULTS = {"found": True, "missed": False}
 SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
-AROUND_WORDS = ("at", "holding", "to", "options", "returned")  # what else an event must be like
+WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions on an event
 
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
-DEEPEST_FORMULA = 50
-"""How deep a formula may be nested; few enough for Python's stack wherever it is evaluated."""
-
-MOST_OFFERED = 100  # of a question, in a formula
-
-_LONGEST_SHOWN = 40
+MAX_FORMULA_DEPTH = 50  # small enough for Python's stack in every evaluation
+MAX_OPTIONS = 100  # that a formula may require of a question
+_MAX_SHOWN_LENGTH = 40
 
 
 class RtlSyntaxError(ValueError):
-    """A text is no formula; the message is one sentence that says where and why.
+    """A text is not a formula; the message says where and why.
 
     Args:
-        column: where, counted from 1.
+        column: the position, counted from 1.
         problem: what is wrong there.
     """
 
@@ -59,18 +56,18 @@ class RtlSyntaxError(ValueError):
 def parse(
     text: str, *, skills: SkillTable = SKILLS, means: Mapping[str, str] = NO_MEANINGS
 ) -> formulas.Formula:
-    """The formula that a text writes.
+    """Parse a formula.
 
     Args:
         text: the formula; a line break counts as a space.
-        skills: the skills whose events formulas are about.
-        means: for explanations, what the texts of the elements of a kind come to, such as `that nobody is
-            coming` for `say`; of questions that were answered, by `answered`.
+        skills: the skills whose events the formula may name.
+        means: for explanations, the meaning of the texts of a kind of event, such as `that nobody is coming`
+            for `say`; for answered questions, under `answered`.
 
     Raises:
-        RtlSyntaxError: the text is no formula.
+        RtlSyntaxError: the text is not a formula.
     """
-    return _Parser(composed(text), skills, means).formula()
+    return _Parser(compose(text), skills, means).formula()
 
 
 class _Parser:
@@ -78,7 +75,7 @@ class _Parser:
         self.means = means
         self.indent = len(text) - len(text.lstrip())
         self.text = re.sub(r"[\r\n\f]", " ", text).strip()
-        self.bytes = self.text.encode(errors="replace")  # in which `ast` counts columns
+        self.bytes = self.text.encode(errors="replace")  # `ast` counts columns in bytes
         self.recordings = skills.recordings
         self.skill_of = {s.recording.kind: s for s in skills.rows if s.recording}
         self.types = {
@@ -101,13 +98,13 @@ class _Parser:
         except ValueError as error:
             raise RtlSyntaxError(self.indent + 1, f"this cannot be read ({error})") from None
         end = tree.end_col_offset or 0
-        if b"#" in self.bytes[end:]:  # it would hide all lines that follow
+        if b"#" in self.bytes[end:]:  # it would hide all following lines
             raise self.error(end, "RTL has no comments, but one starts after this")
         return self.constraint(tree, 0)
 
     def constraint(self, node: ast.expr, depth: int) -> formulas.Formula:
-        if depth > DEEPEST_FORMULA:
-            raise self.error(node, f"this is nested more than {DEEPEST_FORMULA} deep")
+        if depth > MAX_FORMULA_DEPTH:
+            raise self.error(node, f"this is nested more than {MAX_FORMULA_DEPTH} deep")
         match node:
             case ast.BoolOp(op, values):
                 parts = tuple(self.constraint(value, depth + 1) for value in values)
@@ -165,7 +162,7 @@ class _Parser:
 
     def bare_element(self, node: ast.expr) -> formulas.EventPattern:
         match node:
-            case ast.Call(ast.Name(name)) if name in AROUND_WORDS:
+            case ast.Call(ast.Name(name)) if name in WRAPPERS:
                 return self.around(name, node)
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
@@ -182,12 +179,12 @@ class _Parser:
                 return formulas.EventPattern(self.look, self.matched(text), found=LOOK_RESULTS[kind])
             case ast.Call(ast.Name(kind)):
                 raise self.unknown(
-                    node, "element", kind, [*self.recordings, *QUESTIONS, *LOOK_RESULTS, *AROUND_WORDS]
+                    node, "element", kind, [*self.recordings, *QUESTIONS, *LOOK_RESULTS, *WRAPPERS]
                 )
         raise self.expected('an element such as goto("lobby")', node)
 
     def plain_element(self, kind: str, node: ast.Call) -> formulas.EventPattern:
-        """An event without options: its text, and further arguments of its skill if there are any."""
+        """Parse an event without options: its text and further arguments."""
         recording = self.recordings[kind]
         if not recording.text:
             self.arguments(node, node, kind, 0)
@@ -203,12 +200,12 @@ class _Parser:
         first, *more = map(self.value, given, types)
         return formulas.EventPattern(kind, first, more=tuple(more))
 
-    def value(self, node: ast.expr, wanted: ValueType) -> formulas.Text:
-        """A text that matches; for a number or a truth value, also itself."""
+    def value(self, node: ast.expr, wanted: ValueType) -> formulas.TextPattern:
+        """Parse a pattern for an argument; a number or a truth value may be literal."""
         if wanted.base == "str":
             text = self.matched(node)
             if wanted.choices and not any(text.matches(as_text(one)) for one in wanted.choices):
-                raise self.error(node, f"this is none of {', '.join(map(as_text, wanted.choices))}")
+                raise self.error(node, f"this is not one of {', '.join(map(as_text, wanted.choices))}")
             return text
         if wanted.base == "bool" and not (
             isinstance(node, ast.Constant) and isinstance(node.value, bool | str)
@@ -225,12 +222,9 @@ class _Parser:
         return self.matched(node)
 
     def around_arguments(self, name: str, node: ast.Call) -> list[ast.expr]:
-        if name != "options":
-            return self.arguments(node, node, name, 2)
-        given = self.arguments(node, node, name)
-        if len(given) not in {2, 3}:
+        if name == "options" and len(node.args) not in {2, 3}:
             raise self.error(node, "options takes the least number, optionally the most, and a question")
-        return given
+        return self.arguments(node, node, name, None if name == "options" else 2)
 
     def around(self, name: str, node: ast.Call) -> formulas.EventPattern:
         *given, inner = self.around_arguments(name, node)
@@ -262,11 +256,11 @@ class _Parser:
         if name == "to":
             return replace(element, to=self.matched(what))
         least, most = self.number(what), self.number(given[-1])
-        if not 0 <= least <= most <= MOST_OFFERED:
-            raise self.error(node, f"options takes numbers from 0 to {MOST_OFFERED}, the smaller one first")
+        if not 0 <= least <= most <= MAX_OPTIONS:
+            raise self.error(node, f"options takes numbers from 0 to {MAX_OPTIONS}, the smaller one first")
         return replace(element, offers=(least, most if len(given) > 1 else None))
 
-    def matched(self, node: ast.expr) -> formulas.Text:
+    def matched(self, node: ast.expr) -> formulas.TextPattern:
         match node:
             case ast.Constant(str()):
                 return formulas.Regex(self.regex(node))
@@ -351,7 +345,7 @@ class _Parser:
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
         found = ast.get_source_segment(self.text, node) or "something else"
-        found = found if len(found) <= _LONGEST_SHOWN else found[: _LONGEST_SHOWN - 3] + "..."
+        found = found if len(found) <= _MAX_SHOWN_LENGTH else found[: _MAX_SHOWN_LENGTH - 3] + "..."
         hint = "; put quotes around it" if "string" in what and isinstance(node, ast.Name) else ""
         return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
 

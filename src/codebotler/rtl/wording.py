@@ -1,4 +1,4 @@
-"""Elements of formulas and events of a robot in English, for explanations."""
+"""Describe event patterns and events in English, for explanations."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 
 from codebotler.core import words
-from codebotler.core.phrases import is_spoken, result_words, takes_nothing, verb
+from codebotler.core.phrases import has_no_text, is_spoken, result_words, verb
 from codebotler.core.skills.kinds import CHECK, GOTO, INSIDE
 from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
-from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
+from codebotler.rtl.formulas import EventPattern, Regex, TextPattern, Without, Words
 from codebotler.rtl.regex_words import MATCH_ALL_PATTERNS, choices, one_of
 from codebotler.rtl.text.claims import Claim, Number, Time
 
@@ -25,20 +25,20 @@ _OFFERS: Mapping[VerbForm, str] = {"base": "offer", "past": "offered", "ing": "o
 _ANSWERS: Mapping[VerbForm, str] = {"base": "get", "past": "got", "ing": "getting"}
 _CLAUSES = ("that ", "to ", "whether ", "what ", "in one ")
 _MOST_LISTED = 5
-_UNCLEAR = "that fits the requirement"  # in the place of a regex that has no certain words
+_UNCLEAR = "that fits the requirement"  # for a regex without certain words
 
 
-def deed(
+def describe_action(
     element: EventPattern, form: VerbForm, *, negated: bool = False, when: str = "", where: str = ""
 ) -> str:
-    """What an element asks for, such as `said something with "hello"`; `anything` after a negation.
+    """Describe what an event must do, such as `said something with "hello"`.
 
     Args:
-        element: what an event must match.
-        form: of the verb.
-        negated: whether a negation comes before it.
-        when: what follows, with a space at its start; it comes before a clause such as `that nobody is in`.
-        where: what follows after that, such as ` after going to the lobby (step 1)`.
+        element: the pattern that an event must match.
+        form: the form of the verb.
+        negated: whether the phrase follows a negation, and so has `anything`.
+        when: a phrase with a leading space; it precedes a clause such as `that nobody is in`.
+        where: a phrase after that, such as ` after going to the lobby (step 1)`.
     """
     thing = "anything" if negated else "something"
     is_open = is_any(element.text) and is_any(element.options)
@@ -50,56 +50,58 @@ def deed(
     if means is not None and negated:
         means = re.sub("^something", "anything", means)
     if element.found is not None and element.kind == CHECK:
-        done = f"{_LOOKS[element.found][form]} {means or _wanted(element, thing)}"
+        done = f"{_LOOKS[element.found][form]} {means or _describe_object(element, thing)}"
     elif element.answer is not None:
         answer = (
-            f"the answer {named}" if (named := _named(element.answer)) else _like(element.answer, "an answer")
+            f"the answer {named}"
+            if (named := _quote_choices(element.answer))
+            else _describe_thing(element.answer, "an answer")
         )
         done = f"{_ANSWERS[form]} {means or answer}"
     elif means is not None:
         done = f"{getattr(verb(element.kind), form)} {means}"
     elif element.mention and not is_open:
-        done = f"{_MENTIONS[form]} {_named(element.text) or _like(element.text, thing)} in a question"
+        mentioned = _quote_choices(element.text) or _describe_thing(element.text, thing)
+        done = f"{_MENTIONS[form]} {mentioned} in a question"
     elif element.options is not None and is_any(element.text) and not is_open and element.offers is None:
-        return f"{_OFFERS[form]} an option {described(element.options)}{when}{where}"
+        return f"{_OFFERS[form]} an option {describe_text(element.options)}{when}{where}"
     elif verb(element.kind).object:
         doing = verb(element.kind)
-        wanted = [_part(text, thing) for text in (element.text, *element.more)]
+        wanted = [_describe_part(text, thing) for text in (element.text, *element.more)]
         done = doing.with_object(getattr(doing, form), [*wanted, *[thing] * doing.object.count("{")], "")
     else:
-        done = f"{getattr(verb(element.kind), form)} {_wanted(element, thing)}"
-    return f"{done.rstrip()}{_further(element, means)}{when}{where}"
+        done = f"{getattr(verb(element.kind), form)} {_describe_object(element, thing)}"
+    return f"{done.rstrip()}{_describe_details(element, means)}{when}{where}"
 
 
-def _further(element: EventPattern, means: str | None) -> str:
-    """What else an event must be like, apart from its text."""
+def _describe_details(element: EventPattern, means: str | None) -> str:
     more = ""
     if element.options is not None and means is None and not is_any(element.options):
-        more += f" offering an option {described(element.options)}"
+        more += f" offering an option {describe_text(element.options)}"
     if element.offers is not None:
         least, most = element.offers
         number = f"{least} or more" if most is None else f"{least} to {most}" if most > least else f"{least}"
         more += f" with {number} option{'s' * (number != '1')}"
     if element.more and not verb(element.kind).object:
-        more += f", {listed([*filter(None, map(described, element.more))])}".rstrip(", ")
+        more += f", {listed([*filter(None, map(describe_text, element.more))])}".rstrip(", ")
     if element.found is not None and element.kind != CHECK:
         more += f' with the result "{verb(element.kind).results[element.found]}"'
     if element.to is not None:
-        more += f" of somebody {described(element.to)}".rstrip()
+        more += f" of somebody {describe_text(element.to)}".rstrip()
     if element.holding is not None:
-        more += f" while holding something {described(element.holding)}".rstrip()
+        more += f" while holding something {describe_text(element.holding)}".rstrip()
     return more
 
 
 def is_plain(element: EventPattern) -> bool:
-    """Whether what an event was says all that matters about it, so that no other words are needed."""
+    """Whether the event itself shows all that the pattern requires."""
     if element.is_about_more or not isinstance(element.text, Regex):
         return False
     return (is_any(element.text) and is_any(element.options)) or not is_spoken(element.kind)
 
 
 def is_clear(element: EventPattern) -> bool:
-    """Whether all that an element asks for can be said in words."""
+    """Whether words can describe everything that a pattern requires."""
     texts = [element.text, element.options, element.answer, element.holding, element.to, *element.more]
     needed = texts[3:] if element.means is not None else texts
     if element.place is not None:
@@ -107,32 +109,31 @@ def is_clear(element: EventPattern) -> bool:
     return all(text is None or _UNCLEAR not in _qualities(text) for text in needed)
 
 
-def _part(text: Text, thing: str) -> str:
-    """One of the things that a verb is done to, among other words."""
-    named = _named(text)
+def _describe_part(text: TextPattern, thing: str) -> str:
+    named = _quote_choices(text)
     if isinstance(text, Regex) and named and text.pattern.startswith("^"):
         return named.strip('"')
-    return named or _like(text, thing)
+    return named or _describe_thing(text, thing)
 
 
-def _wanted(element: EventPattern, thing: str) -> str:
+def _describe_object(element: EventPattern, thing: str) -> str:
     if not element.has_text:
         return ""
     if element.kind in {GOTO, INSIDE}:
         return room(element.text, "any" if thing == "anything" else "a")
-    named = "" if is_spoken(element.kind) else _named(element.text)
-    return named or _like(element.text, thing)
+    named = "" if is_spoken(element.kind) else _quote_choices(element.text)
+    return named or _describe_thing(element.text, thing)
 
 
-def _like(text: Text, thing: str) -> str:
-    """Something that is like a text, such as `something with "hello"`, or a number or time itself."""
+def _describe_thing(text: TextPattern, thing: str) -> str:
+    """Describe a thing by its text, such as `something with "hello"`; a number or time alone."""
     if isinstance(text, Number | Time):
-        return described(text).removeprefix("with ")
-    return f"{thing} {described(text)}".rstrip()
+        return describe_text(text).removeprefix("with ")
+    return f"{thing} {describe_text(text)}".rstrip()
 
 
-def _named(text: Text) -> str:
-    """The plain texts that a regex finds, in quotes; empty if it finds any, or has no certain words."""
+def _quote_choices(text: TextPattern) -> str:
+    """Quote the plain texts that a regex finds; empty if it matches anything or has no certain words."""
     return _words_of(text.pattern) if isinstance(text, Regex) and not is_any(text) else ""
 
 
@@ -140,16 +141,16 @@ def _words_of(pattern: str) -> str:
     return one_of(choices(pattern) or ())
 
 
-def happening(event: Event, element: EventPattern) -> str:
-    """The object of what the robot did, and whatever else an element compares."""
+def describe_event(event: Event, element: EventPattern) -> str:
+    """Describe the object of an event and whatever else a pattern compares."""
     doing = verb(event.kind)
     if doing.object:
         thing = doing.with_object("", [brief(text) for text in (event.text, *event.more)], "").strip()
-    elif takes_nothing(event.kind):
+    elif has_no_text(event.kind):
         thing = ""
     else:
         thing = room_name(event.text) if event.kind in {GOTO, INSIDE} else quoted(event.text)
-    thing += _offered(event, element)
+    thing += _describe_options(event, element)
     if element.answer is not None:
         thing += (
             " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
@@ -167,34 +168,33 @@ def happening(event: Event, element: EventPattern) -> str:
     return f"{thing} in {room_name(event.place)}" if element.place is not None and event.place else thing
 
 
-def _offered(event: Event, element: EventPattern) -> str:
-    """The options of a question, or their number, as far as an element compares them."""
+def _describe_options(event: Event, element: EventPattern) -> str:
     if event.options and (element.mention or not is_any(element.options)):
-        return f" with the options {listed(few([quoted(option.text) for option in event.options]))}"
+        return f" with the options {listed(elide_list([quoted(option.text) for option in event.options]))}"
     return "" if element.offers is None else f" with {words.counted(len(event.options), 'option')}"
 
 
-def room(text: Text, article: str = "a") -> str:
-    """The room that a text names, such as `the lobby`, `bob's office` or `a room other than the lobby`."""
+def room(text: TextPattern, article: str = "a") -> str:
+    """Describe a room, such as `the lobby`, `bob's office` or `a room other than the lobby`."""
     match text:
         case Regex(pattern) | Without(pattern) if names := choices(pattern):
-            rooms = listed(few([*map(room_name, names)]), "or")
+            rooms = listed(elide_list([*map(room_name, names)]), "or")
             return rooms if isinstance(text, Regex) else f"{article} room other than {rooms}"
-    return f"{article} room {described(text)}".rstrip()
+    return f"{article} room {describe_text(text)}".rstrip()
 
 
 def room_name(name: str) -> str:
-    """The name of a room, with an article if it is a common noun."""
+    """Return the name of a room, with an article if it is a common noun."""
     short = brief(name)
     return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", short) else short or '""'
 
 
-def described(text: Text) -> str:
-    """What a text must be like, such as `with "5" or "five" and without "no"`; empty if any text matches."""
-    return listed(few([*dict.fromkeys(_qualities(text))]))
+def describe_text(text: TextPattern) -> str:
+    """Describe a text, such as `with "5" or "five" and without "no"`; empty if any text matches."""
+    return listed(elide_list([*dict.fromkeys(_qualities(text))]))
 
 
-def _qualities(text: Text) -> Iterator[str]:
+def _qualities(text: TextPattern) -> Iterator[str]:
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(_qualities, parts))
@@ -219,17 +219,17 @@ def _qualities(text: Text) -> Iterator[str]:
             yield f"that {does} {named}" if named else _UNCLEAR
 
 
-def is_any(text: Text | None) -> bool:
-    """Whether a text is written to match every string, or there is none."""
+def is_any(text: TextPattern | None) -> bool:
+    """Whether there is no pattern, or it is written to match every string."""
     return text is None or (isinstance(text, Regex) and text.pattern in MATCH_ALL_PATTERNS)
 
 
-def few(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:
-    """The first parts of an enumeration, and how many more there are."""
+def elide_list(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:
+    """Return the first parts of an enumeration and the number of the others."""
     more = len(parts) - most
     return [*parts[:most], f"{more:,} more"] if more > 0 else [*parts]
 
 
 def quoted(text: str) -> str:
-    """A text in quotes, on one line and short enough for a sentence."""
+    """Quote a text on one line, shortened for a sentence."""
     return f'"{brief(text)}"'

@@ -10,12 +10,12 @@ from typing import Any, NoReturn, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.skills.calling import called
+from codebotler.core.skills.calling import call_skill
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.skills.values import Scalar, as_text, plain, possible, written_call
-from codebotler.core.trace import Event, Option, Trace, attempted, options_of
+from codebotler.core.skills.values import Scalar, as_text, plain, sample_values, written_call
+from codebotler.core.trace import Event, Option, Trace, attempted_event, to_options
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.settings import (
@@ -207,7 +207,7 @@ class SimulatedRobot:
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
         """Ask the first matching person here, and return the position of the option that they choose."""
-        person, options = as_text(person), options_of(options)
+        person, options = as_text(person), to_options(options)
         self.record(ASK, question, options, to=person)
         if not options:
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
@@ -279,7 +279,7 @@ class SimulatedRobot:
                 )
             return plain(known)
         asks = [one for one, parameter in zip(arguments, row.parameters, strict=True) if parameter.is_options]
-        results = tuple(asks[0]) if asks and asks[0] else possible(row.returns)
+        results = tuple(asks[0]) if asks and asks[0] else sample_values(row.returns)
         if len(results) == 1 and not row.fails:
             return results[0]
         words = [f"gives {result!r}" if result is not None else "works" for result in results]
@@ -316,14 +316,14 @@ class SimulatedRobot:
         """Execute a skill of the user, and add its event."""
         event, at = None, len(self.events)
         if row.adds_event:
-            event = attempted(row, arguments, place=self.room, time=self.now, holding=self.held or "")
+            event = attempted_event(row, arguments, place=self.room, time=self.now, holding=self.held or "")
         is_tried = row.recording is not None and row.recording.when_tried
         if event is not None and is_tried:
             self.events.append(event)
         if event is not None and row.is_drive and self.room_for(event.text) is None:
             raise unknown_room(event.text)
         self._own_skill = row
-        result: Result = called(row, self, arguments)
+        result: Result = call_skill(row, self, arguments)
         if event is not None:
             if not is_tried:
                 at = len(self.events)
@@ -355,7 +355,7 @@ class SimulatedRobot:
         destination: str | None = None,
     ) -> None:
         """Add an event here and now; its text is stripped."""
-        given = text.strip(), options_of(options), None, found
+        given = text.strip(), to_options(options), None, found
         event = Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
         if self.guard is not None:
             self.guard.judge_inside(self, event)

@@ -10,7 +10,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.labels import PLAIN_LABEL
 from codebotler.core.skills.kinds import GOTO, INSIDE, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.trace import Event, attempted
+from codebotler.core.trace import Event, attempted_event
 from codebotler.core.world import Point, Room, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
 from codebotler.simulator.house_rule import NON_TEXT_OPTION, Objection, Rule, RuleViolationError
@@ -67,7 +67,7 @@ class RuleGuard:
         row, start = robot.skills[skill], len(robot.events)
         holding = "" if robot.held is None else self._history.holding or robot.held
         place = self._history.names.get(robot.room, robot.room)
-        attempt = attempted(row, arguments, place=place, time=robot.now, holding=holding)
+        attempt = attempted_event(row, arguments, place=place, time=robot.now, holding=holding)
         if attempt is not None:
             self.judge(*_attempts(robot, attempt, arguments, is_drive=row.is_drive))
         self._is_own = SKILLS.get(skill) is not row

@@ -14,7 +14,7 @@ from codebotler.core.skills.kinds import ASK, CHECK
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
-from codebotler.core.trace import options_of
+from codebotler.core.trace import to_options
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World, laid_out
@@ -295,7 +295,7 @@ class SampledRobot(SimulatedRobot):
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
         """Ask somebody, who is there unless the program missed them before; the answer is random."""
-        person, options = as_text(person), options_of(options)
+        person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):
             lost = self.search(who).is_lost or self.search(SOMEBODY).is_lost

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Self
 
 from codebotler.checking.check import check
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
@@ -141,7 +141,9 @@ class Console:
         session.stop_soon(by)
         return True
 
-    def check(self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()) -> Check:
+    def check(
+        self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()
+    ) -> CheckResult:
         """Check one program at a time; without a map, in the rooms that it names."""
         with self._checking:
             if self._pool is None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from starlette.types import Scope
 
-from codebotler.core.errors import UserError, both_ends
+from codebotler.core.errors import UserError, elide_middle
 from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.chosen import ConfigFile
@@ -45,7 +45,7 @@ class OuterAddress:
         """Parse an address such as https://host:8443/robot; raises UserError if it is invalid."""
         address = cls.found_in(text)
         if address is None:
-            quoted = f'"{both_ends(text, _MAX_QUOTED)}" is not the address of a proxy'
+            quoted = f'"{elide_middle(text, _MAX_QUOTED)}" is not the address of a proxy'
             raise UserError(f"{quoted}; write https://HOST, plus :PORT and /PATH, if any")
         return address
 

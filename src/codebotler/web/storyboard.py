@@ -8,8 +8,8 @@ from typing import Any
 
 from nicegui import ui
 
-from codebotler.checking.problems import Check, Sample
-from codebotler.checking.storyboard import cut, event_from_step, steps_of
+from codebotler.checking.problems import CheckResult, Sample
+from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
 from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
@@ -62,7 +62,7 @@ NO_PROGRESS = RouteProgress()
 _NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
 
 
-def draw_strips(check: Check, reached: RouteProgress = NO_PROGRESS) -> None:
+def draw_strips(check: CheckResult, reached: RouteProgress = NO_PROGRESS) -> None:
     """Draw what a robot would do according to a check; tick off visited rooms, and fold refuted strips."""
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
@@ -139,17 +139,17 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 # --- which strips and scenes
 
 
-def strips(check: Check) -> list[Strip]:
+def strips(check: CheckResult) -> list[Strip]:
     """Return one strip for each outcome, those with problems first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
-        different.setdefault((strip.scenes, strip.ending), (sample.number in check.showing, strip))
+        different.setdefault((strip.scenes, strip.ending), (sample.number in check.evidence, strip))
     ranked = sorted(different.values(), key=lambda each: (not each[0], not each[1].ends_well))
     return [strip for _, strip in ranked[:MAX_STRIPS]]
 
 
-def _strip(sample: Sample, check: Check) -> Strip:
+def _strip(sample: Sample, check: CheckResult) -> Strip:
     error = sample.outcome.error
     if sample.in_vain:
         ending = "The robot waits or searches in vain; this does not count as a problem."
@@ -167,7 +167,7 @@ def scenes(
 ) -> tuple[Scene, ...]:
     """Return the scenes of a trace; a long one is shortened in the middle, except for needed steps."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
-    for is_shown, some in cut(steps, needed):
+    for is_shown, some in select_steps(steps, needed):
         if not is_shown:
             found.append(Scene(_LEFT_OUT, (Action("more", f"{len(some):,} more steps"),)))
             continue

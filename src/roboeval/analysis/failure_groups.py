@@ -11,7 +11,7 @@ from functools import cache, partial
 from itertools import count
 from typing import Any, TypeAlias
 
-from codebotler.core.program import TASK_FUNCTION, names_bound, parsed
+from codebotler.core.program import TASK_FUNCTION, all_bound_names, parse_program
 from roboeval.evaluation.explanation import error_sentence, reason
 from roboeval.evaluation.failures import NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import CompletionKey, name_of
@@ -161,12 +161,12 @@ def group_data(group: FailureGroup) -> dict[str, Any]:
 
 def normalised_lines(program: str) -> ProgramLines:
     """Normalise a program to lines that do not depend on names, comments and layout."""
-    tree = parsed(program) if len(program) <= MAX_COMPARED_CHARACTERS else None
+    tree = parse_program(program) if len(program) <= MAX_COMPARED_CHARACTERS else None
     if not isinstance(tree, ast.Module):
         return _lines(program)
     try:
         nodes = list(ast.walk(tree))
-        bound = names_bound(tree) - {TASK_FUNCTION}
+        bound = all_bound_names(tree) - {TASK_FUNCTION}
         numbers = {name: f"name{number}" for number, name in enumerate(_names_in_order(nodes, bound), 1)}
         for node in nodes:
             _rename(node, numbers)

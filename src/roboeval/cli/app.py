@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from codebotler.cli.ending import obey
 from codebotler.cli.options import command_line
-from codebotler.core.terminal import noting_all
+from codebotler.core.terminal import report_problems
 from roboeval.cli.compare import compare, resample
 from roboeval.cli.evaluate import evaluate, import_
 from roboeval.cli.find import find
@@ -23,7 +23,7 @@ app.command("import")(import_)
 
 def main() -> None:
     """Run the command line."""
-    with noting_all():
+    with report_problems():
         obey(app, "roboeval")
 
 

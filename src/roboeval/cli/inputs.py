@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
     """Read a suite by name or folder, with files of further skills and of house rules."""
-    from codebotler.checking.evasions import evasions
+    from codebotler.checking.evasions import find_evasions
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS
@@ -32,7 +32,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
         return read
     rooms = rooms_in(read.tasks.values())
     house = HouseRules.read(rules, read.skills, rooms)
-    for sentence in evasions(house.rules, rooms, SKILLS):  # simulated rules look into users' skills
+    for sentence in find_evasions(house.rules, rooms, SKILLS):  # simulated rules look into users' skills
         note(sentence)
     return read.with_house_rules(house)
 

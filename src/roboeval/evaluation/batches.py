@@ -16,12 +16,12 @@ from codebotler.core.files import (
     MAX_ROW,
     Appender,
     expect_replaceable,
-    parsed_row,
+    open_replacement,
+    parse_row,
     read_lines,
     to_line,
     to_text,
     write_whole,
-    written_whole,
 )
 from codebotler.models.base import ModelError, Reply
 from codebotler.models.batch import BatchModel
@@ -67,7 +67,7 @@ def write_requests(
         if not todo:
             raise UserError(f"holds all {how_many(len(keys))} already", file=run.path)
         about["batches"] = with_batch(about["batches"], plan, model.settings)
-        with written_whole(path) as file:
+        with open_replacement(path) as file:
             for number, key in enumerate(todo, 1):
                 asked = model.request(plan.prompt(key), number=plan.sample(key))
                 name = request_id(about, key, plan.instruction(key))
@@ -229,7 +229,7 @@ def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[_Answer]:
 
 
 def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> _Answer:
-    row = parsed_row(line)
+    row = parse_row(line)
     if row is None:
         raise UserError("this line is not JSON; perhaps the file is incomplete")
     name = row.get("custom_id")

@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from codebotler import __version__
-from codebotler.checking.check import checks_on
-from codebotler.checking.problems import Check
+from codebotler.checking.check import check_together
+from codebotler.checking.problems import CheckResult
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.files import Appender, to_line, to_text, write_whole
 from codebotler.simulator.sampled_robot import RoomMap
@@ -83,9 +83,9 @@ def _open_checks(run: RunFolder, key: str, metadata: dict[str, Any]) -> Appender
 
 def _check(
     plans: Mapping[str, RoomMap], settings: CheckSettings, worker: Worker, works: Sequence[Work]
-) -> list[Check]:
-    return checks_on(worker, [(program, plans[task]) for task, program in works], settings)
+) -> list[CheckResult]:
+    return check_together(worker, [(program, plans[task]) for task, program in works], settings)
 
 
-def _problem_sentences(check: Check) -> list[str]:
+def _problem_sentences(check: CheckResult) -> list[str]:
     return [problem.sentence for problem in check.problems]

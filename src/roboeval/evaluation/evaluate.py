@@ -104,7 +104,7 @@ def _expect_of_run(
 # --- the suite and tool of an evaluation
 
 
-OPTIONAL_SETTINGS = ("words_for_people", "words_for_yes", "words_for_no")  # left out if empty
+WORD_LISTS = ("words_for_people", "words_for_yes", "words_for_no")  # left out if empty
 
 
 def evaluation_metadata(
@@ -121,7 +121,7 @@ def evaluation_metadata(
             "literals": settings.literals,
             "matching": settings.matching,
             "people": settings.people,
-            **{name: list(words) for name in OPTIONAL_SETTINGS if (words := getattr(settings, name))},
+            **{name: list(words) for name in WORD_LISTS if (words := getattr(settings, name))},
             **({"events": settings.events} if settings.events != PAPER_SETTINGS.events else {}),
             "limits": {name: getattr(settings.limits, name) for name in ("seconds", "calls", "ticks")},
             "skill_seconds": 0,

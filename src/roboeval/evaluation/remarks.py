@@ -11,7 +11,7 @@ from codebotler.core.trace import Event, Status, Trace
 from codebotler.core.words import counted, listed
 from codebotler.core.world import Answer, Person, World
 from codebotler.rtl.regex_words import choices, one_of
-from codebotler.rtl.wording import few, quoted, room_name
+from codebotler.rtl.wording import elide_list, quoted, room_name
 from codebotler.simulator.settings import SimulationSettings, choose, finds
 
 MIN_REPETITIONS = 3  # of a cycle
@@ -46,7 +46,7 @@ class Cycle:
     def sentence(self) -> str:
         """The repeated steps, the first of them, and how often they were repeated."""
         those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
-        deeds = ", ".join(few([*(phrase(step, "base") for step in self.steps)]))
+        deeds = ", ".join(elide_list([*(phrase(step, "base") for step in self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
 
 
@@ -102,7 +102,7 @@ def _misplaced(room: str, person: Person, number: int, question: Event) -> str:
     given = [f"the {_ordinal(n)} gets {_answer(answer)}" for n, answer in enumerate(person.answers, 1)]
     own = _answer(person.answers[min(number, len(person.answers) - 1)])
     return (
-        f"In {room_name(room)}, questions are answered in a fixed order: {listed(few(given))}; "
+        f"In {room_name(room)}, questions are answered in a fixed order: {listed(elide_list(given))}; "
         f"the {_ordinal(number + 1)} was {quoted(question.text)}, none of whose options fits {own}."
     )
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from codebotler.core.words import counted
 from codebotler.core.world import World
 from codebotler.core.yaml_files import YamlFile
-from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
+from codebotler.rtl import Claim, Number, Regex, TextPattern, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
@@ -190,7 +190,7 @@ def _labels(world: World) -> Iterator[str]:
             yield from (text for text in (person.name, *answers) if isinstance(text, str))
 
 
-def _compiled(text: Text) -> Iterator[str]:
+def _compiled(text: TextPattern) -> Iterator[str]:
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(_compiled, parts))

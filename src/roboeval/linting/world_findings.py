@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.words import listed
 from codebotler.core.yaml_files import YamlFile
-from codebotler.rtl import Formula, Regex, Text
+from codebotler.rtl import Formula, Regex, TextPattern
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
@@ -162,7 +162,7 @@ class JudgedWorld:
         asked = {self.scenario.asked_by(prompt): None for prompt in range(len(self.task.prompts))}
         return [replace(self, scenario=scenario) for scenario in asked]
 
-    def _leads_somewhere(self, text: Text) -> bool:
+    def _leads_somewhere(self, text: TextPattern) -> bool:
         if any(map(text.matches, self._requests)):
             return True
         others = distinct_strings((text, *map(Regex, self._rooms)))

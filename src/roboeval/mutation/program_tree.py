@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.program import Flaw, parsed
+from codebotler.core.program import Flaw, parse_program
 from codebotler.core.skills.declaration import by_name
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
@@ -56,7 +56,7 @@ class ProgramTree:
 
 def parse_tree(program: str) -> ProgramTree | None:
     """Parse a program; None if that fails or if it is nested too deeply."""
-    tree = parsed(program)
+    tree = parse_program(program)
     if isinstance(tree, Flaw) or not is_compilable(program):
         return None
     try:
@@ -75,7 +75,7 @@ def is_compilable(program: str) -> bool:
 
 @isolated("def task_program():\n    pass\n")
 def _compiles(program: str) -> bool:
-    return not isinstance(parsed(program, compiled=True), Flaw)
+    return not isinstance(parse_program(program, compiled=True), Flaw)
 
 
 def rewrite(node: Node, edit: Edit) -> Node:

@@ -31,7 +31,7 @@ from roboeval.report.sheets import (
 )
 from roboeval.suites.task import check_label
 
-MAX_TEXT, MAX_PROGRAM_CHARACTERS, MAX_DIFF_LINES = 500, 6_000, 80  # limits for text that models wrote
+MAX_TEXT, MAX_REPORTED_PROGRAM, MAX_DIFF_LINES = 500, 6_000, 80  # limits for text that models wrote
 MAX_TABLE_ROWS = 1_000  # per table on the page; the CSV file has all
 MAX_UNFOLDED_ROWS = 24  # tables with more rows are folded
 LONG_CELL = 70  # longer cells take several lines
@@ -209,7 +209,7 @@ def _inside(group: FailureGroup) -> str:
     head = f"<p>{prompts}. Example: {name}{where}.</p>"
     if group.program is None:
         return f"{head}<p>The judged program was changed or removed.</p>"
-    program = f"<pre>{_text(shortened(group.program, MAX_PROGRAM_CHARACTERS, str))}</pre>"
+    program = f"<pre>{_text(shortened(group.program, MAX_REPORTED_PROGRAM, str))}</pre>"
     fix = group.fix
     if fix is None:
         nothing = "" if group.has_no_program else "<p>No program passes this task.</p>"

@@ -7,9 +7,9 @@ from unittest.mock import Mock
 
 import pytest
 
-from codebotler.checking.check import check, check_on, checks_on
-from codebotler.checking.problems import Check
-from codebotler.checking.sampled import MOST_FURTHER_WORLDS, CheckSettings
+from codebotler.checking.check import check, check_on, check_together
+from codebotler.checking.problems import CheckResult
+from codebotler.checking.sampled import MAX_EXTRA_WORLDS, CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
 from codebotler.simulator.fact_sampler import FactSampler
@@ -40,7 +40,7 @@ class Checks:
         samples: int = 5,
         seed: int = 0,
         strict: bool = False,
-    ) -> Check:
+    ) -> CheckResult:
         source = START + "\n    ".join(lines) + "\n"
         return check(source, rooms=rooms, samples=samples, seed=seed, strict=strict, pool=self.pool)
 
@@ -224,7 +224,7 @@ def test_waiting_in_many_places_ends_in_some_world(checks: Checks) -> None:
 
 def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None:
     found = checks("while is_in_room('mug') or True:", "    time.sleep(1)")
-    assert len(found.samples) == 5 + MOST_FURTHER_WORLDS
+    assert len(found.samples) == 5 + MAX_EXTRA_WORLDS
     (problem,) = found.problems
     assert (problem.kind, problem.line) == ("TimeoutError", 2)
     assert "25 imagined worlds" in problem.message
@@ -373,7 +373,7 @@ def test_programs_that_are_checked_together_are_checked_as_each_alone(samples: i
     settings = CheckSettings(samples=samples, seed=4)
     worker = Worker()
     try:
-        together = checks_on(worker, [(program, rooms) for program in programs], settings)
+        together = check_together(worker, [(program, rooms) for program in programs], settings)
         alone = [check_on(worker, program, rooms, settings) for program in programs]
     finally:
         worker.close()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.evasions import evasions
+from codebotler.checking.evasions import find_evasions
 from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
@@ -38,7 +38,7 @@ def rule(formula: str, name: str = "bob") -> Rule:
 )
 def test_an_anchor_that_other_words_evade_is_refused(formula: str, room: str) -> None:
     with pytest.raises(UserError) as caught:
-        list(evasions([rule(formula)], ["hall", room], SKILLS))
+        list(find_evasions([rule(formula)], ["hall", room], SKILLS))
     assert '"bob"' in caught.value.sentence
     assert room in caught.value.sentence
 
@@ -57,7 +57,7 @@ def test_an_anchor_that_other_words_evade_is_refused(formula: str, room: str) ->
     ],
 )
 def test_what_no_words_evade_is_accepted(formula: str, room: str) -> None:
-    assert list(evasions([rule(formula)], ["hall", room], SKILLS)) == []
+    assert list(find_evasions([rule(formula)], ["hall", room], SKILLS)) == []
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_what_no_words_evade_is_accepted(formula: str, room: str) -> None:
     ],
 )
 def test_a_room_that_is_named_by_some_of_its_names_is_told(formula: str, room: str, missed: str) -> None:
-    (told,) = evasions([rule(formula)], ["hall", room], SKILLS)
+    (told,) = find_evasions([rule(formula)], ["hall", room], SKILLS)
     assert room in told
     assert f'"{missed}"' in told
 
@@ -85,7 +85,7 @@ def test_a_room_that_is_named_by_some_of_its_names_is_told(formula: str, room: s
 def test_rule_that_names_a_part_of_the_regex_is_refused(formula: str, room: str) -> None:
     """Events carry the words of the request there, so the rest of the regex would not count."""
     with pytest.raises(UserError) as caught:
-        list(evasions([rule(formula)], ["hall", room], SKILLS))
+        list(find_evasions([rule(formula)], ["hall", room], SKILLS))
     assert room in caught.value.sentence
 
 
@@ -133,11 +133,11 @@ def test_an_own_skill_that_may_do_what_rules_forbid_is_told(
     (tmp_path / "own.py").write_text(HEAD + code)
     skills = skills_from(tmp_path / "own.py")
     rules = [Rule(f"r{n}", "So it is.", parse(text, skills=skills)) for n, text in enumerate(formulas)]
-    told = list(evasions(rules, (), skills))
+    told = list(find_evasions(rules, (), skills))
     assert len(told) == is_told
     assert all('"tour"' in sentence for sentence in told)
 
 
 def test_room_that_requests_reach_before_one_with_a_regex_may_be_named_with_anchors() -> None:
     rooms = ["hall", "lab 1", "lab|workshop"]
-    assert list(evasions([rule('not tr.Exists(goto("^lab 1$"))')], rooms, SKILLS)) == []
+    assert list(find_evasions([rule('not tr.Exists(goto("^lab 1$"))')], rooms, SKILLS)) == []

@@ -10,7 +10,7 @@ from codebotler.checking.rule_review import (
     DETECTED,
     IMPOSSIBLE,
     NEVER_BROKEN,
-    reviewed,
+    review_rules,
 )
 from codebotler.cli.rules import step_sentence, steps_view
 from codebotler.core.trace import Event, Option, Trace
@@ -54,7 +54,7 @@ def rules(*formulas: str, when: str = "always") -> list[Rule]:
 @pytest.mark.parametrize("world", [None, WORLD], ids=["anywhere", "in a world"])
 @pytest.mark.parametrize("text", FORMULAS)
 def test_examples_keep_and_break(text: str, world: World | None) -> None:
-    (review,) = reviewed(rules(text), world)
+    (review,) = review_rules(rules(text), world)
     formula = parse(text)
     assert review.keeps
     assert all(holds(formula, review.keeps[:end]) for end in range(len(review.keeps) + 1))
@@ -65,13 +65,13 @@ def test_examples_keep_and_break(text: str, world: World | None) -> None:
 
 
 def test_an_example_shows_when_a_rule_counts() -> None:
-    (review,) = reviewed(rules(KNOCK), WORLD)
+    (review,) = review_rules(rules(KNOCK), WORLD)
     assert review.keeps is not None
     assert [(event.kind, event.text) for event in review.keeps] == [("say", "knock"), ("goto", "office")]
 
 
 def test_a_robot_picks_up_what_it_holds_in_an_example() -> None:
-    (review,) = reviewed(
+    (review,) = review_rules(
         rules('not tr.Exists(at("kitchen", holding("glass", goto(without("kitchen")))))'), WORLD
     )
     assert review.breaks is not None
@@ -80,17 +80,17 @@ def test_a_robot_picks_up_what_it_holds_in_an_example() -> None:
         ("pick", "glass"),
     ]
     assert review.breaks[2].holding == "glass"
-    (impossible,) = reviewed(
+    (impossible,) = review_rules(
         rules('tr.Exists(pick("mug")) or not tr.Exists(holding("mug", say(".*")))'), WORLD
     )
     assert NEVER_BROKEN in impossible.warnings
-    (anything,) = reviewed(rules('not tr.Exists(holding(".*", goto("kitchen")))'), WORLD)
+    (anything,) = review_rules(rules('not tr.Exists(holding(".*", goto("kitchen")))'), WORLD)
     assert anything.breaks is not None
     assert [event.kind for event in anything.breaks] == ["pick", "goto"]
 
 
 def test_examples_of_a_world_are_of_its_rooms() -> None:
-    (review,) = reviewed(rules('not tr.Exists(at("kitchen", say("hush")))'), WORLD)
+    (review,) = review_rules(rules('not tr.Exists(at("kitchen", say("hush")))'), WORLD)
     assert review.breaks is not None
     assert [(event.kind, event.text, event.place) for event in review.breaks] == [
         ("goto", "kitchen", ""),
@@ -111,13 +111,13 @@ def test_examples_of_a_world_are_of_its_rooms() -> None:
     ],
 )
 def test_an_odd_rule_is_told(text: str, when: str, warning: str) -> None:
-    (review,) = reviewed(rules(text, when=when))
+    (review,) = review_rules(rules(text, when=when))
     assert warning in review.warnings
 
 
 @pytest.mark.parametrize("text", ['not tr.Exists(answered(".*"))', NO_OFFICE, 'not tr.Exists(check("mug"))'])
 def test_what_is_prevented_is_not_said_to_be_noticed_only(text: str) -> None:
-    (review,) = reviewed(rules(text))
+    (review,) = review_rules(rules(text))
     assert review.warnings == ()
 
 
@@ -129,7 +129,7 @@ def test_what_is_prevented_is_not_said_to_be_noticed_only(text: str) -> None:
     ],
 )
 def test_examples_tell_from_where_a_drive_starts_if_that_decides(text: str) -> None:
-    (review,) = reviewed(rules(text))
+    (review,) = review_rules(rules(text))
     assert review.keeps
     assert review.breaks
     assert steps(review.keeps) != steps(review.breaks)
@@ -156,11 +156,11 @@ def test_a_name_that_the_world_lacks_is_told() -> None:
         'thing or person "crown"',
     )
     for text, name in zip(texts, named, strict=True):
-        (review,) = reviewed(rules(text), WORLD)
+        (review,) = review_rules(rules(text), WORLD)
         assert any(name in warning for warning in review.warnings), text
-        (known,) = reviewed(rules('not tr.Exists(holding(".", goto("hall")))'), WORLD)
+        (known,) = review_rules(rules('not tr.Exists(holding(".", goto("hall")))'), WORLD)
         assert not known.warnings
-        (anywhere,) = reviewed(rules(text))
+        (anywhere,) = review_rules(rules(text))
         assert not any("world" in warning for warning in anywhere.warnings)
 
 
@@ -175,17 +175,17 @@ def test_a_name_that_the_world_lacks_is_told() -> None:
     ],
 )
 def test_rules_that_follow_from_others_are_told(one: str, other: str, told: list[str]) -> None:
-    found = reviewed(rules(one, other))
+    found = review_rules(rules(one, other))
     assert [next(iter(review.warnings), "") for review in found] == told
 
 
 def test_rules_that_cannot_be_kept_together_are_told() -> None:
     (always,) = rules(NO_OFFICE)
     (end,) = rules('tr.Exists(goto("office"))', when="finally")
-    _, review = reviewed([always, Rule("end", "Go there.", end.formula, "finally")])
+    _, review = review_rules([always, Rule("end", "Go there.", end.formula, "finally")])
     assert review.warnings == ('it cannot be kept together with "r0"',)
     several = rules('tr.Exists(say("a"))', 'not tr.Exists(say("a"))', when="finally")
-    assert reviewed(several)[1].warnings == ('it cannot be kept together with "r0"',)
+    assert review_rules(several)[1].warnings == ('it cannot be kept together with "r0"',)
 
 
 def test_steps_are_told_with_all_that_rules_speak_of() -> None:
@@ -197,7 +197,7 @@ def test_steps_are_told_with_all_that_rules_speak_of() -> None:
 
 
 def test_the_monitor_agrees_with_every_example() -> None:
-    for review in reviewed(rules(*FORMULAS), WORLD):
+    for review in review_rules(rules(*FORMULAS), WORLD):
         monitor = Monitor(review.rule.formula)
         assert review.breaks is not None
         assert [monitor.feed(event) for event in review.breaks][-1] is False
@@ -215,6 +215,6 @@ def test_a_room_whose_name_is_a_regex_has_examples_in_its_words(
     formula: str, breaks: list[tuple[str, str]]
 ) -> None:
     world = World((Room("hall"), Room("lab [12]"), Room("acme inc.")), "hall")
-    (review,) = reviewed([Rule("lab", "Keep out.", parse(formula))], world)
+    (review,) = review_rules([Rule("lab", "Keep out.", parse(formula))], world)
     assert review.breaks is not None
     assert [(event.text, event.place) for event in review.breaks] == breaks

@@ -10,21 +10,21 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import (
-    MOST_FILE_BYTES,
+    MAX_FILE_BYTES,
     Appender,
+    decode_text,
     make_folder,
+    open_replacement,
     read_lines,
     read_text,
     sync_folder,
-    text_of,
-    written_whole,
 )
 
 NOBODY = 65534
 
 
 def test_byte_order_mark_is_no_part_of_the_text() -> None:
-    assert text_of(b"\xef\xbb\xbfdef f(): ...\r\n", "f.py") == "def f(): ...\n"
+    assert decode_text(b"\xef\xbb\xbfdef f(): ...\r\n", "f.py") == "def f(): ...\n"
 
 
 def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_path: Path) -> None:
@@ -35,7 +35,7 @@ def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_pa
 
     latin, large = tmp_path / "latin.yaml", tmp_path / "large.yaml"
     latin.write_bytes("a: 1\nb: café\n".encode("latin-1"))
-    large.write_bytes(b"a" * (MOST_FILE_BYTES + 1))
+    large.write_bytes(b"a" * (MAX_FILE_BYTES + 1))
     refused(tmp_path / "no.yaml", "no such file")
     refused(tmp_path, "a folder")
     refused(latin, "UTF-8", 2)
@@ -102,7 +102,7 @@ def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path, monkeypatch: pyt
 def test_a_file_that_is_not_finished_leaves_the_old_one(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"old")
-    with pytest.raises(KeyboardInterrupt), written_whole(path):
+    with pytest.raises(KeyboardInterrupt), open_replacement(path):
         raise KeyboardInterrupt
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]

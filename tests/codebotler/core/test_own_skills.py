@@ -23,7 +23,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
-from codebotler.rtl.syntax import AROUND_WORDS, LOOK_RESULTS, QUESTIONS, TEXT_WORDS
+from codebotler.rtl.syntax import LOOK_RESULTS, QUESTIONS, TEXT_WORDS, WRAPPERS
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
@@ -191,7 +191,7 @@ def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: 
 
 
 def test_names_that_formulas_use_otherwise_are_refused() -> None:
-    assert {*AROUND_WORDS, *LOOK_RESULTS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
+    assert {*WRAPPERS, *LOOK_RESULTS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
 
 
 def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ BAD = {
     "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": "found means something else in formulas",
     "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is a skill go_to already",
     "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
-    "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "{to}, which is no parameter",
+    "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "which is not a parameter",
     "@skill(ros='Wave')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"Wave" is no ROS action',
     "@skill(fails={'KeyError': 'x'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "must have a name",
     "@skill\ndef wiggle(who: str) -> None: 'Wiggle.'": "wiggle must take the simulation and then",
@@ -278,15 +278,15 @@ def test_a_function_that_fails_ends_the_command_with_a_sentence(
 
 TRUTHS = {
     "reed('a'): 1": "there is no skill reed; did you mean read?",
-    "open_gate('a'): true": "the code of open_gate decides what comes of it",
+    "open_gate('a'): true": "the code of open_gate decides its result",
     "read(3): 1": "read takes other arguments: read(what: str) -> int",
     "read('a', 'b'): 1": "read takes other arguments",
-    "read('a'): 1.5": "read cannot come to 1.5; write a whole number or Broken",
-    "read('a'): Broke": "read cannot come to 'Broke'; write a whole number or Broken",
-    "read(a): 1": "is no call; write it as in",
-    "'read({1: 2})': 1": "is no call; write it as in",
-    "'read([{1}])': 1": "is no call; write it as in",
-    "read(what='a'): 1": "is no call; write it as in",
+    "read('a'): 1.5": "read cannot return 1.5; write a whole number or Broken",
+    "read('a'): Broke": "read cannot return 'Broke'; write a whole number or Broken",
+    "read(a): 1": "is not a call; write it as in",
+    "'read({1: 2})': 1": "is not a call; write it as in",
+    "'read([{1}])': 1": "is not a call; write it as in",
+    "read(what='a'): 1": "is not a call; write it as in",
     "the sun shines: maybe": "is 'maybe'; write true or false",
 }
 
@@ -362,8 +362,8 @@ def test_minus_zero_is_zero_to_formulas(pool: WorkerPool, every: SkillTable) -> 
 @pytest.mark.parametrize(
     ("formula", "message"),
     [
-        ('tr.Exists(paint("green"))', "this is none of red, blue"),
-        ('tr.Exists(paint("red", "floor"))', "this is none of door, wall"),
+        ('tr.Exists(paint("green"))', "this is not one of red, blue"),
+        ('tr.Exists(paint("red", "floor"))', "this is not one of door, wall"),
         ('tr.Exists(whole("two"))', "expected a whole number, or a regex for it"),
         ("tr.Exists(truth(1))", "expected True or False"),
         ("tr.Exists(returned(True, whole(1)))", "returned is about skills that return True or False"),

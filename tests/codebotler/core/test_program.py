@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from codebotler.core import program
-from codebotler.core.program import flaws
+from codebotler.core.program import find_flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
 from codebotler.core.skills.values import NO_VALUE
@@ -30,7 +30,7 @@ USES_HELPER = "def task_program():\n    for room in rooms():\n        go_to(room
 
 
 def problems(text: str) -> list[tuple[int | None, str]]:
-    return [(p.line, p.message) for p in flaws(text)]
+    return [(p.line, p.message) for p in find_flaws(text)]
 
 
 def in_task(*statements: str) -> str:
@@ -43,7 +43,7 @@ def fenced(code: str, info: str = "python", marks: str = "```") -> str:
 
 def test_right_programs_have_no_problems() -> None:
     for reply in RECORDED:
-        found = flaws(reply.program)
+        found = find_flaws(reply.program)
         if reply.fails is None:
             assert found == (), reply.about
         elif reply.fails in {*UNPARSABLE, "NameError", "AskEmptyOptions"}:
@@ -107,7 +107,7 @@ def test_no_problem(text: str) -> None:
 
 def test_problems_stand_in_the_order_of_lines() -> None:
     text = "def task():\n    ask('a', 'b', [])\n    say(x)\n    go_to()\n    say(x)\n"
-    assert [p.line for p in flaws(text)] == [None, 2, 3, 4, 5]
+    assert [p.line for p in find_flaws(text)] == [None, 2, 3, 4, 5]
 
 
 @pytest.mark.parametrize(
@@ -121,13 +121,13 @@ def test_problems_stand_in_the_order_of_lines() -> None:
     ],
 )
 def test_a_misspelt_name_is_told_with_the_one_that_may_be_meant(lines: list[str], told: str) -> None:
-    assert [flaw.message for flaw in flaws(in_task(*lines))] == [told]
+    assert [flaw.message for flaw in find_flaws(in_task(*lines))] == [told]
 
 
 def test_many_undefined_names_are_quickly_told() -> None:
     bound = "".join(f"    name_{n}_bound = 1\n" for n in range(300))
     used = "".join(f"    say(name_{n}_bond)\n" for n in range(300))
-    found = flaws(f"def task_program():\n{bound}{used}")
+    found = find_flaws(f"def task_program():\n{bound}{used}")
     assert len(found) == 300
     assert 0 < sum("did you mean" in flaw.message for flaw in found) <= 10
 
@@ -135,10 +135,10 @@ def test_many_undefined_names_are_quickly_told() -> None:
 def test_a_ninth_skill_is_known() -> None:
     skills = SKILLS.with_skill(Skill("wave", (Parameter("hand"),), NO_VALUE, "Wave."))
     waves = in_task("wave()")
-    (unknown,) = flaws(waves)
+    (unknown,) = find_flaws(waves)
     assert (unknown.line, unknown.kind) == (2, "NameError")
     assert "wave" in unknown.message
-    (lacks,) = flaws(waves, skills)
+    (lacks,) = find_flaws(waves, skills)
     assert "hand" in lacks.message
 
 
@@ -169,9 +169,9 @@ DEEP = {
     ],
 )
 def test_hostile_source_is_a_problem(text: str) -> None:
-    assert flaws(text)
-    assert flaws(in_task(text) if "\n" not in text else text)
-    assert flaws(program_of(text).source)
+    assert find_flaws(text)
+    assert find_flaws(in_task(text) if "\n" not in text else text)
+    assert find_flaws(program_of(text).source)
     assert program_of(fenced(text) + fenced(TASK)).source
 
 
@@ -209,9 +209,9 @@ def test_threads_parse_at_the_same_time() -> None:
 
 ODD = r"""
 import re
-from codebotler.core.program import flaws, parse_expression
+from codebotler.core.program import find_flaws, parse_expression
 from codebotler.core.world import World
-flaws("def task_program():\n    say('\\d' if 1 is 1 else '')\n")
+find_flaws("def task_program():\n    say('\\d' if 1 is 1 else '')\n")
 parse_expression(r"'\d'")
 re.compile("[[a] nested")
 """

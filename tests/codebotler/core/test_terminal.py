@@ -74,7 +74,7 @@ WAYS: dict[str, Callable[[str], object]] = {
     "a text": terminal.print_text,
     "a program": terminal.print_source,
     "a note": terminal.note,
-    "a question": terminal.says_yes,
+    "a question": terminal.confirm,
     "a drawing": lambda text: terminal.print_rich(Text(text)),
     "a line": lambda text: terminal.console(highlight=False).print(text, markup=False),
     "what goes on": busy,
@@ -103,7 +103,7 @@ def test_a_terminal_obeys_nothing_that_others_wrote(
     ends = pytest.raises(SystemExit) if way == "a bug" else nullcontext()
     with warnings.catch_warnings(), ends:
         warnings.simplefilter("always")
-        with terminal.noting_all():
+        with terminal.report_problems():
             WAYS[way](EVIL)
     out = "".join(capsys.readouterr())
     if way == "a program" and not is_terminal:

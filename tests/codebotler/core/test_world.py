@@ -115,7 +115,7 @@ def word(name: str, quoted: str) -> list[str]:
         (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", 5, ["this entry", "a text", "a number"]),
         (GOOD + "  - hall\n", 5, ['"hall"', "twice"]),
         (GOOD + "  - {name: lab}\n", 5, ['"lab"', "twice"]),
-        (GOOD + "  - Lab\n", 5, ['"lab" and "Lab"', "capitals", "rename"]),
+        (GOOD + "  - Lab\n", 5, ['"lab" and "Lab"', "case", "rename"]),
         ("rooms: [hall, lab]\nrobot: attic\n", 2, ["robot", '"attic"', "hall, lab"]),
         (f"robot: hall\nrooms: [{'hall, ' * 5_001}]\n", 2, ['"rooms"', "too many", "5000"]),
         (GOOD + "objects: [mug]\n", 5, ['"objects"', "a list", "a mapping"]),

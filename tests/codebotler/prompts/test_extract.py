@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.program import flaws, undefined_names
+from codebotler.core.program import find_flaws, undefined_names
 from codebotler.core.skills.table import SkillTable
 from codebotler.models.recorded import RECORDED_NAMES, open_recorded
 from codebotler.prompts.extract import extract, program_of
@@ -341,7 +341,7 @@ def test_cut_off_stays_cut_off(reply: str) -> None:
     if "Dear all" not in reply:  # there, what may be prose is dropped, and the string stays open
         assert program.source.rstrip("\n").endswith(reply.rstrip("`\n").rsplit("\n", 1)[-1])
     if "is_in" not in reply:
-        assert [p.kind for p in flaws(program.source)] == ["SyntaxError"]
+        assert [p.kind for p in find_flaws(program.source)] == ["SyntaxError"]
 
 
 @given(st.sampled_from([r.program for r in RECORDED if r.fails is None]), st.integers(0, 2000))
@@ -362,11 +362,11 @@ def test_broken_code_in_front_is_no_prose() -> None:
 )
 def test_reply_without_code_is_the_source(reply: str) -> None:
     assert source(reply) == reply
-    assert flaws(program_of(reply).source)
+    assert find_flaws(program_of(reply).source)
 
 
 @given(st.text(alphabet=st.sampled_from("`~ \n\t#a(=:\"'\0\ud800é"), max_size=60) | st.text())
 def test_any_reply_and_any_source_is_taken(text: str) -> None:
     program = program_of(text)
-    assert isinstance(flaws(program.source), tuple)
-    assert isinstance(flaws(text), tuple)
+    assert isinstance(find_flaws(program.source), tuple)
+    assert isinstance(find_flaws(text), tuple)

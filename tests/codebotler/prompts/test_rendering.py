@@ -5,7 +5,7 @@ from difflib import SequenceMatcher
 import pytest
 
 from codebotler import prompts
-from codebotler.core.program import flaws
+from codebotler.core.program import find_flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
 from codebotler.core.skills.values import NO_VALUE
@@ -87,7 +87,7 @@ SHOWN = {
 def test_example_is_right_and_does_in_a_world_what_its_instruction_says(example: Example) -> None:
     (known,) = (begins for begins in SHOWN if example.instruction.startswith(begins))
     world, trace = SHOWN[known]
-    assert flaws(example.program) == ()
+    assert find_flaws(example.program) == ()
     outcome = run(example.program, world)
     assert outcome.status is Status.FINISHED, outcome.error
     assert outcome.trace == trace
@@ -141,7 +141,7 @@ def test_chat_begins_with_the_rules_shows_the_examples_and_ends_with_the_instruc
 
 def test_text_is_python_up_to_the_opening_and_holds_each_instruction_as_a_comment() -> None:
     assert PROMPT.text.endswith("# Instruction: Go to the lab.\ndef task_program():\n")
-    assert flaws(PROMPT.text + "    pass\n") == ()
+    assert find_flaws(PROMPT.text + "    pass\n") == ()
     for example in examples():
         assert f"# Instruction: {example.instruction}\n{example.program}" in PROMPT.text
 
@@ -156,7 +156,7 @@ def test_any_instruction_stays_what_it_is_and_stays_a_comment(instruction: str) 
     tail = prompt.text.split("# Instruction: ")[-1]
     first, *more, _opening = tail.splitlines()
     assert [first, *(line.removeprefix("#").removeprefix(" ") for line in more)] == instruction.splitlines()
-    assert flaws(prompt.text + "    pass\n") == ()
+    assert find_flaws(prompt.text + "    pass\n") == ()
 
 
 def test_rooms_are_told_where_they_are_known() -> None:
@@ -189,7 +189,7 @@ def test_repair_carries_the_program_and_its_problems() -> None:
         assert f"- {problem}" in request.text
         assert f"# - {problem}" in again.text
     assert again.text.endswith("\n" + PROMPT.opening)
-    assert flaws(again.text + "    pass\n") == ()
+    assert find_flaws(again.text + "    pass\n") == ()
     assert (again.instruction, again.stop, again.opening) == (PROMPT.instruction, PROMPT.stop, PROMPT.opening)
     twice = again.after("def task_program():\n    go_to('hall')\n", ["a"])
     assert twice.text.count("\n" + PROMPT.opening) == PROMPT.text.count("\n" + PROMPT.opening)
@@ -211,7 +211,7 @@ def test_hash_is_that_of_all_but_the_instruction(monkeypatch: pytest.MonkeyPatch
         "STOP_TEXTS": ("\n#",),
         "OPENING": "def task_program() -> None:\n",
         "examples": lambda: examples()[1:],
-        "_fenced": lambda program: program,
+        "_fence": lambda program: program,
     }
     for name, changed in changes.items():
         monkeypatch.setattr(rendering, name, changed)

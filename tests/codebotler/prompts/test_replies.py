@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.program import entries, tree_of
+from codebotler.core.program import parse_leniently, task_definitions
 from codebotler.prompts.extract import extract, read_reply
 
 TASK = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'
@@ -328,7 +328,7 @@ def test_fenced_program_is_found_as_it_is(statements: list[str]) -> None:
 @given(REPLIES)
 def test_program_that_was_found_is_found_in_itself(reply: str) -> None:
     program = source(reply)
-    if entries(tree_of(program)):
+    if task_definitions(parse_leniently(program)):
         assert source(program) == program
 
 

@@ -9,7 +9,7 @@ from hypothesis.strategies import SearchStrategy
 
 from codebotler import rtl
 from codebotler.core.trace import Event, Option, Trace
-from codebotler.core.unicode import composed
+from codebotler.core.unicode import compose
 from codebotler.rtl.formulas import ScopeName
 
 NAMES = st.sampled_from(["a", "b", "ab", "a b", "No"])
@@ -19,8 +19,8 @@ PATTERNS = st.sampled_from([".*", "a", "b", "ab", "a|b", "^b", r"\bb\b", "no", "
 PLAIN = ("goto", "goto", "say", "check", "pick", "place")
 
 
-def texts_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Text]:
-    leaves: SearchStrategy[rtl.Text] = patterns.map(rtl.Regex) | patterns.map(rtl.Without)
+def texts_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.TextPattern]:
+    leaves: SearchStrategy[rtl.TextPattern] = patterns.map(rtl.Regex) | patterns.map(rtl.Without)
     return st.recursive(
         leaves, lambda inner: st.lists(inner, min_size=1, max_size=3).map(tuple).map(rtl.Words), max_leaves=3
     )
@@ -51,7 +51,7 @@ def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.EventPatt
     return element()
 
 
-def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Text]:
+def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.TextPattern]:
     others = st.lists(patterns, max_size=2).map(tuple)
     return st.one_of(
         st.builds(rtl.Number, st.integers(0, 3), patterns, others, st.booleans()),
@@ -116,7 +116,7 @@ def single_tests() -> SearchStrategy[rtl.Test]:
 @pytest.fixture(scope="session")
 def strange_formulas() -> SearchStrategy[rtl.Formula]:
     """Formulas whose regexes hold anything a string may hold."""
-    return formulas_from(st.text(max_size=6).map(composed).map(_escaped))
+    return formulas_from(st.text(max_size=6).map(compose).map(_escaped))
 
 
 @pytest.fixture(scope="session")

@@ -30,14 +30,14 @@ from codebotler.rtl import (
     Regex,
     Scope,
     Test,
-    Text,
+    TextPattern,
     Time,
     Without,
     Words,
     holds,
     parse,
 )
-from codebotler.rtl.semantics import scoped, visible
+from codebotler.rtl.semantics import positions_in_scopes, visible
 
 Placed = list[tuple[int, Event]]
 """A copied part of a trace, each event with its position in the whole."""
@@ -58,7 +58,7 @@ def ask(question: str, *options: Option) -> Event:
     return Event("ask", question, options)
 
 
-def pattern(text: Text) -> str:
+def pattern(text: TextPattern) -> str:
     match text:
         case Regex(regex):
             return regex
@@ -70,7 +70,7 @@ def pattern(text: Text) -> str:
             raise AssertionError("what a text claims is no regex; test_claims.py is about it")
 
 
-def found(text: Text, actual: str) -> bool:
+def found(text: TextPattern, actual: str) -> bool:
     if isinstance(text, Number | Time | Claim):
         return text.matches(actual)
     if isinstance(text, Words):
@@ -261,7 +261,9 @@ def test_the_parts_before_and_after_make_up_the_trace(
     element, trace = data.draw(elements), data.draw(traces)
     hits = [at for at in range(len(trace)) if same(element, (at, trace[at]))]
     for which, at in (("First", hits[:1]), ("Last", hits[-1:])):
-        before, after = (scoped(parse_scope(side + which, element), trace) for side in ("Before", "After"))
+        before, after = (
+            positions_in_scopes(parse_scope(side + which, element), trace) for side in ("Before", "After")
+        )
         if not at:
             assert before == after == range(len(trace))
         else:

@@ -31,7 +31,7 @@ from codebotler.rtl import (
     holds,
     parse,
 )
-from codebotler.rtl.syntax import DEEPEST_FORMULA
+from codebotler.rtl.syntax import MAX_FORMULA_DEPTH
 
 LOBBY = Exists(EventPattern("goto", Regex("lobby")))
 ASK = EventPattern("ask", Regex("lunch"), Regex(".*"))
@@ -187,7 +187,7 @@ def test_deep_nesting_is_an_error_and_no_crash(text: str) -> None:
 
 
 def test_50_are_deep_enough_and_51_too_deep() -> None:
-    text = "not " * DEEPEST_FORMULA + 'tr.Exists(say("a"))'
+    text = "not " * MAX_FORMULA_DEPTH + 'tr.Exists(say("a"))'
     assert str(parse(text)) == text
     with pytest.raises(RtlSyntaxError, match="more than 50 deep") as caught:
         parse("not " + text)
@@ -195,7 +195,7 @@ def test_50_are_deep_enough_and_51_too_deep() -> None:
 
 
 def test_each_part_of_a_constraint_may_be_deep() -> None:
-    deep = "not " * (DEEPEST_FORMULA - 1) + 'tr.Exists(say("a"))'
+    deep = "not " * (MAX_FORMULA_DEPTH - 1) + 'tr.Exists(say("a"))'
     assert str(parse(f"{deep} and {deep}")) == f"{deep} and {deep}"
     with pytest.raises(RtlSyntaxError, match="nested"):
         parse(f"{deep} and not {deep}")

@@ -337,7 +337,7 @@ class Waves:
         self.wave, self.others = wave, others
 
     def robot(self) -> SimulatedRobot:
-        return SimulatedRobot(WORLD, RULES, TABLE.doing(wave=self._waved, **self.others))
+        return SimulatedRobot(WORLD, RULES, TABLE.with_functions(wave=self._waved, **self.others))
 
     def _waved(self, robot: SimulatedRobot, person: str) -> Result:
         self.processes.append(os.getpid())

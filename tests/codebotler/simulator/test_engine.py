@@ -55,7 +55,7 @@ def said(outcome: Outcome) -> list[str]:
 
 def doing(say: Callable[..., None]) -> SkillTable:
     """The eight skills, of which one does something else."""
-    return SKILLS.doing(say=say)
+    return SKILLS.with_functions(say=say)
 
 
 def links_in(folder: Path) -> list[Path]:
@@ -456,7 +456,7 @@ def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_an
 
 
 def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.simulator.process.isolated_process.MAX_WAIT_SECONDS", 1.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 1.0)
 
     def slow(robot: SimulatedRobot, message: str) -> None:
         time.sleep(2.5)

@@ -20,7 +20,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, note, seed, settings
 from hypothesis import strategies as st
 
-from codebotler.core.program import Flaw, flaws
+from codebotler.core.program import Flaw, find_flaws
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
@@ -177,7 +177,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
         assert outcome.status is not Status.KILLED
         assert all_of(outcome_of(other_pool, source, world)) == all_of(outcome)
         assert without_addresses(ordinary.outcome(source, world)) == without_addresses(outcome)
-        check_problems(source, flaws(source), outcome)
+        check_problems(source, find_flaws(source), outcome)
 
     check()
     assert list(map(all_of, run(seen, workers=3, settings=RULES))) == list(map(all_of, seen.values()))
@@ -216,7 +216,7 @@ def test_broken_texts_end_alike_in_every_run_and_break_nothing(
         outcome = outcome_of(pool, source, world)
         assert outcome.status is not Status.KILLED
         assert all_of(outcome_of(other_pool, source, world)) == all_of(outcome)
-        problems = flaws(source)
+        problems = find_flaws(source)
         check_problems(source, problems, outcome)
         if len(problems) == 1 and problems[0].kind in {"SyntaxError", "IndentationError", "TabError"}:
             assert outcome.trace == ()

@@ -15,7 +15,7 @@ import pytest
 import closed_functions as closed
 from codebotler.checking.check import check
 from codebotler.core import program as programs
-from codebotler.core.program import FILE, LONGEST_PROGRAM
+from codebotler.core.program import MAX_PROGRAM_LENGTH, SOURCE_NAME
 from codebotler.prompts.extract import program_in, program_of
 from codebotler.simulator.isolated_call import IsolatedCallError, end_all
 from codebotler.simulator.worker import EngineError
@@ -121,7 +121,7 @@ def no_compiler_(monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.compile
 
     def parse_only(source: Any, filename: str, mode: str, flags: int = 0, *args: Any, **more: Any) -> Any:  # noqa: ANN401 - as the builtin
-        assert filename != FILE or flags & ast.PyCF_ONLY_AST, "a program is compiled in this process"
+        assert filename != SOURCE_NAME or flags & ast.PyCF_ONLY_AST, "a program is compiled in this process"
         return real(source, filename, mode, flags, *args, **more)
 
     def refuse(*_: object) -> None:
@@ -147,7 +147,7 @@ def test_programs_of_others_are_never_compiled_in_this_process() -> None:
 
 
 def test_program_that_is_too_long_is_not_read() -> None:
-    long = TASK + "# " + "x" * LONGEST_PROGRAM
+    long = TASK + "# " + "x" * MAX_PROGRAM_LENGTH
     assert [problem.kind for problem in check(long).problems] == ["MemoryError"]
 
 

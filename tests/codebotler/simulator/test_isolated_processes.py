@@ -77,7 +77,7 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
                 found[message] = Enclosed.of(pid)
 
     def new_robot() -> SimulatedRobot:
-        return SimulatedRobot(WORLD, skills=SKILLS.doing(say=say))
+        return SimulatedRobot(WORLD, skills=SKILLS.with_functions(say=say))
 
     program = "def task_program():\n    say('child')\n"
     worker.run(program.replace("child", "child of a batch"), new_robot)

@@ -7,7 +7,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.checking.rules import read_rules
-from codebotler.core.program import tree_of
+from codebotler.core.program import parse_leniently
 from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
@@ -73,7 +73,7 @@ def test_rule_and_instruction_are_composed(tmp_path: Path) -> None:
 
 
 def test_tree_of_a_program_has_composed_texts() -> None:
-    assert NFC in repr(tree_of(f"x = '{NFD}'").body[0].value.value)  # type: ignore[attr-defined]
+    assert NFC in repr(parse_leniently(f"x = '{NFD}'").body[0].value.value)  # type: ignore[attr-defined]
 
 
 def test_robot_is_asked_for_its_rooms_in_its_own_spelling(tmp_path: Path) -> None:

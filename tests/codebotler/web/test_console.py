@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender
 from codebotler.core.world import Room, World
@@ -496,7 +496,7 @@ def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
     def slow(
         console: Console, program: str, plan: RoomMap | None = None, rules: tuple[Rule, ...] = ()
-    ) -> Check:
+    ) -> CheckResult:
         go_on.wait(20)
         return check(console, program, plan, rules)
 

@@ -1,4 +1,4 @@
-"""Calls the function of a user's own skill, and reports results and errors that it does not declare."""
+"""Call the function of a custom skill, and report undeclared results and errors."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import plain
 
 SKILL_FAILED = "SkillFailed"
-"""The kind of error where the function of a user's own skill raises what it does not declare."""
+"""The kind of error when the function of a custom skill raises an undeclared error."""
 
 
-def called(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
-    """Call the function of a skill; UserError if it returns a value that it does not declare."""
-    assert row.does is not None, "the robot was made with it"
+def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
+    """Call the function of a skill; UserError if its result does not have the declared type."""
+    assert row.does is not None, "a custom skill has a function"
     given = [
         [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)
         for parameter, argument in zip(row.parameters, arguments, strict=True)
@@ -30,7 +30,9 @@ def called(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa:
         lines = [
             tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
         ]
-        file = code.co_filename.rpartition("/")[2]  # the folder is another one elsewhere, and rows are not
+        file = code.co_filename.rpartition("/")[
+            2
+        ]  # without the folder, so that results are equal on all machines
         where = f"{file}, line {lines[-1] if lines else code.co_firstlineno}"
         said = str(error).replace(type(robot).__name__, "Simulation")
         raise RobotError(

@@ -1,4 +1,4 @@
-"""Declares a skill by one typed function; its signature and docstring are what programs and models see."""
+"""Declare a skill by one typed function, whose signature and docstring programs and models see."""
 
 from __future__ import annotations
 
@@ -21,41 +21,45 @@ from codebotler.core.skills.verbs import Verb, verb_of
 RESERVED_NAMES = frozenset(
     {"task_program", "time", "sys", *dir(builtins), "stop", "rooms", "connect", "disconnect"}
 )
-BE = Verb("be inside", "is inside", "was inside", "being inside", "was in a room")
 POSE_IN_ROOM = Skill(
-    "(pose)", (Parameter("room"),), NO_VALUE, "", Recording(INSIDE, "room", names="room"), verb=BE
+    "(pose)",
+    (Parameter("room"),),
+    NO_VALUE,
+    "",
+    Recording(INSIDE, "room", names="room"),
+    verb=Verb("be inside", "is inside", "was inside", "being inside", "was in a room"),
 )
-"""Not a skill: house rules see this event when the robot's pose enters a room."""
+"""A pseudo-skill whose event tells house rules that the robot's pose has entered a room."""
 RTL_WORDS = frozenset(
     {
         *("at", "holding", "to", "options", "found", "missed", "mention", "answered", "returned", "tr"),
         *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies", INSIDE),
     }
 )
-"""Words with another meaning in formulas, which no event may have as its name."""
+"""Words with a meaning in formulas, which cannot name events."""
 _DECLARED: dict[str, Skill] = {}
 PAPER_MODULE = "codebotler.core.skills.paper"
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
 
 def by_name(name: str) -> Skill | None:
-    """The skill of this name that was declared in this process, for words about it."""
+    """Return the skill of this name that this process has declared."""
     return _DECLARED.get(name)
 
 
 def all_names() -> list[str]:
-    """The names of all skills declared in this process."""
+    """Return the names of all skills that this process has declared."""
     return list(_DECLARED)
 
 
 def by_event(kind: str) -> Skill | None:
-    """The skill declared in this process that leaves events of a kind, which is all that these say of it."""
+    """Return the skill, declared in this process, that records a kind of event."""
     other = POSE_IN_ROOM if kind == INSIDE else None
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 
 
 def verb_for(kind: str) -> Verb | None:
-    """The verb for a kind of event; None if nobody has declared one."""
+    """Return the verb for a kind of event, if declared."""
     row = by_event(kind)
     return None if row is None else row.verb
 
@@ -103,30 +107,30 @@ def skill(
     is_idle: bool = False,
     adds_event: bool = True,
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
-    """Declare a skill by a function that does it to a simulated robot, its first parameter.
+    """Declare a skill by its effect on a simulated robot, the first parameter of the function.
 
-    A function without code (`...`) leaves the event of the skill, and returns a random value of its type; in
-    some of the worlds that a check imagines, it fails with each of its errors.
+    A function without code (`...`) records the event of the skill and returns a random value of its type; in
+    some sampled worlds, it fails with one of its errors.
 
     Args:
-        does: the function, where nothing else is declared.
-        verb: for people, such as `open {door}`, with the parameters in braces.
-        past: of the verb, where it is irregular and not known, such as `wove`.
-        results: what False and True mean to people.
-        fails: the errors that it may end with, by kind, each with a clause that says when.
-        ros: the action on a robot, such as `lab_msgs/OpenDoor:/open_door`.
-        example: a call that models are shown; by default one that is made of the names of parameters.
-        event: the kind of its event; by default the name of the function; None if it leaves no event.
-        text: the parameter whose value is the text of the event; by default the first one.
-        names: the sort of thing that the text names, such as `room`; empty for what is spoken.
-        to: the parameter that says whom it is for.
-        when_tried: whether an attempt that fails is an event, too.
-        seconds: how long the simulated robot takes by its clock, without driving.
-        is_idle: whether it leaves the robot and its world as they are, however often it is executed.
-        adds_event: whether its event is added for it when it ends; otherwise the function does that.
+        does: the function.
+        verb: the English verb, such as `open {door}`, with parameters in braces.
+        past: the past form of an irregular verb that is not in the list, such as `wove`.
+        results: the meanings of False and True in words.
+        fails: the kinds of its errors, each with a clause that says when it occurs.
+        ros: its action on a robot, such as `lab_msgs/OpenDoor:/open_door`.
+        example: a call for prompts; by default one with the names of parameters as arguments.
+        event: the kind of its event; by default the name of the function; None for no event.
+        text: the parameter with the text of the event; by default the first one.
+        names: the sort of thing that the text names, such as `room`; empty for speech.
+        to: the parameter with the addressee of a question.
+        when_tried: whether failed attempts are events, too.
+        seconds: its duration on the simulated clock, without driving.
+        is_idle: whether it changes neither the robot nor its world.
+        adds_event: whether the robot adds its event at the end, rather than the function.
 
     Raises:
-        UserError: it cannot be a skill; the sentence names the file and the line.
+        UserError: the function cannot be a skill; the sentence has the file and the line.
     """
     said = {**locals(), "fails": fails or {}}
 
@@ -139,14 +143,14 @@ def skill(
 
 
 class _Declaration:
-    """One function, with the options of its declaration."""
+    """A function and the options of its declaration."""
 
     def __init__(self, does: Callable[..., Any], said: Mapping[str, Any]) -> None:
         self.does, self.said = does, said
         self.name = does.__name__
 
     def skill(self) -> Skill:
-        """Make the skill, and register it by its name."""
+        """Create and register the skill."""
         self.check_options()
         self.check_name()
         parameters, returns = self.parameters(), self.returns()
@@ -179,20 +183,17 @@ class _Declaration:
         return row
 
     def wrong(self, sentence: str) -> NoReturn:
-        """Raise a UserError that names the function's file and line."""
         refuse(self.does, sentence)
 
     def check_options(self) -> None:
-        """Refuse options of the wrong type."""
         for name, (fits, wanted) in SKILL_OPTIONS.items():
             if not fits(self.said[name]):
                 self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
 
     def check_example(self, row: Skill) -> None:
-        """Refuse an example that does not call the skill."""
         if not row.example:
             return
-        import ast  # noqa: PLC0415 - children have no use for it
+        import ast  # noqa: PLC0415 - sandboxed processes do not need it
 
         try:
             call = ast.parse(row.call, mode="eval").body
@@ -262,7 +263,7 @@ class _Declaration:
         return found
 
     def annotation(self, name: str) -> object:
-        """An annotation, evaluated if it is a text; that of the simulation may be nothing that is there."""
+        """Return an annotation, evaluated if it is a string; that of the simulation may be undefined."""
         annotation: object = self.does.__annotations__.get(name)
         if not isinstance(annotation, str):
             return annotation
@@ -303,7 +304,7 @@ class _Declaration:
             return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb is a text")
         try:
             names = [each.name for each in parameters]
-            if recording is not None:  # in the order in which events have them
+            if recording is not None:  # in the order of the event
                 names = [name for name in (recording.text, *recording.more) if name]
             return verb_of(verb, names, self.said["results"], self.said["past"])
         except ValueError as error:
@@ -373,7 +374,6 @@ def _ros_type(value: ValueType) -> str:
 
 
 def _is_empty(does: Callable[..., Any]) -> bool:
-    """Whether a function has no code."""
     code = does.__code__
     return code.co_code == _empty.__code__.co_code and {*code.co_consts} <= {does.__doc__, None, ...}
 

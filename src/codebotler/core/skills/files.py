@@ -1,4 +1,4 @@
-"""Files of a user's own skills; they are the user's code, and run in this process."""
+"""Load files of custom skills; they are the user's own code and run in this process."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from types import ModuleType
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import SKILL_OPTIONS
-from codebotler.core.skills.own_modules import is_own_module, module_of, place_of
+from codebotler.core.skills.own_modules import is_own_module, load_own_module, location_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 
 
 def skills_from(*files: Path | str) -> SkillTable:
-    """The eight skills of the paper, and those that files declare with `@skill`.
+    """Return the eight skills of the paper and those that files declare with `@skill`.
 
     Args:
-        files: Python files, which are run.
+        files: Python files, which this runs.
 
     Raises:
-        UserError: a file cannot be run, declares no skill, or one whose name is taken.
+        UserError: a file fails, declares no skill, or declares one whose name is taken.
     """
     rows = [*SKILLS.rows]
     for path in {Path(file).resolve(): Path(file) for file in files}.values():
-        found = declared_in(path)
+        found = _declared_skills(path)
         if not found:
             raise UserError("it declares no skill; put @skill above a function", file=path)
         for row in found:
@@ -36,33 +36,32 @@ def skills_from(*files: Path | str) -> SkillTable:
     return SkillTable(tuple(rows)) if files else SKILLS
 
 
-def declared_in(path: Path) -> list[Skill]:
-    """The skills that a file declares, in its order."""
-    module = loaded(path)
+def _declared_skills(path: Path) -> list[Skill]:
+    module = load_skill_module(path)
     found = [value for value in vars(module).values() if isinstance(value, Skill)]
     return [row for row in dict.fromkeys(found) if getattr(row.does, "__module__", "") == module.__name__]
 
 
 def files_of(skills: SkillTable) -> dict[str, str]:
-    """The names of the files that declare skills of a table, each with the SHA-256 of its content."""
+    """Return the names of the files that declare skills of a table, with SHA-256 hashes of their content."""
     modules = {getattr(row.does, "__module__", "") for row in skills.rows}
-    paths = {Path(place_of(name)) for name in modules if is_own_module(name)}
+    paths = {Path(location_of(name)) for name in modules if is_own_module(name)}
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}
 
 
-def loaded(path: Path) -> ModuleType:
-    """The module of a file, which is run once; UserError if it cannot be run."""
+def load_skill_module(path: Path) -> ModuleType:
+    """Run a file once and return its module; UserError if it fails."""
     try:
-        return module_of(path)
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - whatever the file raises
-        raise _refused(path, error) from None
+        return load_own_module(path)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - the file may raise anything
+        raise _as_user_error(path, error) from None
 
 
 UNKNOWN_OPTION = re.compile(r"skill\(\) got an unexpected keyword argument '(\w+)'")
 
 
-def _refused(path: Path, error: BaseException) -> UserError:
-    """Why a file cannot be used, by the line at which it failed."""
+def _as_user_error(path: Path, error: BaseException) -> UserError:
+    """Convert an error of a file to a UserError with the line at which the file failed."""
     if isinstance(error, UserError) and error.file is not None:
         return error
     if isinstance(error, SyntaxError):

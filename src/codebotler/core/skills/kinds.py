@@ -1,4 +1,4 @@
-"""The kinds of events: those of the paper's skills, and the one that house rules see of a robot's pose."""
+"""The kinds of events: those of the paper's skills, and one for the robot's pose."""
 
 from __future__ import annotations
 
@@ -11,4 +11,4 @@ CHECK: Final = "check"
 PICK: Final = "pick"
 PLACE: Final = "place"
 INSIDE: Final = "inside"
-"""The robot's pose has entered a room; no skill does that."""
+"""The robot's pose has entered a room; only house rules see this event."""

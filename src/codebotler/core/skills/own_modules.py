@@ -1,4 +1,4 @@
-"""Runs files of a user's own skills, each once, as modules that any process can find again."""
+"""Run each file of custom skills once, as a module that any process can find again."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from types import ModuleType
 from codebotler.core.errors import UserError
 
 OWN_MODULES = "codebotler_skills_"
-"""How the names of these modules begin."""
+"""The prefix of the names of these modules."""
 
 
 def is_own_module(name: str) -> bool:
-    """Whether a module with this name is a file of a user's own."""
+    """Whether a module with this name is a file of custom skills."""
     return name.startswith(OWN_MODULES)
 
 
-def module_of(path: Path) -> ModuleType:
-    """The module of a file, which is run once; whatever the file raises is raised here.
+def load_own_module(path: Path) -> ModuleType:
+    """Run a file once and return its module.
 
     Raises:
         UserError: the file cannot be read.
+        BaseException: any error of the file.
     """
     try:
         source = path.read_bytes()
@@ -50,12 +51,12 @@ def module_of(path: Path) -> ModuleType:
     return module
 
 
-def place_of(module: str) -> str:
-    """Where another process finds a module: the path of a user's own file, or the module's name."""
+def location_of(module: str) -> str:
+    """Return the location for `find_object`: the path of a custom file, or the module's name."""
     return str(sys.modules[module].__file__) if is_own_module(module) else module
 
 
-def find_in(place: str, name: str) -> object:
-    """Return what a module calls `name`; `place_of` says where the module is."""
-    module = module_of(Path(place)) if place.endswith(".py") else import_module(place)
+def find_object(place: str, name: str) -> object:
+    """Return what a module calls `name`; `location_of` gives the place."""
+    module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)

@@ -1,4 +1,4 @@
-"""The actions of skills as ROS 2 packages, which their users build with colcon."""
+"""Generate ROS 2 packages with the actions of skills, for colcon."""
 
 from __future__ import annotations
 
@@ -45,11 +45,7 @@ ament_package()
 
 
 def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
-    """The files of a ROS 2 package for each package that the actions of some skills belong to, by name.
-
-    Args:
-        skills: those without an action are left out.
-    """
+    """Return the files of each ROS 2 package with actions of the skills, by package name."""
     packages: dict[str, dict[str, str]] = {}
     for skill in skills.rows:
         if skill.ros is not None:
@@ -63,11 +59,11 @@ def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
 
 
 def write_ros_packages(skills: SkillTable, folder: Path) -> list[Path]:
-    """Write the ROS 2 packages of some skills into a folder; the folders of the packages.
+    """Write the ROS 2 packages of some skills, and return their folders.
 
     Args:
-        skills: at least one of them with an action.
-        folder: such as the `src` of a workspace; packages that are there are written anew.
+        skills: at least one with an action.
+        folder: the parent, such as `src` of a workspace; existing packages are overwritten.
 
     Raises:
         UserError: no skill has an action.

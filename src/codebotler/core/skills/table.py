@@ -1,4 +1,4 @@
-"""Skills as data, for prompts, messages, checks and robots."""
+"""Skills as data for prompts, messages, checks and robots."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn, SupportsIndex
 
+from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
-from codebotler.core.skills.own_modules import find_in, place_of
-from codebotler.core.skills.values import TEXT_TYPE, ValueType, possible, written_call
+from codebotler.core.skills.own_modules import find_object, location_of
+from codebotler.core.skills.values import TEXT_TYPE, ValueType, sample_values, written_call
 from codebotler.core.skills.verbs import Verb
 
 
@@ -17,18 +18,18 @@ from codebotler.core.skills.verbs import Verb
 class Parameter:
     """One argument of a skill."""
 
-    name: str  # by which a program may pass it
+    name: str
     type: ValueType = TEXT_TYPE
-    is_options: bool = False  # whether it lists the options of a question, which may be of any type
+    is_options: bool = False  # whether it lists the options of a question, of any type
 
     @property
     def kind(self) -> str:
-        """The type as the sandbox knows it."""
+        """The name of the type for the sandbox."""
         return "list" if self.is_options else self.type.kind
 
     @property
     def words(self) -> str:
-        """What programs must pass, in words."""
+        """The expected values, in words."""
         return "a list" if self.is_options else self.type.words
 
 
@@ -36,65 +37,65 @@ class Parameter:
 class Recording:
     """The event that a skill leaves in the trace."""
 
-    kind: str  # of the event, and its name in RTL, such as `goto`
-    text: str  # the parameter whose value is the event's text; empty if it has none
-    options: str | None = None  # the parameter whose value is the event's list of options
-    to: str | None = None  # the parameter that says whom it is for
-    names: str = ""  # the sort of thing that the text names, such as `room`; empty for what is spoken
-    when_tried: bool = False  # whether an attempt that fails is an event, too
+    kind: str  # the kind of event and its name in RTL, such as `goto`
+    text: str  # the parameter with the event's text; empty if it has none
+    options: str | None = None  # the parameter with the options of a question
+    to: str | None = None  # the parameter with the addressee
+    names: str = ""  # the sort of thing that the text names, such as `room`; empty for speech
+    when_tried: bool = False  # whether failed attempts are events, too
     more: tuple[str, ...] = ()  # the parameters whose values follow the text
 
     @property
     def is_spoken(self) -> bool:
-        """Whether the text is said aloud."""
+        """Whether the robot speaks the text."""
         return not self.names
 
     @property
     def is_drive(self) -> bool:
-        """Whether the robot goes to the place that the text names."""
+        """Whether the text names a room that the robot drives to."""
         return self.names == "room"
 
 
 ROS_PACKAGE = "robot_actions_pkg"
-"""Of the actions of the paper's skills."""
+"""The ROS package with the actions of the paper's skills."""
 
 
 @dataclass(frozen=True)
 class RosAction:
-    """The ROS action that carries a skill to a robot (paper, section III.C)."""
+    """The ROS action of a skill (paper, section III.C)."""
 
     type: str
     server: str  # the topic under which the robot offers it
-    goal: tuple[str, ...] = ()  # its fields, in the order of the skill's parameters
-    result: str | None = None  # the type of its only field, if it has one
-    failure: str = ""  # the kind of its only error; if it is empty, the robot names the kind
+    goal: tuple[str, ...] = ()  # the fields, in the order of the parameters
+    result: str | None = None  # the type of the only field, if any
+    failure: str = ""  # the kind of its only error; if empty, the robot names the kind
     package: str = ROS_PACKAGE
 
     @property
     def definition(self) -> str:
-        """The text of its .action file; names and order decide whether robots understand it."""
+        """The text of its .action file; field names and order must match the robot's."""
         result = "" if self.result is None else f"{self.result} result\n"
         return "".join(f"{line}\n" for line in self.goal) + f"---\n{result}---\n"
 
 
 @dataclass(frozen=True)
 class Skill:
-    """One robot primitive of the paper's figure 2a, or one of a user's own.
+    """A robot primitive of the paper's figure 2a, or a custom one.
 
     Args:
-        name: the function a program calls.
-        parameters: its arguments, in order.
-        returns: the type of what comes back.
-        doc: what it does, in a sentence for the person or model that writes programs.
-        recording: its event in the trace; None for skills without one.
-        ros: the action on a robot.
-        verb: for people; without one, they read the skill's name and its arguments.
-        seconds: how long the simulated robot takes by its clock, without driving.
-        is_idle: whether it leaves the robot and its world as they are, however often it is executed.
-        does: what it does to a simulated robot, its first argument.
-        adds_event: whether the robot adds its event; otherwise, what it does adds that by itself.
-        fails: the kinds of errors that it may end with, and when each occurs.
-        example: a call of it that models are shown.
+        name: the function that programs call.
+        parameters: its parameters, in order.
+        returns: the type of its result.
+        doc: a sentence about it for authors of programs.
+        recording: its event in the trace, if any.
+        ros: its action on a robot.
+        verb: its English verb; None to show its name and arguments instead.
+        seconds: its duration on the simulated clock, without driving.
+        is_idle: whether it changes neither the robot nor its world.
+        does: its effect on a simulated robot, the first argument.
+        adds_event: whether the robot adds its event, rather than `does`.
+        fails: the kinds of its errors, and when each occurs.
+        example: a call for prompts.
     """
 
     name: str
@@ -112,34 +113,34 @@ class Skill:
     example: str = ""
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
-        """By its name where that is in its module: there, the name of the function is that of the skill."""
+        """Pickle by name if its module binds the name to this skill."""
         name = getattr(self.does, "__module__", "")
         module = sys.modules.get(name)
         if module is not None and getattr(module, self.name, None) is self:
-            return find_in, (place_of(name), self.name)
+            return find_object, (location_of(name), self.name)
         return super().__reduce_ex__(protocol)
 
-    def doing(self, does: Callable[..., Any]) -> Skill:
+    def with_function(self, does: Callable[..., Any]) -> Skill:
         """Return this skill with another function."""
         return replace(self, does=does, is_idle=False)
 
     @property
     def is_drive(self) -> bool:
-        """Whether the robot goes to a place that its event names."""
+        """Whether its event names a room that the robot drives to."""
         return self.recording is not None and self.recording.is_drive
 
     @property
-    def is_by_lot(self) -> bool:
-        """Whether its function has no code, so that its results are random."""
+    def is_random(self) -> bool:
+        """Whether its results are random, since its function has no code."""
         return hasattr(self.does, "__wrapped__")
 
     @property
     def call(self) -> str:
-        """A call of it that models are shown."""
+        """A call for prompts."""
         return self.example or written_call(self.name, [_sample(each) for each in self.parameters])
 
     def wrong(self, sentence: str) -> NoReturn:
-        """Raise a UserError that names the file and the line of its function."""
+        """Raise a UserError with the file and the line of its function."""
         refuse(self.does, sentence)
 
     @property
@@ -150,7 +151,7 @@ class Skill:
 
 
 def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
-    """Raise a UserError that names the file and the line of a function, if it has any."""
+    """Raise a UserError with the file and the line of a function, if known."""
     code = getattr(getattr(does, "__wrapped__", does), "__code__", None)
     if code is None:
         raise UserError(sentence)
@@ -158,43 +159,50 @@ def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
 
 
 def _sample(parameter: Parameter) -> object:
-    """A value that a parameter takes: its name, where it is a text."""
+    """Return an example argument: the parameter's name if it is a text."""
     value = parameter.type
     if value.choices:
         one: object = value.choices[0]
     else:
-        one = parameter.name if value.base == "str" else possible(replace(value, is_list=False))[0]
+        one = parameter.name if value.base == "str" else sample_values(replace(value, is_list=False))[0]
     return [one] if value.is_list else one
 
 
 @dataclass(frozen=True)
 class SkillTable(Mapping[str, Skill]):
-    """Skills by name, in the order in which they are shown.
+    """Skills by name, in display order.
 
     Args:
         rows: the skills; names and recorded kinds are unique.
-        recordings: the events that a trace can have, by kind; follows from the rows.
 
     Raises:
         ValueError: two rows share a name or a recorded kind.
     """
 
     rows: tuple[Skill, ...]
-    _by_name: Mapping[str, Skill] = field(init=False, repr=False, compare=False)
-    recordings: Mapping[str, Recording] = field(init=False, repr=False, compare=False)
-    _hash: int = field(init=False, repr=False, compare=False)
-    _idle: frozenset[str] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        by_name = {skill.name: skill for skill in self.rows}
         kinds = [skill.recording.kind for skill in self.rows if skill.recording]
-        if len(by_name) != len(self.rows) or len(set(kinds)) != len(kinds):
+        if len(self._by_name) != len(self.rows) or len(self.recordings) != len(kinds):
             raise ValueError("two skills share a name or a kind of event")
-        object.__setattr__(self, "_by_name", by_name)
-        recordings = {skill.recording.kind: skill.recording for skill in self.rows if skill.recording}
-        object.__setattr__(self, "recordings", recordings)
-        object.__setattr__(self, "_idle", frozenset(s.name for s in self.rows if s.is_idle))
-        object.__setattr__(self, "_hash", hash(self.rows))  # once, since tables are keys of caches
+
+    @cached_property
+    def _by_name(self) -> Mapping[str, Skill]:
+        return {skill.name: skill for skill in self.rows}
+
+    @cached_property
+    def recordings(self) -> Mapping[str, Recording]:
+        """The events that a trace can have, by kind."""
+        return {skill.recording.kind: skill.recording for skill in self.rows if skill.recording}
+
+    @cached_property
+    def idle(self) -> frozenset[str]:
+        """The names of skills that change neither the robot nor its world."""
+        return frozenset(skill.name for skill in self.rows if skill.is_idle)
+
+    @cached_property
+    def _hash(self) -> int:  # computed once, since tables are keys of caches
+        return hash(self.rows)
 
     def __getitem__(self, name: str) -> Skill:
         return self._by_name[name]
@@ -212,28 +220,23 @@ class SkillTable(Mapping[str, Skill]):
         return f"SkillTable({', '.join(self)})"
 
     def with_skill(self, skill: Skill) -> SkillTable:
-        """Return this table with one more row."""
+        """Return this table with another skill."""
         return SkillTable((*self.rows, skill))
 
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """Return this table with the rows of another one that it lacks."""
+        """Return this table with the missing skills of another one."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def without(self, names: Iterable[str]) -> SkillTable:
-        """Return this table without the rows that have these names."""
-        left_out = {*names}
-        return SkillTable(tuple(row for row in self.rows if row.name not in left_out))
+        """Return this table without the skills of these names."""
+        omitted = {*names}
+        return SkillTable(tuple(row for row in self.rows if row.name not in omitted))
 
-    def doing(self, **does: Callable[..., Any]) -> SkillTable:
-        """Return these skills, some with another function."""
-        return SkillTable(tuple(s.doing(does[s.name]) if s.name in does else s for s in self.rows))
-
-    @property
-    def idle(self) -> frozenset[str]:
-        """The skills that leave a robot and its world as they are."""
-        return self._idle
+    def with_functions(self, **does: Callable[..., Any]) -> SkillTable:
+        """Return these skills, some with other functions."""
+        return SkillTable(tuple(s.with_function(does[s.name]) if s.name in does else s for s in self.rows))
 
     @property
     def verbs(self) -> Mapping[str, Verb]:
-        """The verbs of events, by kind; kinds without a verb are absent."""
+        """The verbs of events, by kind."""
         return {s.recording.kind: s.verb for s in self.rows if s.recording and s.verb}

@@ -1,4 +1,4 @@
-"""The types of arguments and results of skills: which values fit, and how programs write them."""
+"""The types of arguments and results of skills, and how programs write their values."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from enum import Enum
 from math import isfinite
 from typing import Any, Literal, TypeAlias, get_args, get_origin
 
+from codebotler.core.words import listed
+
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
-LARGEST_WHOLE_NUMBER = 2**53  # of whole numbers, which JSON and robots carry exactly
-BASES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
+MAX_INTEGER = 2**53  # JSON and robots carry integers up to this exactly
+BASE_TYPES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
 
 
 @dataclass(frozen=True)
@@ -21,10 +23,10 @@ class ValueType:
     """The type of an argument or a result of a skill.
 
     Args:
-        base: the type of a single value; None for nothing at all.
+        base: the type of a single value; None for no value.
         is_list: whether it is a list of these values.
-        choices: the only values that fit, if they are listed.
-        enum: what the function of the skill gets for a choice, where it wants no plain value.
+        choices: the allowed values; empty for all of the type.
+        enum: the enumeration that the function of the skill gets instead of a plain choice.
     """
 
     base: Base | None = "str"
@@ -34,33 +36,27 @@ class ValueType:
 
     @property
     def kind(self) -> str:
-        """The type as the sandbox knows it, without what it chooses from."""
+        """The name of the type for the sandbox, without choices."""
         return f"list[{self.base}]" if self.is_list else str(self.base)
 
     @property
     def annotation(self) -> str:
-        """The type as programs and models see it, such as `list[str]` or `Literal["red", "green"]`."""
+        """The annotation for programs and models, such as `list[str]` or `Literal["red", "green"]`."""
         quoted = map(_written, self.choices)
         one = f"Literal[{', '.join(quoted)}]" if self.choices else str(self.base)
         return f"list[{one}]" if self.is_list else one
 
     @property
     def words(self) -> str:
-        """What is expected, in words."""
-        named = {"str": "text", "int": "a whole number", "float": "a number", "bool": "True or False"}
+        """The expected values, in words."""
         if self.base is None:
             return "nothing"
-        if self.is_list:
-            return f"a list of {PLURALS[self.base]}" if not self.choices else f"a list of {self._listed}"
-        return self._listed if self.choices else named[self.base]
-
-    @property
-    def _listed(self) -> str:
         quoted = [f'"{one}"' if isinstance(one, str) else str(one) for one in self.choices]
-        return " or ".join([", ".join(quoted[:-1]), quoted[-1]] if quoted[1:] else quoted)
+        one, many = [listed(quoted, "or")] * 2 if quoted else TYPE_NAMES[self.base]
+        return f"a list of {many}" if self.is_list else one
 
     def fits(self, value: object) -> bool:
-        """Whether a value is of this type, exactly; a whole number is a number, too."""
+        """Whether a value has exactly this type; an integer is also a float."""
         if self.base is None:
             return value is None
         if self.is_list:
@@ -73,12 +69,12 @@ class ValueType:
             return False
         if isinstance(value, float) and not isfinite(value):
             return False
-        if given is int and abs(value) > LARGEST_WHOLE_NUMBER:  # type: ignore[arg-type]  # a whole number
+        if given is int and abs(value) > MAX_INTEGER:  # type: ignore[arg-type]  # a whole number
             return False
         return not self.choices or value in self.choices
 
     def wanted(self, value: Any) -> Any:  # noqa: ANN401 - of any of these types
-        """A value that fits as the function of the skill wants it."""
+        """Convert a value of this type for the function of the skill."""
         if isinstance(value, list | tuple):
             return [self.wanted(each) for each in value]
         if self.enum is not None:
@@ -86,28 +82,28 @@ class ValueType:
         return float(value) if self.base == "float" else value
 
 
-PLURALS: Mapping[Base, str] = {
-    "str": "texts",
-    "int": "whole numbers",
-    "float": "numbers",
-    "bool": "truth values",
+TYPE_NAMES: Mapping[Base, Sequence[str]] = {
+    "str": ("text", "texts"),
+    "int": ("a whole number", "whole numbers"),
+    "float": ("a number", "numbers"),
+    "bool": ("True or False", "truth values"),
 }
 TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None)
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
-    """A result without enumerations: each member is replaced by its value."""
+    """Replace members of enumerations by their values."""
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.value if isinstance(value, Enum) else value
 
 
 def value_type(annotation: object) -> ValueType | None:
-    """The type that an annotation means; None if it is none of those that skills can have."""
+    """Return the type that an annotation means; None if skills cannot have it."""
     if annotation is None or annotation is type(None):
         return NO_VALUE
-    if isinstance(annotation, type) and annotation in BASES:
-        return ValueType(BASES[annotation])
+    if isinstance(annotation, type) and annotation in BASE_TYPES:
+        return ValueType(BASE_TYPES[annotation])
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return _one_of(tuple(member.value for member in annotation), annotation)
     if get_origin(annotation) is Literal:
@@ -123,20 +119,20 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
     kinds = {type(choice) for choice in choices}
     if len(kinds) != 1 or not kinds <= {str, int, float}:
         return None
-    return ValueType(BASES[kinds.pop()], choices=choices, enum=enum)
+    return ValueType(BASE_TYPES[kinds.pop()], choices=choices, enum=enum)
 
 
-def possible(value: ValueType) -> tuple[Any, ...]:
-    """Some values of a type, of which a random one is the result."""
+def sample_values(value: ValueType) -> tuple[Any, ...]:
+    """Return some values of a type, as candidates for random results."""
     if value.is_list:
-        some = possible(ValueType(value.base, choices=value.choices))
+        some = sample_values(ValueType(value.base, choices=value.choices))
         return [some[0]], [], [some[0], some[-1]]
     if value.base is None:
         return (None,)
-    return value.choices or SAMPLE_VALUES[value.base]
+    return value.choices or SCALAR_SAMPLES[value.base]
 
 
-SAMPLE_VALUES: Mapping[Base, tuple[Scalar, ...]] = {
+SCALAR_SAMPLES: Mapping[Base, tuple[Scalar, ...]] = {
     "bool": (True, False),
     "int": (1, 0, 2, 10),
     "float": (1.0, 0.0, 0.5, 100.0),
@@ -145,7 +141,7 @@ SAMPLE_VALUES: Mapping[Base, tuple[Scalar, ...]] = {
 
 
 def written_call(name: str, arguments: Sequence[object]) -> str:
-    """A call as a program writes it, such as `open_door("glass door")`."""
+    """Write a call in Python, such as `open_door("glass door")`."""
     return f"{name}({', '.join(map(_written, arguments))})"
 
 
@@ -156,9 +152,9 @@ def _written(value: object) -> str:
 
 
 def as_text(value: object) -> str:
-    """An argument as events and rules have it: `3`, `0.5`, `red`, `true`, `cup, plate`."""
+    """Write an argument for events and rules: `3`, `0.5`, `red`, `true`, `cup, plate`."""
     if isinstance(value, list | tuple):
         return ", ".join(map(as_text, value))
     if isinstance(value, float) and value.is_integer():
-        return f"{value:.0f}" if value else "0"  # which has a sign
+        return f"{value:.0f}" if value else "0"  # without the sign of -0.0
     return str(value).lower() if isinstance(value, bool) else str(value)

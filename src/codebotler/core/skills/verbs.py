@@ -1,4 +1,4 @@
-"""Skills in English: a verb in its forms, and what follows it."""
+"""English verbs for skills, in several forms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ IRREGULAR_VERBS = """
     wear/wore wind/wound write/wrote
 """
 PAST: Mapping[str, str] = dict(re.findall(r"(\w+)/(\w+)", IRREGULAR_VERBS))
-"""The past of irregular verbs that robots may need."""
+"""The past forms of irregular verbs that robots may need."""
 
 STRESSED_AT_THE_END = frozenset(
     {
@@ -34,18 +34,18 @@ VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
 
 @dataclass(frozen=True)
 class Verb:
-    """A skill in English; the event's text follows it, or fills in `object`."""
+    """The verb of a skill; the event's text follows it or fills in `object`."""
 
     base: str  # `pick up`
     third: str  # `picks up`
     past: str  # `picked up`
     ing: str  # `picking up`
-    alone: str = ""  # `picked something up`, where no object follows
-    results: tuple[str, str] = ("no", "yes")  # what False and True mean
-    object: str = ""  # `{} ml of {} into {}`, if what follows is more than one text
+    alone: str = ""  # `picked something up`, without an object
+    results: tuple[str, str] = ("no", "yes")  # the meanings of False and True
+    object: str = ""  # `{} ml of {} into {}`, for several texts
 
     def with_object(self, form: str, arguments: Sequence[str], quote: str = '"') -> str:
-        """A form of the verb with what it is done to, in quotes where there are no words around it."""
+        """Return a form of the verb with its objects, which are quoted unless words surround them."""
         if not self.object:
             return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
         missing = ["something"] * (self.object.count("{") - len(arguments))
@@ -53,10 +53,10 @@ class Verb:
 
 
 def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], past: str = "") -> Verb:
-    """The verb that a template such as `open {door}` declares.
+    """Return the verb that a template such as `open {door}` declares.
 
     Raises:
-        ValueError: the template names what is no parameter, or has no verb.
+        ValueError: the template has no verb, or braces around anything but a parameter.
     """
     head, _, rest = template.strip().partition(" ")
     head = head.lower()
@@ -64,9 +64,9 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
         raise ValueError(f'the verb "{template}" must begin with a verb such as "open"')
     for name in PARAMETER.findall(template):
         if name not in parameters:
-            raise ValueError(f'the verb "{template}" names {{{name}}}, which is no parameter')
+            raise ValueError(f'the verb "{template}" names {{{name}}}, which is not a parameter')
     if set("{}") & set(PARAMETER.sub("", template)):
-        raise ValueError(f'the verb "{template}" has a brace that is no parameter in braces')
+        raise ValueError(f'the verb "{template}" may have braces around parameters only')
     fixed, brace, _ = rest.partition("{")
     particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
     if rest and not brace:
@@ -103,6 +103,6 @@ def _ing(verb: str) -> str:
 
 
 def _doubled(verb: str) -> str:
-    """A verb as it is before `ed` and `ing`: after a short, stressed vowel its consonant is doubled."""
+    """Return the stem before `ed` and `ing`, with a doubled consonant after a short, stressed vowel."""
     is_short = re.fullmatch(r"(?:[^aeiou]*|.*qu)[aeiou][^aeiouwxy]", verb) is not None
     return verb + verb[-1] if is_short or verb in STRESSED_AT_THE_END else verb

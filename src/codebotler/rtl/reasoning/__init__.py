@@ -1,7 +1,7 @@
-"""Reasoning about formulas: can they hold together, does one follow from others, do two mean the same?
+"""Decide whether formulas are satisfiable, equivalent or implied by others.
 
-Each function about formulas answers one question, and raises `Undecided` if that would take too long. A
-`Reasoner` answers several, also for the rooms of one world; `satisfiability.py` is the search behind all.
+Each function answers one question, and raises `Undecided` if that would take too long. A `Reasoner` answers
+several, also for the rooms of one world; `satisfiability.py` has the search.
 """
 
 from __future__ import annotations
@@ -31,22 +31,17 @@ def is_satisfiable(*formulas: Formula) -> bool:
 
 
 def satisfying_trace(*formulas: Formula) -> Trace | None:
-    """A shortest trace that satisfies all formulas, or None if they contradict each other."""
+    """Return a shortest trace that satisfies all formulas; None if they contradict each other."""
     return Reasoner(formulas).trace(formulas, shortest=True)
 
 
 def conflict(*formulas: Formula) -> list[Formula] | None:
-    """Formulas that contradict each other, none of which can be left out, or None if all can hold."""
+    """Return a minimal subset of contradictory formulas; None if all can hold."""
     return Reasoner(formulas).conflict(formulas)
 
 
 def is_implied(formula: Formula, *premises: Formula) -> bool:
-    """Whether a formula holds on every trace on which the premises hold.
-
-    Args:
-        formula: the conclusion.
-        premises: the formulas it may follow from; without any, it must hold on every trace.
-    """
+    """Whether a formula holds on every trace on which all premises hold."""
     return Reasoner([formula, *premises]).trace([*premises, Not(formula)]) is None
 
 
@@ -56,7 +51,7 @@ def are_equivalent(one: Formula, other: Formula) -> bool:
 
 
 def distinguishing_trace(one: Formula, other: Formula) -> Trace | None:
-    """A shortest trace on which only one of two formulas holds, or None if they are equivalent."""
+    """Return a shortest trace on which only one of two formulas holds; None if they are equivalent."""
     reasoner = Reasoner([one, other])
     found = (reasoner.trace([a, Not(b)], shortest=True) for a, b in ((one, other), (other, one)))
     return min((trace for trace in found if trace is not None), key=len, default=None)

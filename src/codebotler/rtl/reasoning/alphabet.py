@@ -1,22 +1,31 @@
-"""Reduces all possible events to a finite set: one for each way in which formulas can tell them apart."""
+"""Reduce all possible events to a finite set that formulas can distinguish."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
-from typing import Any, overload
 
 from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Event, Option
-from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
+from codebotler.rtl.formulas import (
+    ActAtFirst,
+    ActAtSome,
+    And,
+    EventPattern,
+    Formula,
+    Not,
+    Or,
+    Regex,
+    TextPattern,
+)
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.rtl.semantics import is_match
 
-ANY_TEXT = Regex("")
+_MATCH_ANY = Regex("")
 
 
 def elements(formula: Formula) -> Iterator[EventPattern]:
-    """All elements of a formula in the order of its text, and the moves that bound its stays."""
+    """Yield all event patterns of a formula in order, and those of the moves that bound its stays."""
     match formula:
         case And(parts) | Or(parts):
             for part in parts:
@@ -35,25 +44,27 @@ def alphabet(
     rooms: Sequence[str] | None = None,
     moves: Sequence[str] | None = None,
 ) -> list[Event]:
-    """Events that match elements in all combinations for which strings were found, one for each of these.
+    """Return an event for each combination of matching patterns for which strings were found.
 
     Args:
-        wanted: the elements.
-        rooms: where events happen; by default in rooms of any names. If there are some, each has events.
-        moves: the requests to move; by default any texts. If there are some, each has events.
+        wanted: the patterns.
+        rooms: rooms that all get events; by default rooms of any names.
+        moves: requests to move that all get events; by default any texts.
     """
     kinds: dict[str, list[EventPattern]] = {}
     for element in dict.fromkeys(wanted):
         kinds.setdefault(element.kind, []).append(element)
     places = _places([element for alike in kinds.values() for element in alike], rooms)
-    held = _texts([element.holding for alike in kinds.values() for element in alike], nothing="")
+    held = _held([element.holding for alike in kinds.values() for element in alike])
     events: list[Event] = []
     for kind, alike in kinds.items():
         moves_by = moves if kind == GOTO else None
         aspects = [
             [
                 Event(kind, text, options, more=more)
-                for text in (_requests(alike) if moves_by is None else moves_by)
+                for text in (
+                    moves_by if moves_by is not None else distinct_strings(_distinct(e.text for e in alike))
+                )
                 for more in _more(alike)
                 for options in _options(alike)
             ],
@@ -69,7 +80,9 @@ def alphabet(
             [
                 Event(kind, "", holding=holding, to=to)
                 for holding in (held if any(e.holding for e in alike) else [""])
-                for to in _texts([e.to for e in alike])[any(e.to for e in alike) :]  # each has somebody
+                for to in _texts([e.to for e in alike])[
+                    any(e.to for e in alike) :
+                ]  # every question has an addressee
             ],
         ]
         events += _distinct_events(alike, aspects, by_room=rooms is not None, by_text=moves_by is not None)
@@ -77,24 +90,24 @@ def alphabet(
 
 
 def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
-    """The elements that say of one aspect each what an element says: it matches where all of these do."""
+    """Split a pattern into patterns for one aspect each, whose conjunction it is."""
     kind = element.kind
     return (
         EventPattern(
             kind, element.text, element.options, element.mention, more=element.more, offers=element.offers
         ),
-        EventPattern(kind, ANY_TEXT, answer=element.answer, found=element.found),
-        EventPattern(kind, ANY_TEXT, place=element.place),
-        EventPattern(kind, ANY_TEXT, holding=element.holding, to=element.to),
+        EventPattern(kind, _MATCH_ANY, answer=element.answer, found=element.found),
+        EventPattern(kind, _MATCH_ANY, place=element.place),
+        EventPattern(kind, _MATCH_ANY, holding=element.holding, to=element.to),
     )
 
 
 def _distinct_events(
     alike: Sequence[EventPattern], aspects: Sequence[Sequence[Event]], *, by_room: bool, by_text: bool
 ) -> Iterable[Event]:
-    """Of all events that can be made of some aspects, the first for each set of elements that it matches.
+    """Combine aspects to events, and keep the first for each set of matching patterns.
 
-    There can be hundreds of thousands, so that bits for the elements that match its aspects identify each.
+    Bit masks of the patterns identify the sets, since there may be hundreds of thousands of combinations.
     """
     patterns = zip(*map(aspects_of, alike), strict=True)
     matched = [
@@ -116,50 +129,41 @@ def _distinct_events(
     return distinct.values()
 
 
-def _distinct(texts: Iterable[Text | None]) -> tuple[Text, ...]:
+def _distinct(texts: Iterable[TextPattern | None]) -> tuple[TextPattern, ...]:
     return tuple(dict.fromkeys(text for text in texts if text is not None))
 
 
 def _places(wanted: Sequence[EventPattern], rooms: Sequence[str] | None) -> Sequence[str]:
-    """Rooms that match the elements' places in all combinations; an empty name if no element has a place."""
+    """Return rooms that match places in all combinations; an empty name if no pattern has a place."""
     regexes = _distinct(Regex(e.place_regex.pattern) for e in wanted if e.place_regex is not None)
     if not regexes:
         return [""]
     return distinct_strings(regexes) if rooms is None else rooms
 
 
-def _requests(alike: Sequence[EventPattern]) -> Sequence[str]:
-    return distinct_strings(_distinct(element.text for element in alike))
-
-
 def _more(alike: Sequence[EventPattern]) -> Iterable[tuple[str, ...]]:
-    """Further arguments that match in all combinations; none where no element has any."""
     most = max(len(element.more) for element in alike)
     wanted = ([e.more[at] for e in alike if len(e.more) > at] for at in range(most))
     return product(*(distinct_strings(_distinct(texts), outer=True) for texts in wanted))
 
 
-@overload
-def _texts(wanted: Sequence[Text | None]) -> list[str | None]: ...
-@overload
-def _texts(wanted: Sequence[Text | None], nothing: str) -> list[str]: ...
-def _texts(wanted: Sequence[Text | None], nothing: str | None = None) -> list[Any]:
-    """Texts that match in all combinations, with a placeholder for a missing text."""
+def _texts(wanted: Sequence[TextPattern | None]) -> list[str | None]:
     texts = _distinct(wanted)
-    strings = distinct_strings(texts, outer=True) if texts else ()
-    if nothing == "":  # the placeholder for a missing text, so that an empty text needs another spelling
-        strings = tuple(string or "x" for string in strings if string or _is_as_empty("x", texts))
-    return [*dict.fromkeys([nothing, *strings])]
+    return [None, *(distinct_strings(texts, outer=True) if texts else ())]
 
 
-def _is_as_empty(string: str, texts: Sequence[Text]) -> bool:
-    return all(text.matches(string) == text.matches("") for text in texts)
+def _held(wanted: Sequence[TextPattern | None]) -> list[str]:
+    """Return things that match in all combinations; an empty text means that the robot holds nothing."""
+    texts = _distinct(wanted)
+    x_is_like_empty = all(text.matches("x") == text.matches("") for text in texts)
+    strings = (string or "x" for string in _texts(texts)[1:] if string or x_is_like_empty)
+    return [*dict.fromkeys(["", *strings])]
 
 
 def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
-    """Options that match in all combinations, and so many of them; one may match what another cannot."""
+    """Yield options that match in all combinations, and in all required numbers."""
     texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
-    found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
+    found: dict[frozenset[TextPattern], tuple[Option, ...]] = {frozenset(): ()}
     other: tuple[Option, ...] = ()
     for string in distinct_strings(texts, outer=True):
         matched = frozenset(text for text in texts if text.matches(string))

@@ -1,4 +1,4 @@
-"""Formulas as finite automata over the letters of an alphabet."""
+"""Convert formulas to finite automata over the letters of an alphabet."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from typing import Any, NamedTuple, TypeAlias, assert_never
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl import formulas
 
-MOST_STATES = 1_000
-"""States that an automaton may have before it is minimized."""
+MAX_STATES = 1_000  # of an automaton before it is minimized
 
 AutomatonState: TypeAlias = Hashable
 Letter: TypeAlias = frozenset[formulas.EventPattern]
-"""The elements of a formula that match an event."""
+"""The patterns of a formula that match an event."""
 
 
-class Undecided(Exception):  # noqa: N818 - no mistake of the caller
+class Undecided(Exception):  # noqa: N818 - not a mistake of the caller
     """The answer to a question would take too long to find."""
 
 
@@ -26,13 +25,13 @@ class Undecided(Exception):  # noqa: N818 - no mistake of the caller
 class Automaton:
     """The smallest deterministic automaton of a formula; it starts in state 0."""
 
-    rows: tuple[tuple[int, ...], ...]  # for each state, where each letter leads
-    accepts: tuple[bool, ...]  # for each state, whether the formula holds if the trace ends there
+    rows: tuple[tuple[int, ...], ...]  # for each state, the next state for each letter
+    accepts: tuple[bool, ...]  # for each state, whether the formula holds there
 
     @classmethod
-    @lru_cache(maxsize=1_000)  # worlds of a task have most requirements in common
+    @lru_cache(maxsize=1_000)  # worlds of a task share most requirements
     def of(cls, formula: formulas.Formula, letters: tuple[Letter, ...]) -> Automaton:
-        """The automaton of a formula, reading these letters."""
+        """Return the automaton of a formula over these letters."""
         machine = machine_of(formula)
         number: dict[AutomatonState, int] = {machine.start: 0}
         rows: list[list[int]] = []
@@ -42,7 +41,7 @@ class Automaton:
             states += [one for one in dict.fromkeys(after) if one not in number]
             number.update((one, index) for index, one in enumerate(states[len(number) :], len(number)))
             rows.append([number[one] for one in after])
-            if len(states) > MOST_STATES:
+            if len(states) > MAX_STATES:
                 raise Undecided
         return cls._smallest(rows, [machine.accepts(state) for state in states])
 
@@ -62,7 +61,7 @@ class Automaton:
 
     @cached_property
     def always(self) -> Automaton:
-        """The automaton of the traces on all of whose prefixes the formula holds."""
+        """The automaton of traces on all of whose prefixes the formula holds."""
         rows = tuple(
             row if accepted else (state,) * len(row)
             for state, (row, accepted) in enumerate(zip(self.rows, self.accepts, strict=True))
@@ -71,7 +70,7 @@ class Automaton:
 
     @cached_property
     def distances(self) -> tuple[int | None, ...]:
-        """For each state, the fewest events to an accepting one; None if there is no way to one."""
+        """For each state, the least number of events to an accepting one; None if there is none."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
         distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
         while border:
@@ -91,7 +90,7 @@ class Machine(NamedTuple):
 
 
 def machine_of(formula: formulas.Formula) -> Machine:
-    """The automaton of a formula, whose states are found as they are needed."""
+    """Return the automaton of a formula with lazily computed states."""
     match formula:
         case formulas.And(parts) | formulas.Or(parts):
             return _together([*map(machine_of, parts)], all if isinstance(formula, formulas.And) else any)
@@ -150,34 +149,20 @@ def _during_stays(test: formulas.ActAtSome) -> Machine:
 
 
 def _within(scope: formulas.Scope, inner: Machine) -> Machine:
-    """The machine that lets an inner one read only the events in a scope.
-
-    Its state is whether the event has come, and the inner state.
-    """
+    """Restrict a machine to the events in a scope; the state is (bound seen, inner state)."""
     at, (start, step, accepts) = scope.element, inner
-    match scope.name.removeprefix("Only"):
-        case "BeforeFirst":
+    which = scope.name.removeprefix("Only")
+    if which == "BeforeLast":
+        return _before_last(scope, inner)
 
-            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - as in Machine
-                came, here = state
-                return (True, here) if came or at in letter else (False, step(here, letter))
+    def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - as in Machine
+        came, here = state
+        if which == "BeforeFirst":
+            return (True, here) if came or at in letter else (False, step(here, letter))
+        begins = at in letter and not (came and which == "AfterFirst")
+        return (True, start) if begins else (came, step(here, letter))
 
-        case "AfterFirst":
-
-            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - of whichever part it is
-                came, here = state
-                return (True, start) if not came and at in letter else (came, step(here, letter))
-
-        case "AfterLast":
-
-            def read(state: Any, letter: Letter) -> AutomatonState:  # noqa: ANN401 - of whichever part it is
-                came, here = state
-                return (True, start) if at in letter else (came, step(here, letter))
-
-        case _:
-            return _before_last(scope, inner)
-
-    def accepted(state: Any) -> bool:  # noqa: ANN401 - of whichever part it is
+    def accepted(state: Any) -> bool:  # noqa: ANN401 - as in Machine
         came, here = state
         return accepts(start if scope.is_only and not came else here)
 
@@ -185,7 +170,7 @@ def _within(scope: formulas.Scope, inner: Machine) -> Machine:
 
 
 def _before_last(scope: formulas.Scope, inner: Machine) -> Machine:
-    """The same for what is before the last event: the inner state, and what it was when that last came."""
+    """Restrict a machine to the events before a last one; the state has a copy from the last bound."""
     at, (start, step, accepts) = scope.element, inner
     nothing = (start,) if scope.is_only else ()
     return Machine(

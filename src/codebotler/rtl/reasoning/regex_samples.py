@@ -1,4 +1,4 @@
-"""Sample strings of one regex, spelled out from the syntax tree that Python parses it into."""
+"""Generate sample strings of a regex from Python's syntax tree."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _MOST_SPELLED = 16
 _LONGEST = 10_000
 
 
-def failing(pattern: str) -> re.Pattern[str]:
-    """A regex that tries all that another one tries, needs no repeat twice, and is never found."""
+def failing_regex(pattern: str) -> re.Pattern[str]:
+    """Compile a variant of a regex that never matches, so that a search tries every way."""
     tree = parse_tree(pattern)
     _loosen(tree)
     tree.append(parse_tree("(?!)")[0])
@@ -36,7 +36,7 @@ def _loosen(tree: Tree) -> None:
 
 
 def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Python's parser made them
-    """The trees directly inside one node."""
+    """Return the trees directly inside a node."""
     match op:
         case "BRANCH":
             return list(arguments[1])
@@ -51,8 +51,8 @@ def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Pyt
 
 @cache
 def samples(pattern: str) -> tuple[str, ...]:
-    """Up to four strings in which a regex is found, if possible without outer spaces; may be empty."""
-    words = _spelled_in_all_ways(parse_tree(pattern))
+    """Return up to four strings in which a regex is found, if possible without outer spaces."""
+    words = _spell_in_all_ways(parse_tree(pattern))
     forms = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in words]
     tries = (map(str.strip, forms), forms, _guesses(pattern))
     found = (dict.fromkeys(filter(Regex(pattern).matches, several)) for several in tries)
@@ -60,36 +60,35 @@ def samples(pattern: str) -> tuple[str, ...]:
 
 
 def counter_samples(pattern: str) -> list[str]:
-    """Strings from the negative lookaheads of a regex, which keep it from being found."""
+    """Return strings from the negative lookaheads of a regex, which prevent a match."""
     denied = (arguments[-1] for op, arguments in parse_tree(pattern) if str(op) == "ASSERT_NOT")
-    words = (word.strip() for tree in denied for word in _spelled_in_all_ways(tree)[:_MOST_SPELLED])
+    words = (word.strip() for tree in denied for word in _spell_in_all_ways(tree)[:_MOST_SPELLED])
     return [*dict.fromkeys(filter(None, words))]
 
 
 def _guesses(pattern: str) -> Iterator[str]:
-    """Short random strings of the characters in a regex."""
     random, letters = Random(pattern), f"{pattern}x1 "  # noqa: S311 - no secret
     return ("".join(random.choices(letters, k=random.randint(0, 8))).strip() for _ in range(3_000))
 
 
-def _spelled_in_all_ways(tree: Tree) -> list[str]:
-    """Spelled without gaps, with gaps, and with gaps and lookaheads last."""
+def _spell_in_all_ways(tree: Tree) -> list[str]:
+    """Spell out a tree without gaps, with gaps, and with gaps and lookaheads last."""
     behind = sorted(tree, key=lambda node: str(node[0]) == "ASSERT")
-    ways = zip_longest(spelled(tree), spelled(tree, " "), spelled(behind, " "))
+    ways = zip_longest(spell_out(tree), spell_out(tree, " "), spell_out(behind, " "))
     return [*dict.fromkeys(text for text in chain.from_iterable(ways) if text is not None)]
 
 
-def spelled(tree: Tree, gap: str = "") -> list[str]:
-    """Some strings that a tree matches, with a gap wherever it allows any character."""
+def spell_out(tree: Tree, gap: str = "") -> list[str]:
+    """Return some strings that a tree matches, with a gap wherever it allows any character."""
     texts = [""]
     for op, arguments in tree:
-        parts = _spelled_node(op, arguments, gap)
+        parts = _spell_node(op, arguments, gap)
         texts = [*dict.fromkeys(text + part for part in parts for text in texts)][:_MOST_SPELLED]
     return texts
 
 
-def _spelled_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
-    inner = [spelled(tree, gap) for tree in inner_trees(str(op), arguments)]
+def _spell_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
+    inner = [spell_out(tree, gap) for tree in inner_trees(str(op), arguments)]
     match str(op):
         case "LITERAL":
             return [chr(arguments)]
@@ -109,7 +108,7 @@ def _spelled_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: A
 
 
 def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
-    """Some characters of a set, those that it names first; a single one if it holds nearly all."""
+    """Return some characters of a set, literal ones first; one if the set has nearly all."""
     parser = import_module("re._parser")
     one = import_module("re._compiler").compile(
         parser.SubPattern(parser.State(), [(op, arguments)]), PATTERN_FLAGS

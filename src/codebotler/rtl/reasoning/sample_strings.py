@@ -1,7 +1,6 @@
-"""Strings that match some of the regexes in formulas but not the others.
+"""Generate strings that match some regexes of formulas but not others.
 
-They are put together from samples of the texts' regexes, and each is tried. A combination for which none was
-found may still have one.
+Samples of the regexes are combined and tried, so a combination without a result may still be possible.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from itertools import chain, combinations, islice, permutations, product
 
-from codebotler.rtl.formulas import Regex, Text, Without, Words
+from codebotler.rtl.formulas import Regex, TextPattern, Without, Words
 from codebotler.rtl.reasoning.regex_samples import counter_samples, samples
 from codebotler.rtl.text.claims import Claim, Number, Time
 
@@ -20,10 +19,10 @@ _MOST_ALIKE = 2
 
 
 @cache
-def distinct_strings(texts: tuple[Text, ...], *, outer: bool = False) -> tuple[str, ...]:
-    """A short string for each combination of texts that some candidate matches.
+def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> tuple[str, ...]:
+    """Return a short string for each combination of patterns that a candidate matches.
 
-    `outer` allows spaces at the ends, which options may have and texts of events may not.
+    `outer` allows outer spaces, which options may have and texts of events may not.
     """
     found: dict[tuple[bool, ...], str] = {}
     for candidate in _candidates(texts, outer=outer):
@@ -32,13 +31,13 @@ def distinct_strings(texts: tuple[Text, ...], *, outer: bool = False) -> tuple[s
 
 
 @cache
-def can_match(text: Text, *, outer: bool = False) -> bool:
-    """Whether a string was found that matches a text."""
+def can_match(text: TextPattern, *, outer: bool = False) -> bool:
+    """Whether some candidate matches a pattern."""
     return any(map(text.matches, _candidates((text,), outer=outer)))
 
 
-def patterns(text: Text) -> Iterator[str]:
-    """The regexes in a text of a formula."""
+def patterns(text: TextPattern) -> Iterator[str]:
+    """Yield the regexes in a text pattern."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(patterns, parts))
@@ -51,7 +50,7 @@ def patterns(text: Text) -> Iterator[str]:
 
 
 @cache
-def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
+def _candidates(texts: tuple[TextPattern, ...], *, outer: bool) -> tuple[str, ...]:
     regexes = dict.fromkeys(chain.from_iterable(map(patterns, texts)))
     groups = [[*group] for one in regexes for group in (samples(one), counter_samples(one)) if group]
     words = [*dict.fromkeys([*chain.from_iterable(groups), *chain.from_iterable(map(_claims, texts))])]
@@ -61,16 +60,16 @@ def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
         words,
         (f"x{word}x" for word in whole),
         (form for word in whole for form in (f"x {word}", f"{word} x")),
-        _pairs(_told_apart(whole, texts)),
+        _pairs(_distinguishable(whole, texts)),
         _subsets([group[0] for group in groups]),
-        *(_joined(text.parts) for text in texts if isinstance(text, Words)),
+        *(_join_parts(text.parts) for text in texts if isinstance(text, Words)),
         (form for word in words for form in (f" {word}", f"{word} ", f" {word} ")),
     )
     return tuple(dict.fromkeys(text for text in every if outer or text == text.strip()))
 
 
-def _claims(text: Text) -> Iterator[str]:
-    """Strings that make the claim a text asks for, or a different one."""
+def _claims(text: TextPattern) -> Iterator[str]:
+    """Yield strings with the claim of a pattern or a different one."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(_claims, parts))
@@ -84,8 +83,8 @@ def _claims(text: Text) -> Iterator[str]:
             return
 
 
-def _told_apart(words: Iterable[str], texts: Sequence[Text]) -> list[str]:
-    """The first two of any words that the texts, their parts and their regexes do not tell apart."""
+def _distinguishable(words: Iterable[str], texts: Sequence[TextPattern]) -> list[str]:
+    """Keep the first two of all words that the patterns, their parts and regexes do not distinguish."""
     parts = chain.from_iterable(text.parts if isinstance(text, Words) else (text,) for text in texts)
     wanted = [*dict.fromkeys([*parts, *(Regex(pattern) for text in texts for pattern in patterns(text))])]
     alike: defaultdict[tuple[bool, ...], list[str]] = defaultdict(list)
@@ -99,13 +98,12 @@ def _pairs(words: Sequence[str]) -> Iterator[str]:
 
 
 def _subsets(words: Sequence[str]) -> Iterator[str]:
-    """All choices of three or more words, the largest first, forwards and backwards."""
+    """Yield all subsets of three or more words, the largest first, forwards and backwards."""
     subsets = chain.from_iterable(combinations(words, size) for size in range(len(words), 2, -1))
     return (" ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1]))
 
 
-def _joined(parts: Sequence[Text]) -> Iterator[str]:
-    """Samples of all parts, in several orders."""
+def _join_parts(parts: Sequence[TextPattern]) -> Iterator[str]:
     groups = [
         [word for pattern in patterns(part) for word in samples(pattern)] or [""]
         for part in parts

@@ -1,8 +1,8 @@
-"""The search for a trace on which formulas hold.
+"""Search for a trace on which formulas hold.
 
-Each formula becomes an automaton, and the product of the automata is searched completely. So "there is none"
-is a proof for all sequences, of any length, of events of the alphabet. The only gap is a text that meets
-other conditions together than any in the alphabet does. Options that are not text are left out.
+The search covers the product of the formulas' automata, so "none" is a proof for all sequences of events of
+the alphabet. The only gap is a text that satisfies a combination of conditions which no text of the alphabet
+does. Options that are not texts are ignored.
 """
 
 from __future__ import annotations
@@ -18,22 +18,21 @@ from codebotler.core.trace import Event, Trace
 from codebotler.rtl.formulas import Formula, Not
 from codebotler.rtl.reasoning.alphabet import alphabet, elements
 from codebotler.rtl.reasoning.automaton import Automaton, Undecided
-from codebotler.rtl.semantics import holds, matches
+from codebotler.rtl.semantics import holds, is_match
 
-MOST_VISITED = 20_000
-"""States of the product that a search visits before it gives up."""
+MAX_VISITED_STATES = 20_000  # of the product in one search
 
 Reading: TypeAlias = tuple[Automaton, list[int]]
-"""An automaton, and for each event of the alphabet the letter that it reads."""
+"""An automaton, and its letter for each event of the alphabet."""
 
 
 class Reasoner:
-    """What formulas allow a robot to do, anywhere or in the rooms of one world.
+    """Answers questions about formulas, for a robot anywhere or in the rooms of one world.
 
     Args:
-        formulas: all that will be asked about; the alphabet is made from their regexes.
-        moves: the room that each request to move leads to; by default any text may lead anywhere.
-        start: the room in which the robot starts; it counts only with `moves`.
+        formulas: all formulas of later questions, whose regexes determine the alphabet.
+        moves: the room for each request to move; by default any text may lead anywhere.
+        start: the robot's first room; only with `moves`.
     """
 
     def __init__(
@@ -46,7 +45,7 @@ class Reasoner:
             events += [Event(GOTO, move) for move in moves]
         distinct: dict[tuple[object, ...], tuple[list[bool], Event]] = {}
         for event in events:
-            row = [matches(element, (event,), 0) for element in wanted]
+            row = [is_match(element, event, 0) for element in wanted]
             where = () if moves is None else (event.place, event.text if event.kind == GOTO else "")
             distinct.setdefault((*row, *where), (row, event))
         rows, self.events = [row for row, _ in distinct.values()], [event for _, event in distinct.values()]
@@ -54,21 +53,19 @@ class Reasoner:
         self._readings: dict[Formula, Reading] = {}
         self._driving: Reading | None = None
         if moves is not None and rooms is not None and any(element.place is not None for element in wanted):
-            self._driving = _driving(self.events, rooms, moves)
+            self._driving = _driving_automaton(self.events, rooms, moves)
 
     def conflict(self, formulas: Sequence[Formula], denied: Formula | None = None) -> list[Formula] | None:
-        """The formulas that contradict each other, in their order, or None if all can hold.
-
-        None of them can be left out.
+        """Return a minimal subset of contradictory formulas, in order; None if all can hold.
 
         Args:
-            formulas: what should hold.
-            denied: what should fail at the same time; formulas that contradict this imply it.
+            formulas: the formulas that should hold.
+            denied: a formula that should fail; formulas that contradict this imply it.
 
         Raises:
             Undecided: the search would take too long.
         """
-        # Starting with no formula and adding one that the last trace breaks keeps the proofs small.
+        # Adding only formulas that the last trace breaks keeps the proofs small.
         given = [] if denied is None else [Not(denied)]
         wanted = {element for one in given for element in elements(one)}
         nearest = sorted(formulas, key=lambda one: -len(wanted.intersection(elements(one))))
@@ -87,12 +84,12 @@ class Reasoner:
     def trace(
         self, formulas: Iterable[Formula], *, always: Iterable[Formula] = (), shortest: bool = False
     ) -> Trace | None:
-        """A trace of events of the alphabet on which formulas hold, or None if there is none.
+        """Return a trace of events of the alphabet on which formulas hold; None if there is none.
 
         Args:
-            formulas: what must hold.
-            always: what must hold on every prefix as well.
-            shortest: whether it must be one of the shortest, which takes longer to find.
+            formulas: the formulas that must hold.
+            always: formulas that must hold on every prefix.
+            shortest: whether the trace must have minimal length, which takes longer.
 
         Raises:
             Undecided: the search would take too long.
@@ -101,7 +98,7 @@ class Reasoner:
         readings += [(machine.always, read) for machine, read in map(self._reading, always)]
         if self._driving is not None:
             readings.append(self._driving)
-        letters: dict[States, Event] = {}  # of events that no automaton tells apart, the first
+        letters: dict[States, Event] = {}  # the first of the events that no automaton distinguishes
         for event, *of_event in zip(self.events, *(numbers for _, numbers in readings), strict=True):
             letters.setdefault(tuple(of_event), event)
         return _search([automaton for automaton, _ in readings], letters, shortest=shortest)
@@ -117,8 +114,8 @@ class Reasoner:
         return self._readings[formula]
 
 
-def _driving(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
-    """The automaton of the traces in which each event happens where the robot is."""
+def _driving_automaton(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
+    """Return the automaton of traces in which each event happens where the robot is."""
     lost = len(rooms)
     kinds = [(event.text if event.kind == GOTO else "", event.place) for event in events]
     number = {kind: index for index, kind in enumerate(dict.fromkeys(kinds))}
@@ -144,7 +141,7 @@ States: TypeAlias = tuple[int, ...]
 def _search(
     automata: Sequence[Automaton], letters: Mapping[States, Event], *, shortest: bool
 ) -> Trace | None:
-    """A trace that all automata accept, found greedily, or a shortest one, found by A*."""
+    """Return a trace that all automata accept, by greedy search, or a shortest one, by A*."""
     tables = [automaton.rows for automaton in automata]
     distances = [automaton.distances for automaton in automata]
     start = (0,) * len(automata)
@@ -155,7 +152,7 @@ def _search(
     while heap:
         _, _, state = heapq.heappop(heap)
         if not any(map(getitem, distances, state)):
-            return tuple(reversed([*_back(state, came)]))
+            return tuple(reversed([*_path_back(state, came)]))
         steps = came[state][0] + 1
         here = [*map(getitem, tables, state)]
         for letter, event in letters.items():
@@ -167,12 +164,12 @@ def _search(
             if None not in far:
                 left = [each or 0 for each in far]
                 heapq.heappush(heap, (steps + max(left) if shortest else sum(left), next(order), after))
-        if len(came) > MOST_VISITED:
+        if len(came) > MAX_VISITED_STATES:
             raise Undecided
     return None
 
 
-def _back(state: States, came: Mapping[States, tuple[int, States, Event | None]]) -> Iterator[Event]:
+def _path_back(state: States, came: Mapping[States, tuple[int, States, Event | None]]) -> Iterator[Event]:
     _, before, event = came[state]
     while event is not None:
         yield event

@@ -1,4 +1,4 @@
-"""What a text in plain English claims: numbers of things, times of day, and what it affirms or denies.
+"""Find claims in plain English: numbers of things, times of day, affirmations and denials.
 
-Start with `claims.py`: the texts of formulas that use the other modules.
+Start with `claims.py`, the patterns of formulas that use the other modules.
 """

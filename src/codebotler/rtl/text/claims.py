@@ -1,4 +1,4 @@
-"""Matchers for what a sentence claims: a count, a time of day, yes or no."""
+"""Text patterns for claims: a number, a time of day, an affirmation or a denial."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from codebotler.rtl.text.times import TimeOfDay, times_in
 
 @dataclass(frozen=True)
 class Number(Matcher):
-    """A text that gives a number of a thing, and no other number of it.
+    """Matches texts that give a number of a thing, and no other number of it.
 
     Args:
-        number: how many.
-        thing: a regex for the thing, found as a whole word, in the singular or the plural.
-        others: regexes for other things, whose numbers do not count.
-        other: whether the text must give a different number of the thing instead.
+        number: the number.
+        thing: a regex for the thing, as a whole word in the singular or the plural.
+        others: regexes for other things, whose numbers are ignored.
+        other: whether the text must give a different number instead.
     """
 
     number: int
@@ -39,10 +39,10 @@ class Number(Matcher):
         return bool(given) and (given != {self.number}) == self.other
 
     def given(self, text: str) -> frozenset[float]:
-        """All numbers that a text gives of the thing.
+        """Return all numbers that a text gives of the thing.
 
-        In each clause a number belongs to the thing after it, or, where things come first, to the one before
-        it. A text that does not name the thing gives all numbers that belong to no other.
+        A number belongs to the thing after it, or, in clauses that begin with a thing, to the one before it.
+        In a text that does not name the thing, all numbers count that belong to no other thing.
         """
         return _given(self.kinds, text)
 
@@ -56,28 +56,28 @@ class Number(Matcher):
         return f"{head}({', '.join([str(self.number), *map(quote, (self.thing, *self.others))])})"
 
 
-@lru_cache(maxsize=256)  # several checks ask for other numbers of the same thing
+@lru_cache(maxsize=256)  # several formulas compare numbers of the same thing
 def _given(kinds: tuple[re.Pattern[str], ...], text: str) -> frozenset[float]:
     stated = [sentence for sentence in sentences(without_harmless(text)) if not sentence.endswith("?")]
     parts = [[*_marks(clause, kinds)] for sentence in stated for clause in clauses(sentence)]
     if not any(kind == 0 for part in parts for kind, _ in part):
         no_other = (part for part in parts if not any(kind for kind, _ in part))
         return frozenset(n for part in no_other for _, numbers in part for n in numbers)
-    found = frozenset(n for part in parts for n in _paired(part))
-    return found or frozenset(n for sentence in stated for n in _paired([*_marks(sentence, kinds)]))
+    found = frozenset(n for part in parts for n in _numbers_of_thing(part))
+    return found or frozenset(n for sentence in stated for n in _numbers_of_thing([*_marks(sentence, kinds)]))
 
 
-# "2 people in the offices" are no 2 offices.
+# "2 people in the offices" does not mean 2 offices.
 _PLACE = re.compile(
     r"\b(?:(?:in|at|from|across|around) (?:(?:all|the|their|your|my|our|each|every) ){0,2}"
     r"|(?:all|each|every) (?:the )?)$",
     re.IGNORECASE,
 )
-NEAR_CLAIM = 30  # characters before a thing, in which such words are looked for
+_MAX_PLACE_PREFIX = 30  # characters before a thing in which to look for such words
 
 
 def _word(pattern: str) -> re.Pattern[str]:
-    """A regex as a whole word, in the singular or the plural; a sign such as `%` may touch a word."""
+    """Compile a regex for whole words, singular or plural; a sign such as `%` may touch a word."""
     return compile_regex(rf"(?:\b|(?=\W))(?:{scope_flags(pattern)})(?:e?s)?(?:\b|(?<=\W))")
 
 
@@ -86,24 +86,24 @@ Mark = tuple[int | None, tuple[float, ...]]
 
 
 def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
-    """The things and numbers in a text, in order; digits in the name of a thing are no number."""
+    """Yield the things and numbers in a text, in order; ignore digits in names of things."""
     things = [*_things(text, kinds)]
     starts = [start for start, _, _ in things]
     found: list[tuple[int, Mark]] = [(start, (kind, ())) for start, _, kind in things]
     for start, end, numbers in numerals(text):
-        before = bisect_left(starts, end)  # of those that begin before it ends, the last reaches farthest
+        before = bisect_left(starts, end)  # the last of these ends last
         if not before or things[before - 1][1] <= start:
             found.append((start, (None, numbers)))
     yield from (mark for _, mark in sorted(found, key=lambda one: one[0]))
 
 
 def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int, int, int]]:
-    """Start, end and index of each thing that is named; of overlapping names the first, then the longest."""
+    """Yield start, end and index of each thing; of overlapping names, the first, then the longest."""
     named = [
         (match.start(), -match.end(), kind)
         for kind, regex in enumerate(kinds)
         for match in regex.finditer(text)
-        if kind == 0 or not _PLACE.search(text, max(0, match.start() - NEAR_CLAIM), match.start())
+        if kind == 0 or not _PLACE.search(text, max(0, match.start() - _MAX_PLACE_PREFIX), match.start())
     ]
     last_end = -1
     for start, end, kind in sorted(named):
@@ -112,8 +112,8 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
             yield start, -end, kind
 
 
-def _paired(marks: list[Mark]) -> Iterator[float]:
-    """The numbers of the first thing: those before it, or after it if the marks begin with a thing."""
+def _numbers_of_thing(marks: list[Mark]) -> Iterator[float]:
+    """Yield the numbers of the first thing: before it, or after it if the marks begin with a thing."""
     ordered = marks if marks and marks[0][0] is None else marks[::-1]
     numbers: tuple[float, ...] = ()
     for kind, given in ordered:
@@ -126,14 +126,14 @@ def _paired(marks: list[Mark]) -> Iterator[float]:
 
 @dataclass(frozen=True)
 class Time(Matcher):
-    """A text that names times of day, all within a span.
+    """Matches texts that name times of day, all within a span.
 
-    A time that may be in the morning or in the afternoon is taken for the one within the span.
+    An ambiguous time, morning or afternoon, is within the span if one reading is.
 
     Args:
         start: the earliest, such as `11:00`.
         end: the latest.
-        other: whether some time must lie outside the span instead.
+        other: whether some time must be outside the span instead.
     """
 
     start: str
@@ -156,7 +156,7 @@ class Time(Matcher):
 
 
 def minutes(time: str) -> TimeOfDay:
-    """A time such as `11:30` in minutes since midnight; a ValueError if it is none."""
+    """Convert a time such as `11:30` to minutes since midnight; raise ValueError for other texts."""
     match = re.fullmatch(r"(\d\d?):(\d\d)", time)
     if match is None or int(match[1]) > 24 or int(match[2]) > 59:  # noqa: PLR2004 - hours and minutes
         raise ValueError(f'"{time}" is not a time of day such as "11:30"')
@@ -165,11 +165,11 @@ def minutes(time: str) -> TimeOfDay:
 
 @dataclass(frozen=True)
 class Claim(Matcher):
-    """A text in which a clause that affirms, or one that denies, names something.
+    """Matches texts with a clause that affirms, or one that denies, a thing.
 
     Args:
-        pattern: a regex for what is named, found as a whole word.
-        denied: whether it must be a clause that denies.
+        pattern: a regex for the thing, as a whole word.
+        denied: whether the clause must deny.
     """
 
     pattern: str
@@ -191,8 +191,7 @@ class Claim(Matcher):
         return f"{'denies' if self.denied else 'affirms'}({quote(self.pattern)})"
 
 
-@lru_cache(maxsize=1024)  # several checks read the same text, and programs say what others said
+@lru_cache(maxsize=1024)  # several formulas read the same text
 def _polarities(text: str) -> tuple[tuple[str, Polarity], ...]:
-    """The clauses of a text, each with its polarity."""
     parts = [clause for sentence in sentences(text) for clause in clauses(sentence, lists=True)]
     return tuple((clause, polarity(clause)) for clause in complete_clauses(parts))

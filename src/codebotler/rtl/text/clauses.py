@@ -1,4 +1,4 @@
-"""A text divided into sentences, and a sentence into clauses."""
+"""Split a text into sentences, and a sentence into clauses."""
 
 from __future__ import annotations
 
@@ -60,9 +60,9 @@ _NO_SUBJECT = re.compile(
     re.IGNORECASE,
 )
 _SINGULAR = re.compile(r"\b(?:(is|was|has|does)|are|were|have|do)(?:\b|n['\u2019]t)", re.IGNORECASE)
-# After such a word a clause lists nothing: `Bob is in`, `butter is missing`, `Alice has accepted`.
+# A clause that ends with such a word lists nothing: `Bob is in`, `butter is missing`, `Alice has accepted`.
 _STATES = r"(?:there|here|in|out|gone|(?:un)?available|absent|yes|no|not|too|\w+(?:ed|ing))\b"
-NEAR_CLAUSE_END = 40  # characters at the end of a clause, in which such a word is looked for
+_STATE_LENGTH = 40  # characters at the end of a clause in which to look for such a word
 _STATE = re.compile(rf"\b{_STATES}\W*$", re.IGNORECASE)
 _LACK = re.compile(r"\b(?:missing|lacking|absent|unavailable|gone)\b", re.IGNORECASE)
 _UNFINISHED = re.compile(
@@ -78,14 +78,14 @@ _INSTEAD = re.compile(
     r"\b(?:rather than|instead of)\s+((?:(?!(?:and|but|is|are|was|were)\b)\w[\w'\u2019]*\s?){1,3})",
     re.IGNORECASE,
 )
-# "All rooms except room 3 have one": who is excepted has a clause of its own.
+# "All rooms except room 3 have one": the exception becomes a clause of its own.
 _EXCEPT = re.compile(
     r"\b(?P<of>all|every\w*|each|no(?:ne|body|thing| ?one)?)\b(?P<what>[^,.;:]{0,60}?)\W(?:"
     r"(?P<but>but)|except(?: for)?|with the exception of|apart from|other than|besides)\b\s*"
     r"(?P<whom>(?!(?:no|nobody|none|nothing|i|he|she|it|they|we|there)\b)(?:\w[\w']*\s+){0,3}?\w[\w']*)(?P<rest>\s+(?:is|are|was|were|has|have|had|will|would|can|wants?|gave|needs?|lacks?)\b.*|\W*)$",
     re.IGNORECASE,
 )
-# "I looked in room 2, but there was none": the second part tells of the room in the first.
+# "I looked in room 2, but there was none": the second part is about the room in the first.
 _SEARCHED = re.compile(
     r"\b(?:look|search|check|hunt|visit|inspect)\w*\b|\bwas in\b|\b(?:is|was) done\b", re.IGNORECASE
 )
@@ -106,9 +106,9 @@ _QUOTED = re.compile(
 
 
 def sentences(text: str) -> list[str]:
-    """The sentences of a text, questions with their question marks; `4 p.m.` and `1.5` end none.
+    """Return the sentences of a text, questions with their marks; `4 p.m.` and `1.5` do not end one.
 
-    Who asks and answers, as in `Butter? No`, says one sentence; a question that is answered asks nothing.
+    A question with its answer, as in `Butter? No`, is one sentence and not a question.
     """
     text = _QUOTED.sub(r"\1", _ANSWERED.sub(r"\1: \2", _HALF_DAY.sub(r"\1m", text)))
     return [part for part in _END.split(text) if part.strip().strip("?")]
@@ -120,7 +120,7 @@ class _Part(NamedTuple):
 
 
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
-    """The clauses of a sentence, divided by commas and words such as `but`; those that ask end with `?`.
+    """Split a sentence at commas and words such as `but`; questions keep their `?`.
 
     With `lists`, a few words without a verb belong to the full clause before or after them:
     `Alice and Bob are in` is one clause, and `he has bread and butter, but cheese is missing` is two.
@@ -131,8 +131,8 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     if lists and not sentence.rstrip().endswith("?"):
         sentence = _DASH.sub(", ", sentence)
     rejected = [f"not {match[1]}" for match in _INSTEAD.finditer(sentence)]
-    sentence = _with_exception(_INSTEAD.sub(" ", sentence))
-    parts = [part for half in _at_colon(sentence) for part in _divided(half)]
+    sentence = _split_exception(_INSTEAD.sub(" ", sentence))
+    parts = [part for half in _split_at_colon(sentence) for part in _split_at_joints(half)]
     if sentence.rstrip().endswith("?"):
         parts = [
             part._replace(text=f"{part.text}?")
@@ -140,12 +140,12 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
             else part
             for part in parts
         ]
-    whole = _with_results(_gathered(parts)) if lists else [part.text for part in parts]
-    return [*_with_subjects(whole), *rejected]
+    whole = _join_results(_join_lists(parts)) if lists else [part.text for part in parts]
+    return [*_add_subjects(whole), *rejected]
 
 
 def complete_clauses(parts: Iterable[str]) -> Iterator[str]:
-    """Yield the clauses of a text, with the word that some leave out: `it is not missing` for `it is not`."""
+    """Yield clauses with their omitted word: `it is not missing` for `it is not`."""
     names_lack = False
     for part in parts:
         is_unfinished = names_lack and _UNFINISHED.search(part) is not None
@@ -153,7 +153,7 @@ def complete_clauses(parts: Iterable[str]) -> Iterator[str]:
         names_lack = is_unfinished or _LACK.search(part) is not None
 
 
-def _divided(sentence: str) -> Iterator[_Part]:
+def _split_at_joints(sentence: str) -> Iterator[_Part]:
     joint = ""
     # "She would love to, but is busy" does not affirm.
     for at, piece in enumerate(_JOINT.split(_IN_VAIN.sub("might", sentence))):
@@ -164,8 +164,8 @@ def _divided(sentence: str) -> Iterator[_Part]:
             joint = ""
 
 
-def _with_exception(sentence: str) -> str:
-    """The sentence, with a clause for who is excepted: `all come, without Bob` for `all but Bob come`."""
+def _split_exception(sentence: str) -> str:
+    """Turn an exception into a clause: `all come, without Bob` for `all but Bob come`."""
     match = _EXCEPT.search(sentence)
     if match is None:
         return sentence
@@ -176,8 +176,8 @@ def _with_exception(sentence: str) -> str:
     return f"{rule}, {excepted}"
 
 
-def _with_results(parts: Iterable[str]) -> list[str]:
-    """The clauses, with what was not found behind where it was sought, as in `I looked, but found none`."""
+def _join_results(parts: Iterable[str]) -> list[str]:
+    """Join each search with its negative result, as in `I looked, but found none`."""
     whole: list[str] = []
     for part in parts:
         if whole and _SEARCHED.search(whole[-1]) and _IN_VAIN_THERE.match(part):
@@ -187,16 +187,16 @@ def _with_results(parts: Iterable[str]) -> list[str]:
     return whole
 
 
-def _at_colon(sentence: str) -> list[str]:
-    """Both sides of a colon if each is a clause: `You are not alone: Bob comes`, but not `Absent: Bob`."""
+def _split_at_colon(sentence: str) -> list[str]:
+    """Split at a colon between clauses: `You are not alone: Bob comes`, but not `Absent: Bob`."""
     head, colon, tail = sentence.partition(":")
     if colon and denies_something(head) and _VERB.search(_JOINT.split(tail)[0]):
         return [head, tail]
     return [sentence]
 
 
-def _with_subjects(parts: Iterable[str]) -> list[str]:
-    """The parts, with the subject `room 3` before `no stapler` in `room 3 has paper, but no stapler`."""
+def _add_subjects(parts: Iterable[str]) -> list[str]:
+    """Add the subject `room 3` before `no stapler` in `room 3 has paper, but no stapler`."""
     whole: list[str] = []
     for part in parts:
         lacks = bool(whole) and _NO_THING.fullmatch(part) and _HAS.search(whole[-1])
@@ -204,11 +204,11 @@ def _with_subjects(parts: Iterable[str]) -> list[str]:
     return whole
 
 
-def _gathered(parts: Sequence[_Part]) -> Iterator[str]:
+def _join_lists(parts: Sequence[_Part]) -> Iterator[str]:
     waiting: list[_Part] = []
     done: list[str] = []
     for number, part in enumerate(parts, start=1):
-        if _ASKED.search(part.text) and number < len(parts):  # what follows tells the answer
+        if _ASKED.search(part.text) and number < len(parts):  # the answer follows
             waiting.append(_Part(part.joint, _WHETHER.sub(" ", part.text)))
             continue
         if _is_item(part.text):
@@ -231,20 +231,20 @@ def _gathered(parts: Sequence[_Part]) -> Iterator[str]:
 
 
 def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part) -> int:
-    """Count the names before a clause that belong to the clause before them, or are a clause of their own.
+    """Count the names that belong to the clause before them, or form a clause of their own.
 
     A list ends at a contrast, or where the next clause cannot begin with it. Otherwise, if a list is what the
     clause before ends with, it ends with `and` and one more name: `he has tea and milk, sugar is missing`.
     """
-    if not waiting or _belong(waiting, part.text):
+    if not waiting or _belongs_to_next(waiting, part.text):
         return 0
     joints = [name.joint for name in (*waiting, part)]
     contrasts = [at for at, joint in enumerate(joints) if at and joint not in (",", "and")]
     if contrasts and (done or not (_PLACE.match(waiting[0].text) or joints[-1] in ("however", "though"))):
         return contrasts[-1]
-    if done and joints[0] not in (",", "and"):  # what follows a contrast is none of what comes before it
+    if done and joints[0] not in (",", "and"):  # names after a contrast do not belong to the clause before it
         return 0
-    may_list = bool(done) and _STATE.search(done[-1][-NEAR_CLAUSE_END:]) is None
+    may_list = bool(done) and _STATE.search(done[-1][-_STATE_LENGTH:]) is None
     has_no_subject = _NO_SUBJECT.match(part.text) is not None and (may_list or joints[-1] == "and")
     if done and (has_no_subject or _SUBJECT.match(part.text)):
         return len(waiting)
@@ -255,7 +255,7 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
     return ends[-1] if may_list and ends else 0
 
 
-def _belong(waiting: Sequence[_Part], part: str) -> bool:
+def _belongs_to_next(waiting: Sequence[_Part], part: str) -> bool:
     """Whether the words before a clause belong to it: `in room 3, there is one`."""
     if any(_ASKED.search(name.text) for name in waiting):
         return True

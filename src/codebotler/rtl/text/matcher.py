@@ -1,4 +1,4 @@
-"""`Matcher`: what a text of an event is compared with, which remembers its answers."""
+"""`Matcher`: a text pattern with a cache."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from abc import ABC, abstractmethod
 
 from codebotler.core.cachedproperty import cached_property
 
-SHORT_TEXT, MOST_REMEMBERED_TEXTS = 200, 1_000  # characters of a text that is remembered, and how many texts
+MAX_CACHED_LENGTH, MAX_CACHED_TEXTS = 200, 1_000  # characters of a cached text, and number of texts
 
 
 class Matcher(ABC):
-    """Something that a text matches or not."""
+    """A pattern for texts."""
 
     def matches(self, text: str) -> bool:
-        """Whether a text matches; programs say the same texts again and again."""
+        """Whether a text matches; results are cached, since programs repeat texts."""
         known = self._known
         found = known.get(text)
         if found is None:
             found = self._matches(text)
-            if len(text) <= SHORT_TEXT:
-                if len(known) >= MOST_REMEMBERED_TEXTS:
+            if len(text) <= MAX_CACHED_LENGTH:
+                if len(known) >= MAX_CACHED_TEXTS:
                     known.clear()
                 known[text] = found
         return found

@@ -1,4 +1,4 @@
-"""The numbers in a text, in digits or in words."""
+"""Find numbers in a text, in digits or in words."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _NOTHING = (
     r"|(?:(?<=\bnot )|(?<=n['\u2019]t ))(?:needed|wanted|chosen|picked)"
 )
 
-_NEAR = 60  # characters within which words belong together; without a limit, long texts would take forever
+_NEAR = 60  # characters within which words belong together; a limit keeps long texts fast
 
-# What a number may be glued to; a single F or C needs two digits or more, because 3C may be a room.
+# Suffixes of a number; a single F or C needs two digits or more, because 3C may be a room.
 _GLUED = (
     r"x|[ap]m|h|hrs?|hours?|days?|mins?|minutes?|s|secs?|seconds?|k?g|lbs?|oz|m?l|[kcm]m|m|ft|degrees?|percent"
     r"|pcs?|pieces?|people|(?:deg|\u00ba)[fc]?|fahrenheit|celsius|(?<=\d\d)[fc]"
@@ -60,7 +60,7 @@ _TOGETHER = re.compile(
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
-    """Start, end and values of the numbers in a text; alternatives such as `2 or 3` come together.
+    """Yield start, end and values of the numbers in a text; group alternatives such as `2 or 3`.
 
     `no`, `nobody` and the like are 0; `x2`, `2x` and `2kg` are 2. `2 of 4` and `a total of 2` give 2;
     `the one`, `not 3` and `at least 3` give none.
@@ -91,7 +91,7 @@ def _is_ignored(match: re.Match[str], text: str) -> bool:
 
 
 def _is_pronoun(match: re.Match[str], before: str) -> bool:
-    """Whether `one` means a thing, as in `some one` and `would take one`."""
+    """Whether `one` is a pronoun, as in `some one` and `would take one`."""
     return _PRONOUN.search(before) is not None or (
         _TAKES.search(before) is not None and _LAST.match(match.string, match.end()) is not None
     )

@@ -1,4 +1,4 @@
-"""The times of day in a text."""
+"""Find times of day in a text."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ _ALONE = re.compile(rf"\s*(?:(?:at|around|about)\s+)?{_hour('')}\s*", re.IGNOREC
 _EXCLUDED = re.compile(
     r"\b(?:before|after|except|(?:any ?(?:thing|time)|all|everything) but|not)\s+(?:at\s+)?$", re.IGNORECASE
 )
-_NEAR = 30  # characters before a time, in which such a word is looked for
+_NEAR = 30  # characters before a time in which to look for an exclusion
 _DAY = 24 * 60
 
 
-@lru_cache(maxsize=1024)  # several checks read the same text, and programs say what others said
+@lru_cache(maxsize=1024)  # several formulas read the same text
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
-    """The times of day in a text, each with both readings if it may be in the morning or the afternoon.
+    """Return the times of day in a text, each with two readings if it may be morning or afternoon.
 
     `12 pm`, `12:00`, `noon`, `twelve o'clock`, `half past twelve` and `six in the evening` are times, and so
-    is a text that is only an hour; `before 12 pm` is none.
+    is an hour alone; `before 12 pm` is not a time.
     """
     plain = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
     plain = _IN_THE.sub(lambda match: f"{match[1]} {'am' if match[2].lower() == 'morning' else 'pm'}", plain)

@@ -17,7 +17,7 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.sandbox import HEADER, MAX_FRAME, MORE, PIECE, WITHOUT_REFERENCES
 
-MAX_WAIT_SECONDS = 60.0  # of waiting for a process in total; no computation takes so long
+PROCESS_WAIT_SECONDS = 60.0  # of waiting for a process in total; no computation takes so long
 SILENCE_SECONDS = 1  # after which a silent process is examined
 SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
 
@@ -39,7 +39,7 @@ class IsolatedProcess:
             channel.setsockopt(socket.SOL_SOCKET, direction, silence)
         self._has_seccomp = has_seccomp
         self._buffer = bytearray()
-        self.patience = MAX_WAIT_SECONDS  # seconds left to wait
+        self.patience = PROCESS_WAIT_SECONDS  # seconds left to wait
 
     @cached_property
     def pid(self) -> int:
@@ -155,7 +155,7 @@ class IsolatedProcess:
 
     def reset_patience(self) -> None:
         """Start to wait anew, after an answer."""
-        self.patience = MAX_WAIT_SECONDS
+        self.patience = PROCESS_WAIT_SECONDS
 
     def hang_up(self) -> None:
         """Close the channel."""

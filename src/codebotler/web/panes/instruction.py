@@ -7,7 +7,7 @@ import asyncio
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
-from codebotler.core.program import called_skills, tree_of
+from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.log import MissionSummary
 from codebotler.missions.mission import MissionError
@@ -139,7 +139,7 @@ def examples(console: Console) -> list[str]:
     known = known_instructions(room_map)
     found: dict[frozenset[str], str] = {}
     for instruction in sorted(known, key=len):
-        found.setdefault(frozenset(called_skills(tree_of(known[instruction]))), instruction)
+        found.setdefault(frozenset(called_skills(parse_leniently(known[instruction]))), instruction)
     return list(found.values())[:_MAX_EXAMPLES]
 
 

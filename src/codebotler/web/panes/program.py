@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from codebotler.checking.problems import Check
+from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
@@ -264,7 +264,7 @@ def _current_line(view: SessionView) -> list[dict[str, Any]]:
     return [{"kind": "line", "line": line, "class": kind}] if is_there else []
 
 
-def _problem_marks(found: Check | None, program: str) -> list[dict[str, Any]]:
+def _problem_marks(found: CheckResult | None, program: str) -> list[dict[str, Any]]:
     """Marks for lines with problems, and their messages."""
     if found is None:
         return []

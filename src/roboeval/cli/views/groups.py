@@ -22,7 +22,7 @@ from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label
 
-MAX_DIFF_LINES = 60  # of a difference between programs
+MAX_PRINTED_CHANGES = 60  # of a difference between programs
 
 
 def found_view(
@@ -75,10 +75,10 @@ def failure_group_view(group: FailureGroup) -> RenderableType:
     if (fix := group.fix) is not None:
         changed = f"{fix.changed} line{'s' * (fix.changed != 1)}"
         lines.append(Text(f"{visible(fix.name)} passes, and differs in {changed}:", "dim"))
-        for sign, line in fix.changes[:MAX_DIFF_LINES]:
+        for sign, line in fix.changes[:MAX_PRINTED_CHANGES]:
             style = {"-": "red", "+": "green"}.get(sign, "dim")
             lines.append(Text(f"{sign} {shortened(line.expandtabs(4))}", style))
-        if (left := len(fix.changes) - MAX_DIFF_LINES) > 0:
+        if (left := len(fix.changes) - MAX_PRINTED_CHANGES) > 0:
             lines.append(Text(f"... {left} more lines", "dim"))
     return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
 

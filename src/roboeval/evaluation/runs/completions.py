@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
+from codebotler.core.files import MAX_ROW, parse_row, read_lines, to_line
 from codebotler.core.words import counted
 from codebotler.models.base import Reply
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, classify_reply, is_cut_off
@@ -167,7 +167,7 @@ def read_completions(
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
-    row = parsed_row(line, EXAMPLE)
+    row = parse_row(line, EXAMPLE)
     if row is None:
         if growing and not line.endswith(b"\n"):
             return None

@@ -14,7 +14,7 @@ from typing import Any
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
-from codebotler.core.files import read_text, sync_folder, to_line, to_text, write_whole, written_whole
+from codebotler.core.files import open_replacement, read_text, sync_folder, to_line, to_text, write_whole
 from roboeval.evaluation.runs.completions import COMPLETIONS, Completion, read_completions
 from roboeval.suites.load import ABLATED, Suite
 
@@ -147,7 +147,7 @@ class RunFolder:
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
             write_whole(self.about, to_text(about))
             try:
-                with written_whole(self.completions) as file:
+                with open_replacement(self.completions) as file:
                     file.writelines(lines)
             except BaseException:
                 self.about.unlink()

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import MAX_ROW, read_text, text_of
+from codebotler.core.files import MAX_ROW, decode_text, read_text
 from codebotler.core.program import parse
 from roboeval.evaluation.runs.completions import (
     KEY,
@@ -99,7 +99,7 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:
             raise UserError(f"unpacks to more than {MAX_UNPACKED:,} bytes", file=path)
-        return text_of(data, name, limit=MAX_ROW)
+        return decode_text(data, name, limit=MAX_ROW)
 
     for member in archive.infolist():
         if member.filename.endswith(".py"):

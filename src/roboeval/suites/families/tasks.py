@@ -16,7 +16,7 @@ from pydantic import Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
-from codebotler.core.program import Flaw, parsed
+from codebotler.core.program import Flaw, parse_program
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import listed
 from codebotler.core.world_file import Name, YamlText
@@ -272,7 +272,7 @@ def _fill(text: str, chosen: Mapping[str, str], path: Path) -> str:
 def _expect_python(form: FamilyFile, file: YamlFile) -> None:
     wrong = [(one.program, ("wrong", number, "program")) for number, one in enumerate(form.wrong)]
     for program, place in ((form.solution, ("solution",)), *wrong):
-        if isinstance(flaw := parsed(program), Flaw):
+        if isinstance(flaw := parse_program(program), Flaw):
             raise file.wrong(f"this program is not valid Python: {flaw.message}", *place)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codebotler.rtl.text.matcher import MOST_REMEMBERED_TEXTS, SHORT_TEXT, Matcher
+from codebotler.rtl.text.matcher import MAX_CACHED_LENGTH, MAX_CACHED_TEXTS, Matcher
 
 
 class Longer(Matcher):
@@ -17,7 +17,7 @@ class Longer(Matcher):
 
 
 def test_a_short_text_is_looked_at_once_and_a_long_one_each_time() -> None:
-    matcher, long = Longer(), "x" * (SHORT_TEXT + 1)
+    matcher, long = Longer(), "x" * (MAX_CACHED_LENGTH + 1)
     for _ in range(2):
         assert [matcher.matches(text) for text in ("abc", "abcd", long)] == [False, True, True]
     assert matcher.seen == ["abc", "abcd", long, long]
@@ -25,8 +25,8 @@ def test_a_short_text_is_looked_at_once_and_a_long_one_each_time() -> None:
 
 def test_what_is_remembered_has_an_end() -> None:
     matcher = Longer()
-    for number in range(2 * MOST_REMEMBERED_TEXTS):
+    for number in range(2 * MAX_CACHED_TEXTS):
         matcher.matches(str(number))
-    assert len(matcher._known) <= MOST_REMEMBERED_TEXTS
+    assert len(matcher._known) <= MAX_CACHED_TEXTS
     assert matcher.matches("0") is False
     assert matcher.seen.count("0") == 2
