@@ -1,6 +1,6 @@
-"""Have a robot carry out a program over the API: begin a mission, look at its check, approve it, answer.
+"""Run a program on a robot over the API: start a mission, read its check, approve it, answer questions.
 
-Give it the link that `codebotler serve --face` printed for operators; without one it starts its own page,
+Pass the operator's link that `codebotler serve --face` printed; without one, the script starts its own page
 with a simulated robot.
 """
 
@@ -26,7 +26,7 @@ class Robot:
     """A robot behind a page.
 
     Args:
-        link: as `codebotler serve` prints it, with the token.
+        link: the link that `codebotler serve` prints, with the token.
     """
 
     def __init__(self, link: str) -> None:
@@ -35,7 +35,7 @@ class Robot:
         self._headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
 
     def ask(self, method: str, path: str, body: object = None) -> http.client.HTTPResponse:
-        """Send a request; the answer may be read as it comes."""
+        """Send a request, and return its response, which may be a stream."""
         connection = http.client.HTTPConnection(self._place, timeout=60)
         connection.request(method, path, None if body is None else json.dumps(body), self._headers)
         answer = connection.getresponse()
@@ -44,7 +44,7 @@ class Robot:
         return answer
 
     def run(self, program: str) -> None:
-        """Have it carry out a program, and print what happens."""
+        """Run a program on the robot, and print its events."""
         mission = json.load(self.ask("POST", "/api/missions", {"program": program}))["id"]
         while (view := json.load(self.ask("GET", f"/api/missions/{mission}")))["check"] is None:
             time.sleep(0.1)
@@ -58,7 +58,7 @@ class Robot:
                     self.answer()
 
     def answer(self) -> None:
-        """Choose the first option of what the robot asks, as somebody in front of its face could."""
+        """Choose the first option of the robot's question, as a person at its face could."""
         while (question := json.load(self.ask("GET", "/api/face"))["question"]) is None:
             time.sleep(0.1)
         self.ask("POST", "/api/face/answer", {"question": question["number"], "option": 0})

@@ -1,4 +1,4 @@
-"""Judge a program in every world of a task, and say why it fails where it does."""
+"""Judge a program in every world of a task, and explain its failures."""
 
 from codebotler.rtl import explain
 from roboeval import Completion, evaluate, load_suite

@@ -1,4 +1,4 @@
-"""RTL alone: a trace by hand, a formula, a verdict, a sentence."""
+"""Use RTL on its own: test a formula on a hand-written trace, and explain the result."""
 
 from codebotler.core.trace import Event, Option
 from codebotler.rtl import explain, holds, parse

@@ -1,7 +1,7 @@
-"""A policy that learns to write a program from nothing but rewards (REINFORCE), in some seconds.
+"""A policy that learns to write a program from rewards alone (REINFORCE), in seconds.
 
 It is far simpler than a language model: it writes a fixed program with three holes, and for each hole draws
-one of a few texts. What it learns is which to draw. The rewards are those a model would be trained with.
+one of a few texts. It learns which ones to draw. A model would be trained with the same rewards.
 """
 
 import math
@@ -26,16 +26,16 @@ STEPS, BATCH, RATE = 40, 32, 2.0
 
 
 def softmax(logits: list[float]) -> list[float]:
-    """How likely each text is."""
+    """Return the probability of each text."""
     powers = [math.exp(logit - max(logits)) for logit in logits]
     return [power / sum(powers) for power in powers]
 
 
 def learn(seed: int) -> tuple[list[float], str]:
-    """The mean reward of each step, and the program that is likeliest at the end.
+    """Return the mean reward of each step, and the most likely program at the end.
 
     Args:
-        seed: of all that is drawn.
+        seed: of all random draws.
     """
     drawing = random.Random(seed)  # noqa: S311 - nothing secret
     logits = {hole: [0.0] * len(texts) for hole, texts in HOLES.items()}

@@ -2,7 +2,7 @@
 
     codebotler run "..." --robot examples/robots/http_robot.py:Cart
 
-CART_URL names it, such as http://127.0.0.1:8000.
+CART_URL is its address, such as http://127.0.0.1:8000.
 """
 
 import json
@@ -24,7 +24,7 @@ class Cart:
         return rooms
 
     def get_current_location(self) -> str:
-        """Ask where it is."""
+        """Ask for its room."""
         return str(post("where"))
 
     def go_to(self, location: str) -> None:
@@ -40,12 +40,12 @@ class Cart:
         post("say", text=message)
 
     def stop(self) -> None:
-        """Stop at once; the drive under way then ends with an error."""
+        """Stop at once; the current drive then ends with an error."""
         post("stop")
 
 
-def post(path: str, **values: str):  # type: ignore[no-untyped-def]  # whatever it answers # noqa: ANN201 - the same
-    """Send a request, and return what it answers; a refusal is an error of the robot."""
+def post(path: str, **values: str):  # type: ignore[no-untyped-def]  # any JSON # noqa: ANN201 - the same
+    """Send a request, and return its answer; raise a RobotError if the cart refuses."""
     body = json.dumps(values).encode()
     request = Request(f"{URL}/{path}", body, {"Content-Type": "application/json"})  # noqa: S310 - the robot's own
     try:

@@ -3,8 +3,8 @@
     pip install mcp
     codebotler run program.py --skills examples/skills/hotel_lift/skills.py --robot mcp_robot.py:Porter
 
-PORTER_URL names the server, such as http://127.0.0.1:8000/mcp. PORTER_TOOLS lists the tools that may be used
-without asking; for any other, the terminal asks once.
+PORTER_URL is the address of the server, such as http://127.0.0.1:8000/mcp. PORTER_TOOLS lists the tools that
+may be used without asking; for any other, the terminal asks once.
 """
 
 import os
@@ -25,11 +25,11 @@ class Porter:
         self.approved = {tool for tool in os.environ.get("PORTER_TOOLS", "").split(",") if tool}
 
     def rooms(self) -> list[str]:
-        """Where it can be."""
+        """List the places where it can be."""
         return ["lobby", "third floor"]
 
     def get_current_location(self) -> str:
-        """Where it starts."""
+        """Return the place where it starts."""
         return "lobby"
 
     async def say(self, message: str) -> None:
@@ -49,12 +49,12 @@ class Porter:
         return bool(await self.use("knock", room=room))
 
     async def stop(self) -> None:
-        """Stop at once, which needs nobody's approval."""
+        """Stop at once, without approval."""
         async with Client(URL) as client:
             await client.call_tool("stop", {})
 
     async def use(self, tool: str, **arguments: Any) -> Any:  # noqa: ANN401 - of any type
-        """Call a tool, if a person approves of that, and return what it returns."""
+        """Call a tool if a person approves it, and return its result."""
         if tool not in self.approved:
             self.ask_for(tool)
         async with Client(URL) as client:
@@ -65,7 +65,7 @@ class Porter:
         return (result.structured_content or {}).get("result")
 
     def ask_for(self, tool: str) -> None:
-        """Ask a person at the terminal whether a tool may be used; RobotError if it may not."""
+        """Ask a person at the terminal to approve a tool; raise a RobotError if they do not."""
         if not sys.stdin.isatty() or input(f"May the program use the tool {tool}? [y/N] ").lower() != "y":
             raise RobotError("NotApproved", f"nobody has approved of the tool {tool}")
         self.approved.add(tool)

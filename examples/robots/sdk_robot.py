@@ -2,7 +2,7 @@
 
     codebotler run "..." --skills examples/skills/tidy_arm/skills.py --robot examples/robots/sdk_robot.py:Arm
 
-ARM_ADDRESS names its controller, such as 127.0.0.1:7000.
+ARM_ADDRESS is its controller's address, such as 127.0.0.1:7000.
 """
 
 import os
@@ -19,25 +19,25 @@ class Arm:
     """An arm at a table."""
 
     def connect(self) -> None:
-        """Connect with the controller; a second connection is kept free for stopping."""
+        """Connect to the controller; a second connection stays free for stopping."""
         host, _, port = os.environ.get("ARM_ADDRESS", "127.0.0.1:7000").partition(":")
         self.arm, self.emergency = Connection(host, int(port)), Connection(host, int(port))
 
     def disconnect(self) -> None:
-        """Hang up."""
+        """Close both connections."""
         self.arm.close()
         self.emergency.close()
 
     def stop(self) -> None:
-        """Stop at once, whatever it does."""
+        """Stop at once, even during a command."""
         self.emergency.command("halt")
 
     def rooms(self) -> list[str]:
-        """Where it can be."""
+        """List the places where it can be."""
         return ["table"]
 
     def get_current_location(self) -> str:
-        """It never moves."""
+        """Return its only place; the arm never moves."""
         return "table"
 
     def say(self, message: str) -> None:

@@ -1,6 +1,6 @@
 """A stand-in for the SDK of a robot's vendor: commands as lines of JSON over TCP.
 
-Yours is whatever `pip install` brings; `sdk_robot.py` shows how little it takes to use it.
+Use your vendor's package instead; `sdk_robot.py` shows how.
 """
 
 import json
@@ -9,7 +9,7 @@ import threading
 
 
 class Connection:
-    """A connection with the robot's controller, which answers one command after the other."""
+    """A connection to the robot's controller, which answers one command after the other."""
 
     def __init__(self, host: str, port: int) -> None:
         self.address = host, port
@@ -18,7 +18,7 @@ class Connection:
         self._lock = threading.Lock()
 
     def command(self, name: str, *arguments: object) -> object:
-        """Send a command and wait for its end; a RuntimeError in the controller's words if it fails."""
+        """Send a command and wait for its result; raise a RuntimeError with the controller's message."""
         with self._lock:
             self._lines.write(json.dumps([name, *arguments]) + "\n")
             self._lines.flush()
@@ -29,5 +29,5 @@ class Connection:
         return result
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._socket.close()
