@@ -217,14 +217,17 @@ def returned() -> Iterator[object]:
 
 def test_what_is_returned_is_shown_in_a_few_lines() -> None:
     found = [*returned()]
-    assert {"Suite", "Task", "World", "Check", "Outcome", "Reply"} <= {type(one).__name__ for one in found}
+    kinds = {type(one).__name__ for one in found}
+    assert {"Suite", "Task", "World", "CheckResult", "Outcome", "Reply"} <= kinds
+        type(one).__name__ for one in found
+    }
     assert [repr(one) for one in found if len(repr(one)) > 400] == []
     assert {
         "Suite('plus', 16 tasks)",
         "Task('LunchTime', 5 prompts, 2 worlds)",
         "Scenario(World(3 rooms, robot='start_loc'), 5 requirements)",
         "Program(1,001 lines)",
-        "Check(1,000 problems, 5 samples)",
+        "CheckResult(1,000 problems, 5 samples)",
         "Generation(1 attempt, 0 problems)",
     } <= {repr(one) for one in found}
 
@@ -286,13 +289,13 @@ def test_settings_out_of_range_are_refused(wrong: dict[str, Any], named: str) ->
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"task": 3}, "task is 3, .*text"),
+        ({"task": 3}, "task is 3, .*string"),
         ({"prompt": "0"}, "prompt is '0', .*whole number"),
         ({"index": -1}, "index is -1, .* whole number"),
         ({"index": 10**9}, "index is 1000000000, .* 999,999,999$"),
-        ({"program": None}, "program is None, .*text"),
-        ({"instruction": 1}, "instruction is 1, .*text"),
-        ({"model": 1}, "model is 1, .*text"),
+        ({"program": None}, "program is None, .*string"),
+        ({"instruction": 1}, "instruction is 1, .*string"),
+        ({"model": 1}, "model is 1, .*string"),
     ],
 )
 def test_a_completion_of_what_is_none_is_refused(wrong: dict[str, Any], named: str) -> None:
