@@ -219,8 +219,6 @@ def test_what_is_returned_is_shown_in_a_few_lines() -> None:
     found = [*returned()]
     kinds = {type(one).__name__ for one in found}
     assert {"Suite", "Task", "World", "CheckResult", "Outcome", "Reply"} <= kinds
-        type(one).__name__ for one in found
-    }
     assert [repr(one) for one in found if len(repr(one)) > 400] == []
     assert {
         "Suite('plus', 16 tasks)",
