@@ -61,25 +61,14 @@ def test_what_no_words_evade_is_accepted(formula: str, room: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("formula", "room", "missed"),
-    [
-        ('not tr.Exists(goto("lab 3"))', "lab [0-9]", "lab 0"),
-        ('not tr.Exists(at("bob\'s office", say(".*")))', "(bob's|robert's) office", "robert's office"),
-    ],
-)
-def test_a_room_that_is_named_by_some_of_its_names_is_told(formula: str, room: str, missed: str) -> None:
-    (told,) = find_evasions([rule(formula)], ["hall", room], SKILLS)
-    assert room in told
-    assert f'"{missed}"' in told
-
-
-@pytest.mark.parametrize(
     ("formula", "room"),
     [
         ('not tr.Exists(goto("bob\'s office"))', BOTH),
         ('not tr.Exists(at(r"\\bbob\'s office\\b", say(".*")))', BOTH),
         ('not tr.Exists(goto("acme inc[.]"))', "acme inc."),
         ('not tr.Exists(goto("0-9"))', "lab [0-9]"),
+        ('not tr.Exists(goto("lab 3"))', "lab [0-9]"),
+        ('not tr.Exists(at("bob\'s office", say(".*")))', "(bob's|robert's) office"),
     ],
 )
 def test_rule_that_names_a_part_of_the_regex_is_refused(formula: str, room: str) -> None:
@@ -93,36 +82,18 @@ def test_rule_that_names_a_part_of_the_regex_is_refused(formula: str, room: str)
 
 HEAD = "from codebotler import Simulation, skill\n"
 DRIVES = 'def tour(sim: Simulation, room: str) -> None:\n    "Tour."\n    sim.drive(room)\n'
-HANDS_ON = (
-    "def lead(it, room):\n    it.drive(room)\n\n@skill\n"
-    'def tour(sim: Simulation, room: str) -> None:\n    "Tour."\n    lead(sim, room)\n'
-)
-NESTED = (
-    'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    def go() -> None:\n'
-    "        sim.drive(room)\n    go()\n"
-)
-NAMED = 'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    getattr(sim, "drive")(room)\n'
-HARMLESS = 'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    sim.truth(sim.room + room)\n'
-LOOKS = 'def tour(sim: Simulation, room: str) -> None:\n    "T."\n    sim.look(room)\n'
 BY_LOT = "def tour(sim: Simulation, room: str) -> None: 'Tour.'\n"
-NO_VAULT, NO_KNIFE = 'not tr.Exists(goto("vault"))', 'not tr.Exists(pick("knife"))'
+NO_VAULT = 'not tr.Exists(goto("vault"))'
 
 
 @pytest.mark.parametrize(
     ("code", "formulas", "is_told"),
     [
         ("@skill\n" + DRIVES, [NO_VAULT], True),
-        ("@skill\n" + DRIVES, [NO_KNIFE], False),
-        ("@skill\n" + DRIVES, [NO_VAULT, 'not tr.AtLeast(tour(".*"), 4)'], True),
         ("@skill\n" + DRIVES, [f'{NO_VAULT} and not tr.Exists(tour("vault"))'], False),
+        ("@skill\n" + DRIVES, [NO_VAULT, 'not tr.AtLeast(tour(".*"), 4)'], False),
+        ("@skill\n" + DRIVES, [], False),
         ("@skill(event=None)\n" + DRIVES, [NO_VAULT], True),
-        (HANDS_ON, [NO_VAULT], True),
-        (HANDS_ON, [NO_KNIFE], True),
-        ("@skill\n" + NESTED, [NO_VAULT], True),
-        ("@skill\n" + NAMED, [NO_VAULT], True),
-        ("@skill\n" + HARMLESS, [NO_VAULT, NO_KNIFE], False),
-        ("@skill\n" + LOOKS, [NO_VAULT], False),
-        ("@skill\n" + LOOKS, ['not tr.Exists(missed("mug"))'], True),
         ("@skill\n" + BY_LOT, [NO_VAULT], False),
         ("@skill(names='room')\n" + BY_LOT, [NO_VAULT], True),
     ],
@@ -135,7 +106,7 @@ def test_an_own_skill_that_may_do_what_rules_forbid_is_told(
     rules = [Rule(f"r{n}", "So it is.", parse(text, skills=skills)) for n, text in enumerate(formulas)]
     told = list(find_evasions(rules, (), skills))
     assert len(told) == is_told
-    assert all('"tour"' in sentence for sentence in told)
+    assert all(" tour;" in sentence for sentence in told)
 
 
 def test_room_that_requests_reach_before_one_with_a_regex_may_be_named_with_anchors() -> None:
