@@ -11,11 +11,11 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import plain
 
 SKILL_FAILED = "SkillFailed"
-"""The kind of error when the function of a custom skill raises an undeclared error."""
+"""The kind of the error reported when a custom skill's function raises an undeclared exception."""
 
 
-def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
-    """Call the function of a skill; UserError if its result does not have the declared type."""
+def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the declared type
+    """Call the function of a skill; raise UserError if its result does not have the declared type."""
     assert row.does is not None, "a custom skill has a function"
     given = [
         [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)
