@@ -1,9 +1,8 @@
 """Validate the labels of a world, and reject regexes that may take exponential time.
 
-Python tries every way to match a regex and cannot be interrupted. In a label, therefore, a repeat may contain
-only single characters, at most one repeat may be unlimited, and the number of ways to match the same text is
-limited. This simple rule also rejects some fast regexes, but names and answers do not need them. `.*` at the
-start or the end of a label is always allowed.
+Python tries every way to match a regex and cannot be interrupted. In a label, a repeat may therefore contain
+only single characters, at most one repeat may be unlimited, and the ways to match one text are limited. This
+simple rule also rejects some fast regexes that labels do not need. `.*` at either end is always allowed.
 """
 
 from __future__ import annotations
@@ -18,7 +17,8 @@ from codebotler.core.regex_flags import scope_flags
 
 PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
 ENDLESS_REPEATS = 100  # repeats with a higher limit count as unlimited
-MAX_WAYS, MAX_WAYS_BESIDE_ENDLESS = 1_000, 40  # for one text; the second limit applies beside an unlimited repeat
+MAX_WAYS = 1_000  # to match one text
+MAX_WAYS_BESIDE_ENDLESS = 40  # to match one text if a repeat is unlimited
 ANY_LABEL = ".*"
 SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
 REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})

@@ -1,7 +1,7 @@
 """Parse programs, and find the skills they call and their definite errors.
 
-CPython 3.11 parses some texts in quadratic time, so the length of programs is limited. The compiler, `symtable`
-and pyflakes may still take any time: apply them to untrusted text only in isolated processes
+CPython 3.11 parses some texts in quadratic time, so the length of programs is limited. The compiler,
+`symtable` and pyflakes may still take any time: apply them to untrusted text only in isolated processes
 (`codebotler.simulator.isolated_call`).
 """
 
@@ -32,9 +32,7 @@ NAME_CUTOFF = 0.65  # the minimum similarity of a suggested name, from 0 to 1
 GIVEN_MODULES = ("time", "sys")  # modules that every program can use without an import
 SOURCE_NAME = "<program>"
 
-warnings.filterwarnings(
-    "ignore", module=SOURCE_NAME
-)  # about invalid escapes such as "\d" in the programs of models
+warnings.filterwarnings("ignore", module=SOURCE_NAME)  # about invalid escapes such as "\d" in programs
 
 # CPython before 3.13 counts the nesting depth of all threads together, so if two threads parse at the same
 # time, one gets a SystemError. A forked process must not inherit a locked lock.
@@ -131,7 +129,7 @@ def _text_flaw(source: str) -> Flaw:
 
 
 def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth values, lists of them
-    """Evaluate a literal; raise ValueError for other nodes and for dictionaries and sets (hash collisions)."""
+    """Evaluate a literal; raise ValueError for other nodes, dictionaries and sets (hash collisions)."""
     try:
         if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
             return ast.literal_eval(node)

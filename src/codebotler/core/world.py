@@ -115,7 +115,7 @@ def _squared(room: Room) -> Room:
 def laid_out(world: World) -> World:
     """Give every room a footprint and a standing point, in a grid on both sides of a hallway.
 
-    Existing footprints are kept; a room with only a standing point gets a square metre around it, and the other
+    Existing footprints are kept; a room with only a standing point gets a square metre around it, and other
     rooms are placed to the right.
     """
     known = [_squared(room) for room in world.rooms]

@@ -149,7 +149,7 @@ class WorldFile(_Form):
             if room.stand_at and room.footprint and not is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
-                raise file.wrong(f"{sentence}; change "stand_at" or the footprint", *at, "rooms", index, "stand_at")
+                raise file.wrong(f"{sentence}; move the point", *at, "rooms", index, "stand_at")
         rooms = dict.fromkeys(names.values())
         known = ", ".join(rooms)
         if self.robot not in rooms:
@@ -209,7 +209,7 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
         raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
     row = skills[name]
     if not row.is_random:
-        raise ValueError(f"the result of {name} is computed by its code; set the truths that it queries instead")
+        raise ValueError(f"the code of {name} computes its result; set the truths that it queries instead")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):

@@ -40,7 +40,7 @@ SYNTAX_MENDS = {
 class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chosen above
     """A loader that stops before the nesting overflows the C stack."""
 
-    yaml_implicit_resolvers = {  # noqa: RUF012 - like the base class, but "<<" and "=" are texts
+    yaml_implicit_resolvers = {  # noqa: RUF012 - as in the base class, except that "<<" and "=" are texts
         first: forms for first, forms in Loader.yaml_implicit_resolvers.items() if first not in {"<", "="}
     }
     depth = 0
@@ -123,7 +123,7 @@ class YamlFile:
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
-        """Validate the content, or the part at `at`, against a model; raise UserError for the first mistake."""
+        """Validate the content, or `data` at a place, against a model; raise UserError at the first mistake."""
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
@@ -145,7 +145,7 @@ class YamlFile:
             problem = f"the character U+{error.character:04X} is not allowed"
             line = self._text.encode()[: error.position].count(b"\n") + 1
         else:
-            line = min(mark.line + 1, len(self._text.splitlines()))  # the mark may be after the end of the file
+            line = min(mark.line + 1, len(self._text.splitlines()))  # the mark may be after the end
         sentence = ", ".join(part for part in (context, problem) if part).replace(", but", " but")
         mend = f"; {SYNTAX_MENDS[problem]}" if problem in SYNTAX_MENDS else ""
         return UserError(f"not valid YAML: {sentence}{mend}", file=self.name, line=line)

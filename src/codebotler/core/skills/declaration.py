@@ -226,7 +226,7 @@ class _Declaration:
             or value_type(first or object) is not None
         ):
             self.wrong(
-                f"{self.name} must take the simulation first, and then the arguments of programs by position, "
+                f"{self.name} must take the simulation first, then the arguments of programs by position, "
                 "as in (sim: Simulation, door: str)"
             )
         if self.does.__defaults__:
@@ -294,7 +294,7 @@ class _Declaration:
         for kind in fails:
             if not kind.isidentifier() or iskeyword(kind) or kind == VIOLATION or hasattr(builtins, kind):
                 self.wrong(
-                    f'the error name "{kind}" of {self.name} cannot be used; choose another, such as "DoorLocked"'
+                    f'the error "{kind}" of {self.name} is a reserved name; choose another, such as "DoorLocked"'
                 )
         return fails
 
@@ -328,7 +328,7 @@ class _Declaration:
             )
         unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
         if unusable:
-            self.wrong(f"{unusable[0]} of {self.name} cannot be a field of a ROS message; use lower-case letters")
+            self.wrong(f"{unusable[0]} of {self.name} cannot be a ROS field; use lower-case letters")
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)
