@@ -123,7 +123,7 @@ class YamlFile:
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
-        """Validate the content, or `data` at a place, against a model; raise UserError at the first mistake."""
+        """Validate the content, or `data` at a place, against a model; raise UserError if it does not fit."""
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:

@@ -19,7 +19,7 @@ MAX_CACHED_STEPS = 4_000  # per formula
 class Monitor:
     """Evaluates a formula on a growing trace; `holds` is the result for the events so far.
 
-    An event takes constant time and memory. With `events`, the monitor also knows whether the result is final.
+    An event takes constant time and memory. With `events`, the monitor also knows if the result is final.
 
     Args:
         formula: the formula.

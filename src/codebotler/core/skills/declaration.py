@@ -294,7 +294,7 @@ class _Declaration:
         for kind in fails:
             if not kind.isidentifier() or iskeyword(kind) or kind == VIOLATION or hasattr(builtins, kind):
                 self.wrong(
-                    f'the error "{kind}" of {self.name} is a reserved name; choose another, such as "DoorLocked"'
+                    f'"{kind}" cannot name an error of {self.name}; choose another name, such as "DoorLocked"'
                 )
         return fails
 
