@@ -1,4 +1,4 @@
-"""Write prompts for models, from text files in this folder, and extract programs from their replies."""
+"""Write prompts for models from the text files in this folder, and read programs from replies."""
 
 from codebotler.prompts.rendering import (
     PictureMessage,
