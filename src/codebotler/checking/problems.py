@@ -102,7 +102,7 @@ class CheckResult:
 
     @property
     def evidence(self) -> frozenset[int]:
-        """The numbers of the first samples that show each problem, for problems that samples show."""
+        """The number of the first sample that shows each problem; a problem may have no sample."""
         ends = {
             sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
         }

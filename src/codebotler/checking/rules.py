@@ -22,7 +22,7 @@ from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.house_rule import Rule
 
-EACH_TAG = "{each}"  # the placeholder that each name of `for_each` replaces in a formula
+EACH_TAG = "{each}"  # in a formula, each name of `for_each` takes its place
 MAX_QUOTED_CHARACTERS = 30  # of a formula, starting at the error
 
 

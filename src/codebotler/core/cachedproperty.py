@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING or sys.version_info >= (3, 12):
-    from functools import cached_property  # noqa: TID251 - here it has no lock
+    from functools import cached_property  # noqa: TID251 - no lock in Python 3.12
 else:
 
     class cached_property:  # noqa: N801 - named as in functools

@@ -44,7 +44,7 @@ class UserError(ValueError):
 
 
 def elide_middle(text: str, longest: int) -> str:
-    """Replace the middle of a long text by an ellipsis."""
+    """Replace the middle of a long text with an ellipsis."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"
 

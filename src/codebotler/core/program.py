@@ -222,7 +222,7 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - slow
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
-    class Names(Checker):  # type: ignore[misc]  # which has no types
+    class Names(Checker):  # type: ignore[misc]  # pyflakes has no types
         def addBinding(self, node: ast.AST | None, value: Any) -> None:  # noqa: ANN401, N802 - pyflakes' own
             if node is None:  # one of about 170 builtins, which need no further checks
                 self.scope[value.name] = value

@@ -152,7 +152,7 @@ def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | No
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Restrict a span to a scope whose bounding event is at a position, or did not happen if None."""
+    """Restrict a span to a scope; `at` is the position of its bounding event, or None without one."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)

@@ -35,13 +35,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Recording:
-    """The event that a skill leaves in the trace."""
+    """The event that a skill records in the trace."""
 
     kind: str  # the kind of event and its name in RTL, such as `goto`
     text: str  # the parameter that becomes the event's text; empty for no text
     options: str | None = None  # the parameter with the options of a question
     to: str | None = None  # the parameter that names the addressee
-    names: str = ""  # the sort of thing that the text names, such as `room`; empty for speech
+    names: str = ""  # the sort of thing that the text names, such as `room`; empty if the text is spoken
     when_tried: bool = False  # whether failed attempts are recorded, too
     more: tuple[str, ...] = ()  # further parameters whose values the event contains
 
@@ -224,7 +224,7 @@ class SkillTable(Mapping[str, Skill]):
         return SkillTable((*self.rows, skill))
 
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """Return a copy of this table with the skills of another one that this one lacks."""
+        """Return a copy of this table with the skills added that only the other table has."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def without(self, names: Iterable[str]) -> SkillTable:

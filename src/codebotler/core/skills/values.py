@@ -92,7 +92,7 @@ TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - any of these types
-    """Replace members of enumerations by their values."""
+    """Replace members of enumerations with their values."""
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.value if isinstance(value, Enum) else value

@@ -50,7 +50,7 @@ def is_slow(
     """Whether a function takes more than `seconds` of processor time for a text of any of the sizes."""
     for size in sizes:
         duration = _measure(read, text.of(size))
-        if duration > seconds and _measure(read, text.of(size)) > seconds:  # once may be chance
+        if duration > seconds and _measure(read, text.of(size)) > seconds:  # the machine may be busy once
             return True
         if size == LONG_SIZES[-2] and duration < seconds / 10:  # not quadratic
             return False
