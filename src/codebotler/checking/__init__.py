@@ -1,4 +1,4 @@
-"""Checks of programs before a robot moves: static analysis, and runs in sampled worlds.
+"""Check programs before a robot moves, by static analysis and by runs in sampled worlds.
 
 Start with `check.py`; `problems.py` defines its results.
 """

@@ -1,4 +1,4 @@
-"""Check a program before a robot moves: analyse its text, then run it in sampled worlds."""
+"""Check a program before a robot moves: analyse its source, then run it in sampled worlds."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
 
-WORLDS_PER_WORKER = 16  # in one batch
-MAX_WIDENINGS = 3  # rounds that add rooms which the program visits but its text does not name
+WORLDS_PER_WORKER = 16  # per batch
+MAX_WIDENINGS = 3  # rounds that add rooms which the program visits but its source does not name
 
 
 def check(
@@ -50,17 +50,17 @@ def check(
     """Find the problems of a program by static analysis and by runs in sampled worlds.
 
     Args:
-        program: its source, which need not even parse.
+        program: its source, which may even contain syntax errors.
         rooms: the names of the rooms, in order, as in a world file; by default those in the program.
         start: the robot's first room, one of `rooms` if given; by default `start_loc` or else the first room.
-        samples: how many worlds to sample, 1 to 10,000.
-        seed: determines the worlds, on every machine.
+        samples: how many worlds to sample, from 1 to 10,000.
+        seed: determines the worlds, equally on all machines.
         strict: whether to randomize even facts that the program takes for granted.
         skills: the skills that the program may call.
-        workers: the number of parallel runs, in a new pool.
-        pool: runs the programs; without it and `workers`, the shared pool of this process does.
-        room_map: replaces `rooms` and `start` where more is known about them.
-        house_rules: the rules that a program must keep in every world.
+        workers: the number of parallel runs in a new pool.
+        pool: the pool that runs the programs; without `workers`, it defaults to the pool of this process.
+        room_map: a map that replaces `rooms` and `start` if more is known about the rooms.
+        house_rules: the rules that the program must keep in every world.
 
     Raises:
         UserError: a room's name is not a regular expression, the start is not a room, or the number of
@@ -89,7 +89,7 @@ def _open_pool(pool: WorkerPool | None, workers: int | None) -> Iterator[WorkerP
     else:
         try:
             yield shared_pool()
-        except KeyboardInterrupt:  # otherwise the program would go on and delay the exit of this process
+        except KeyboardInterrupt:  # else the program would continue and delay the exit of this process
             SHARED_POOL.end()
             raise
 
@@ -100,7 +100,7 @@ def check_on(
     room_map: RoomMap | None = None,
     settings: CheckSettings | None = None,
 ) -> CheckResult:
-    """Check one program on a worker that only the calling thread uses."""
+    """Check one program on a worker; no other thread may use the worker."""
     how = settings or CheckSettings()
     worker.begin_to_prepare(program, how.skills, how.simulation)
     room_map = room_map or room_map_for(program, skills=how.skills)
@@ -127,7 +127,7 @@ def check_together(
 
 
 RunSamples: TypeAlias = Callable[[RoomMap, Sequence[FactSampler], Meanwhile], list[Sample]]
-"""Runs a program in several worlds; calls the last argument while waiting for it."""
+"""Runs a program in several worlds; while the program runs, it calls the last argument."""
 
 
 def _runner_on_pool(pool: WorkerPool, program: str, settings: CheckSettings) -> RunSamples:

@@ -1,4 +1,4 @@
-"""Find ways to evade a rule: another name of a room, or an action inside a custom skill."""
+"""Find ways to evade a rule: by another name for a room, or by an action inside a custom skill."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from codebotler.simulator.settings import resolve_room
 
 
 def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) -> Iterator[str]:
-    """Yield a sentence if programs could evade rules inside custom skills that no rule names.
+    """Yield a sentence if programs could evade rules by custom skills that no rule names.
 
     Args:
         rules: the rules in force.
@@ -49,7 +49,7 @@ def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTabl
 
 
 def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
-    """Raise UserError if a rule names a room, but not by all words that lead there."""
+    """Raise UserError if a rule names a room but does not match all words that lead to it."""
     for pattern in room_patterns(rule):
         text = Regex(pattern)
         words = [*samples(room), *samples(pattern)]

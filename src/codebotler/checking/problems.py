@@ -1,4 +1,4 @@
-"""`CheckResult`: the problems of a program and the samples that show them."""
+"""The result of a check: the problems of a program and the samples that show them."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Problem:
     """A reason to reject a program.
 
     Args:
-        kind: the kind of failure, such as `GoToInvalidLocation` or `NameError`.
+        kind: the kind of error, such as `GoToInvalidLocation` or `NameError`.
         message: what is wrong, in a plain sentence.
-        line: the line of the program, counted from 1; None if no line is to blame.
-        where: the facts that its worlds share, in words; empty if it occurs in every world.
-        samples: the numbers of these worlds; empty if static analysis found the problem.
+        line: the line of the program, counted from 1; None if no single line is at fault.
+        where: the facts that the worlds with the problem share, in words; empty if it occurs in every world.
+        samples: the numbers of the worlds with the problem; empty if static analysis found it.
     """
 
     kind: str
@@ -43,27 +43,27 @@ class Problem:
 
 @dataclass(frozen=True)
 class Sample:
-    """One run in a sampled world."""
+    """One run of a program in a sampled world."""
 
-    number: int  # of the world, from 0
+    number: int  # the number of the world, counted from 0
     outcome: Outcome
-    facts: tuple[SampledFact, ...] = field(default=(), repr=False)  # that the run discovered, in order
-    draws: tuple[Draw, ...] = field(default=(), repr=False)  # that decided the facts, in order
-    in_vain: bool = False  # whether the run waited or searched in vain, so that its end says little
-    is_chosen: bool = False  # whether the world was chosen for a fact that no random world had
+    facts: tuple[SampledFact, ...] = field(default=(), repr=False)  # facts that the run discovered
+    draws: tuple[Draw, ...] = field(default=(), repr=False)  # draws that decided the facts, in order
+    in_vain: bool = False  # whether it waited or searched without success, so that its end says little
+    is_chosen: bool = False  # whether the world was chosen to try a fact that no random world had
 
     def would_repeat_in(self, sampler: FactSampler) -> bool:
-        """Whether a run in another world would discover the same facts, and so be the same."""
+        """Whether a run in another world would discover the same facts, and therefore be identical."""
         return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
     def drawn(self) -> tuple[str, ...]:
-        """The random facts, in words."""
+        """The random facts of the world, in words."""
         return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.is_random))
 
     @property
     def world(self) -> str:
-        """The world, in words."""
+        """All facts of the world, in words."""
         return listed(list(dict.fromkeys(fact.sentence for fact in self.facts)))
 
 
@@ -102,7 +102,7 @@ class CheckResult:
 
     @property
     def evidence(self) -> frozenset[int]:
-        """The number of the first sample that shows each problem, if one does."""
+        """The number of the first sample that shows each problem; a problem may have no sample."""
         ends = {
             sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
         }
@@ -112,7 +112,7 @@ class CheckResult:
         return frozenset(number for number in first if number is not None)
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:
-        """Return plain data for JSON, equal for equal results.
+        """Convert the result to plain data for JSON; equal results give equal data.
 
         Args:
             skills: the skills that the program could call.
@@ -145,12 +145,12 @@ class CheckResult:
 
 
 def no_room(request: str, room_map: RoomMap) -> str:
-    """Return the message for an unknown room, with the closest match."""
+    """Return the message for an unknown room, with the most similar name."""
     name = brief(request)
     return f'there is no room "{name}"{closest_room(name, room_map.rooms)}'
 
 
 def closest_room(name: str, rooms: Sequence[str]) -> str:
-    """Return a clause with the closest name of a room; empty if none is close."""
+    """Return a clause with the most similar name of a room, or an empty string if none is similar."""
     closest = difflib.get_close_matches(name.lower(), rooms, n=1)
     return f'; the closest is "{closest[0]}"' if closest else ""

@@ -13,7 +13,7 @@ from codebotler.core.skills.table import Skill, SkillTable
 
 ROOMS_SKILL, ROOM_SKILL = "get_all_rooms", "get_current_location"
 MAX_NAMED_ROOMS = 100
-PROPAGATION_ROUNDS = 6  # from variable to variable; longer chains are unusual
+PROPAGATION_ROUNDS = 6  # steps from variable to variable; longer chains are unusual
 SAME_VALUES = frozenset({"sorted", "list", "set", "tuple", "reversed", "iter", "filter", "frozenset"})
 ELEMENT_METHODS = frozenset({"copy", "keys", "lower", "strip", "casefold", "title", "pop"})
 COMPARISON_METHODS = frozenset({"startswith", "endswith"})
@@ -25,7 +25,7 @@ A_ROOM: TextLiteral = (0, 0, "")  # the placeholder for the name of a room that 
 
 
 def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...]:
-    """Return the names that a program drives to or compares rooms with, in order of its text."""
+    """Return the names that a program drives to or compares with rooms, in the order of its source."""
     try:
         return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MAX_NAMED_ROOMS]
     except RecursionError:
@@ -33,9 +33,9 @@ def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...
 
 
 def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
-    """Return the line and the request of each drive to a literal room.
+    """Return the line and the request of each drive whose room is a literal.
 
-    Omit drives to rooms with which the program compares something: it may check first that they exist.
+    Drives to rooms that the program uses in comparisons are omitted, since it may check that they exist.
     """
     bound = all_bound_names(tree)
     if "*" in bound:
@@ -78,7 +78,7 @@ def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.
 
 
 class _Variables:
-    """The texts that the variables of a program may hold; scopes are ignored."""
+    """Finds the texts that the variables of a program may have; scopes are ignored."""
 
     def __init__(self, tree: ast.Module, skills: SkillTable) -> None:
         self.tree, self.drives = tree, _drives(skills)
@@ -96,7 +96,7 @@ class _Variables:
                 break
 
     def rooms(self) -> list[str]:
-        """Return the names of rooms, in the order of the program."""
+        """Return the names of rooms, in the order of the program's source."""
         found = {text for _, request in _requests(self.tree, self.drives) for text in self.texts(request)}
         driven = {_variable(request) for _, request in _requests(self.tree, self.drives)} - {None}
         for node in nodes(self.tree):
@@ -207,7 +207,7 @@ def _parts(node: ast.expr) -> list[ast.expr]:
 
 
 def _variable(node: ast.expr) -> str | None:
-    """Return the variable that an expression is or reads from."""
+    """Return the variable that an expression consists of or reads from, or None."""
     match node:
         case ast.Name(name):
             return name

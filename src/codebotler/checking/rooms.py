@@ -1,4 +1,4 @@
-"""Determine the rooms of a check: those of the caller, or a guess from the program's text."""
+"""Determine the rooms for a check: those of the caller, or a guess from the program's source."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.simulator.sampled_robot import RoomMap
 
-DEFAULT_START = "start_loc"  # the paper's prompt gives models this name
-PLACEHOLDER_ROOMS = ("room 1", "room 2")  # for a program that visits all rooms and names none
+DEFAULT_START = "start_loc"  # the name in the paper's prompt
+PLACEHOLDER_ROOMS = ("room 1", "room 2")  # for a program that visits all rooms but names none
 
 
 def room_map_for(
@@ -26,12 +26,12 @@ def room_map_for(
     *,
     skills: SkillTable = SKILLS,
 ) -> RoomMap:
-    """Return the rooms and the start that a caller gives, or guess both from a program's text.
+    """Return the rooms and the start from the caller, or guess both from the program's source.
 
     Args:
         program: its source.
         rooms: the names of the rooms, in order; None if they are unknown.
-        start: where the robot starts; by default `start_loc` if that is a room, or else the first room.
+        start: the room where the robot starts; by default `start_loc` if it is a room, else the first room.
         skills: the skills that the program may call.
 
     Raises:
@@ -57,7 +57,7 @@ def room_map_for(
 
 
 def add_visited_rooms(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
-    """Add the rooms that the program visited although its text does not name them."""
+    """Add the rooms that the program visited although its source does not name them."""
     requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == GOTO)
     driven = (room_map.room(request) for request in requests)
     found = dict.fromkeys([*room_map.rooms, *(room for room in driven if room is not None)])

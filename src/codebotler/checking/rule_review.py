@@ -1,4 +1,4 @@
-"""Review house rules: an example that keeps each rule, one that breaks it, and likely mistakes."""
+"""Review house rules: find an example that keeps each rule, one that breaks it, and likely mistakes."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from codebotler.simulator.sampled_robot import PERSON_WORDS
 from codebotler.simulator.settings import finds
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
-ALWAYS_BROKEN = "all that a robot can do breaks it"
+ALWAYS_BROKEN = "everything that a robot can do breaks it"
 IMPOSSIBLE = "nothing can keep it"
 UNDECIDED = 'it is too complex for examples, but still enforced; split it at "and" into several rules'
 DETECTED = (
     "it can be broken by what a look finds or a person answers, which can only be noticed: "
     "the mission stops right after that"
 )
-OTHER_ANSWER = "something else"  # an answer that rules do not name
+OTHER_ANSWER = "something else"  # an answer that no rule names
 ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
 
 
 @dataclass(frozen=True)
 class Review:
-    """Examples and warnings for one rule."""
+    """The examples and warnings for one rule."""
 
     rule: Rule
-    keeps: Trace | None  # a shortest example; if possible, with an event that the rule mentions
-    breaks: Trace | None  # a shortest example
-    warnings: tuple[str, ...]  # sentences
+    keeps: Trace | None  # a shortest trace that keeps the rule, if possible with an event it mentions
+    breaks: Trace | None  # a shortest trace that breaks the rule
+    warnings: tuple[str, ...]  # one sentence each
 
 
 def review_rules(rules: Sequence[Rule], world: World | None = None) -> list[Review]:
-    """Review rules for a robot anywhere, or in the rooms of a world."""
+    """Review rules for a robot in any rooms, or in the rooms of a world."""
     found = {rule.name: _review(rule, world) for rule in rules}
     for one, other in combinations(rules, 2):
         for rule, warning in _pair_warnings(one, other, world):
@@ -72,7 +72,7 @@ def _review(rule: Rule, world: World | None) -> Review:
 
 
 def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
-    """Yield traces that break a rule: a shortest one, and those that end with a result it mentions."""
+    """Yield traces that break a rule: a shortest one, and ones that end with a result it mentions."""
     yield shortest
     for element in dict.fromkeys(elements(rule.formula)):
         if element.found is not None or element.answer is not None:
@@ -82,7 +82,7 @@ def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterat
 
 
 def _is_by_result(rule: Rule, breaks: Trace) -> bool:
-    """Whether the result of the last step, rather than the step itself, breaks the rule."""
+    """Whether a trace breaks the rule by the result of its last step, not by the step itself."""
     guard = RuleGuard([rule])
     try:
         for event in breaks[:-1]:
@@ -112,7 +112,7 @@ def _keeping_trace(rule: Rule, world: World | None) -> Trace | None:
 
 
 def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None) -> Trace | None:
-    """Return a shortest trace on which formulas hold and rules are kept; None if there is none."""
+    """Return a shortest trace on which formulas hold and rules are kept, or None if there is none."""
     always = [rule.formula for rule in kept if rule.when == "always"]
     finally_ = [rule.formula for rule in kept if rule.when == "finally"]
     spoken_of = [*wanted, *always, *finally_]
@@ -124,7 +124,7 @@ def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None)
 
 
 def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
-    """Yield the names of rooms; for regexes, also words for the room that formulas distinguish."""
+    """Yield the names of rooms and, for regexes, also words for the room that formulas distinguish."""
     names = [room.name for room in world.rooms]
     spoken_of = [*chain.from_iterable(map(elements, formulas))]
     named_texts: list[TextPattern] = [one.text for one in spoken_of if one.kind == GOTO]
@@ -139,7 +139,7 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
 
 
 def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
-    """Yield, for each event that requires holding a thing, that the robot has picked it up before."""
+    """Yield formulas which say that the robot has picked up each thing before an event with it in hand."""
     for element in elements(formula):
         if element.holding is not None:
             held = EventPattern(element.kind, Regex(".*"), holding=element.holding)
@@ -151,7 +151,7 @@ def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
 
 
 def _pair_warnings(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule, str]]:
-    """Yield likely mistakes of two rules together, each with the rule it belongs to."""
+    """Yield likely mistakes in the combination of two rules, each with the rule to which it belongs."""
     kinds = [{element.kind for element in elements(rule.formula)} for rule in (one, other)]
     if not kinds[0] & kinds[1]:
         return
@@ -163,7 +163,7 @@ def _pair_warnings(one: Rule, other: Rule, world: World | None) -> Iterator[tupl
     except Undecided:
         return
     if all(follows):
-        yield other, f'it says the same as "{one.name}"'
+        yield other, f'it is equivalent to "{one.name}"'
     elif follows[0]:
         yield one, f'it follows from "{other.name}"'
     elif follows[1]:
@@ -177,7 +177,7 @@ def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
 
 
 def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
-    """Whether a rule that can be broken is always kept where another one is."""
+    """Whether a rule can be broken, but only if another rule is broken, too."""
     if rule.when == "always" and other.when == "finally":
         return False
     return (
@@ -190,7 +190,7 @@ def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
 
 
 def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
-    """Yield a sentence for each room, thing or person that a rule names and its world lacks."""
+    """Yield a sentence for each room, thing or person that a rule names but the world does not have."""
     if world is None:
         return
     rooms = [room.name for room in world.rooms]

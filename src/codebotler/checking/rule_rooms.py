@@ -1,4 +1,4 @@
-"""Compare the rooms that house rules name with those of a house."""
+"""Compare the rooms that house rules name with the rooms of a house."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from codebotler.simulator.settings import is_in_request
 
 
 def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
-    """Refuse rules that name a room which the house lacks, unless they allow any room.
+    """Raise UserError if a rule names a room that the house does not have, unless it allows any room.
 
     Args:
         rules: the rules.
-        rooms: all rooms of the house; empty if they are unknown, and then all rules pass.
+        rooms: all rooms of the house; if this is empty, all rules pass.
 
     Raises:
         UserError: a rule names an unknown room.
@@ -31,7 +31,7 @@ def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
 
 
 def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
-    """Yield a sentence for each room that a rule names and the house lacks; none if no room is known."""
+    """Yield a sentence for each room that a rule names but the house lacks; none if `rooms` is empty."""
     if rule.any_room or not rooms:
         return
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
@@ -54,7 +54,7 @@ def room_patterns(rule: Rule) -> Iterator[str]:
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may mean one of these labels; also true if it matches anything or nothing."""
+    """Whether a regex may refer to one of these labels; also true if it matches everything or nothing."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts

@@ -1,4 +1,4 @@
-"""Read a file of house rules and report its mistakes."""
+"""Read files of house rules, and report mistakes in them."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.house_rule import Rule
 
-EACH_TAG = "{each}"  # the placeholder in a formula for the names of `for_each`
-MAX_QUOTED_CHARACTERS = 30  # of a formula, from the position of its error
+EACH_TAG = "{each}"  # in a formula, each name of `for_each` takes its place
+MAX_QUOTED_CHARACTERS = 30  # of a formula, starting at the error
 
 
 def _as_name(text: str) -> str:
     if not re.fullmatch("[a-z][a-z0-9-]*", text):
-        raise ValueError("may have only small letters, digits and dashes, such as server-room")
+        raise ValueError("may contain only lower-case letters, digits and dashes, such as server-room")
     return text
 
 
@@ -37,7 +37,7 @@ def _on_one_line(text: str) -> str:
 
 
 class HouseRuleFile(BaseModel):
-    """One rule in a file."""
+    """One rule in a file of house rules."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -50,7 +50,7 @@ class HouseRuleFile(BaseModel):
     for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
 
     def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable) -> Rule:
-        """Return the rule; raise UserError if it is not valid."""
+        """Convert the entry to a rule; raise UserError if it is not valid."""
         if self.always is None and self.finally_ is None:
             raise file.wrong(
                 f'the rule "{self.name}" has no formula; write one after "always" or "finally"', *at
@@ -83,7 +83,7 @@ class HouseRuleFile(BaseModel):
 
 
 class HouseRulesFile(BaseModel):
-    """A file of rules."""
+    """A file of house rules."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -91,15 +91,15 @@ class HouseRulesFile(BaseModel):
 
 
 def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = ()) -> tuple[Rule, ...]:
-    """Read a file of rules.
+    """Read a file of house rules, and check that its rules name existing rooms.
 
     Args:
         path: the file.
         skills: the skills that its formulas may name.
-        rooms: all rooms of the house; empty if they are unknown, and then rules may name any.
+        rooms: all rooms of the house; if this is empty, rules may name any room.
 
     Raises:
-        UserError: the file is not valid; the sentence has the line and the fix.
+        UserError: the file is not valid; the message gives the line and the fix.
     """
     file = YamlFile.read(path)
     forms = file.validate(HouseRulesFile).rules
@@ -124,7 +124,7 @@ def _parse(text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formu
     for element in elements(formula):
         for pattern in _regexes(element):
             if slow_text(pattern) is not None:
-                sentence = f"finding {pattern!r} takes much longer the longer a text is"
+                sentence = f"searching a long text for {pattern!r} takes too much time"
                 raise file.wrong(f"{sentence}; let no two repeats match the same text", *at)
     return formula
 

@@ -1,4 +1,4 @@
-"""Run a program in sampled worlds and group its failures into problems."""
+"""Run a program in sampled worlds, and group its failures into problems."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import DO_NOTHING, Job, Meanwhile, Worker
 
 DEFAULT_SAMPLES, MAX_SAMPLES = 5, 10_000
-EXPLORATION_FACTOR = 2  # times the samples: the most worlds added to try both values of each fact
-MAX_EXTRA_WORLDS = 20  # worlds added while the program waits in vain in all of them
+EXPLORATION_FACTOR = 2  # worlds added per sample, at most, to try both values of each fact
+MAX_EXTRA_WORLDS = 20  # worlds added, at most, while every run waits without success
 MAX_SHOWN_FACTS = 4
 
 
@@ -33,11 +33,11 @@ class CheckSettings:
     """Settings of a check."""
 
     samples: int = DEFAULT_SAMPLES
-    seed: int = 0  # determines the worlds, on every machine
+    seed: int = 0  # determines the worlds, equally on all machines
     strict: bool = False  # whether to randomize even facts that the program takes for granted
     simulation: SimulationSettings = AS_WRITTEN
     skills: SkillTable = SKILLS
-    house_rules: tuple[Rule, ...] = ()  # to keep in every world
+    house_rules: tuple[Rule, ...] = ()  # rules that the program must keep in every world
 
     def __post_init__(self) -> None:
         if not 1 <= self.samples <= MAX_SAMPLES:
@@ -45,7 +45,7 @@ class CheckSettings:
 
 
 class SampledRuns:
-    """The runs of one program in sampled worlds, which a worker executes as one job."""
+    """The runs of one program in sampled worlds; a worker executes them as one job."""
 
     def __init__(
         self, program: str, room_map: RoomMap, samplers: Sequence[FactSampler], settings: CheckSettings
@@ -56,7 +56,7 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """Return the samples; reuse known outcomes, and skip worlds that would repeat a run."""
+        """Return the samples; known outcomes are reused, and worlds that would repeat a run are skipped."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:
@@ -88,7 +88,7 @@ def run_samples(
     *,
     meanwhile: Meanwhile = DO_NOTHING,
 ) -> list[Sample]:
-    """Run a program in sampled worlds, and skip worlds that would repeat a run."""
+    """Run a program in sampled worlds, but skip worlds that would repeat a run."""
     if not samplers:
         return []
     runs = SampledRuns(program, room_map, samplers, settings)
@@ -103,20 +103,20 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
 
 
 RunInWorlds: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
-"""Runs one program in several worlds; may skip worlds that would repeat a run."""
+"""Runs a program in several worlds; it may skip worlds that would repeat a run."""
 
 
 def run_in_sampled_worlds(
     run: RunInWorlds, room_map: RoomMap, settings: CheckSettings, width: int
 ) -> list[Sample]:
-    """Run a program in the first worlds, then in more to try both values of each fact.
+    """Run a program in the first worlds, then in further ones until both values of each fact were tried.
 
-    Add further worlds while all runs wait or search in vain. Worlds that would repeat a run share its
-    result; `run` is called with at most `width` worlds.
+    Further worlds are also added as long as every run waits or searches without success. Worlds that would
+    repeat a run share its result. `run` is called with at most `width` worlds at a time.
     """
     known: list[Sample] = []
     ran: list[Sample] = []
-    drew: list[FactSampler] = []  # the worlds in which it ran
+    drew: list[FactSampler] = []  # the samplers of these worlds
 
     def add(samplers: Sequence[FactSampler]) -> None:
         drew.extend(samplers)
@@ -134,7 +134,7 @@ def run_in_sampled_worlds(
     for more in range(MAX_EXTRA_WORLDS):
         if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
             break
-        # A program that waits in several places only ends in a lucky world; a search may need an empty one.
+        # A program that waits in several places ends only in a lucky world; a search may need an empty world.
         add([replace(first, sample=len(ran), lucky=more % 2 == 1)])
     most = len(ran) + EXPLORATION_FACTOR * settings.samples
     while len(ran) < most and not all(map(_only_computed, ran)) and (new := unexplored_samplers(ran, drew)):
@@ -143,7 +143,7 @@ def run_in_sampled_worlds(
 
 
 def unexplored_samplers(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactSampler]:
-    """Return worlds that differ from earlier ones in one fact whose value no run has seen."""
+    """Return samplers of worlds that differ from an earlier world in one fact, with a value not yet seen."""
     met = {(draw.method, draw.arguments, draw.result) for sample in ran for draw in sample.draws}
     found: list[FactSampler] = []
     for sample, sampler in zip(ran, drew, strict=True):
@@ -156,12 +156,12 @@ def unexplored_samplers(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> l
 
 
 def first_samplers(settings: CheckSettings) -> list[FactSampler]:
-    """Return the samplers of the first worlds."""
+    """Return the samplers of the random worlds in which every program runs first."""
     return [FactSampler(settings.seed, number, settings.strict) for number in range(settings.samples)]
 
 
 def _only_computed(sample: Sample) -> bool:
-    """Whether a run used up its processor time, which takes seconds and is not waiting."""
+    """Whether a run used up its processor time by computing, not by waiting."""
     error = sample.outcome.error
     return sample.in_vain and error is not None and error.message.endswith(PROCESSOR_TIME)
 
@@ -170,19 +170,17 @@ def _only_computed(sample: Sample) -> bool:
 
 
 _NO_ROOM_MESSAGE = re.compile('there is no room "(?P<request>.*)"', re.DOTALL)
-"""The simulated robot's message about an unknown room."""
+"""Matches the simulated robot's message about an unknown room."""
 
 
 def group_failures(ran: Sequence[Sample], room_map: RoomMap) -> Iterator[Problem]:
-    """Yield one problem for the runs that failed at the same line with the same error or rule."""
+    """Yield one problem for each group of runs that failed at the same line with the same error or rule."""
     in_vain = all(sample.in_vain for sample in ran)
     groups: dict[tuple[int | None, str, str], list[Sample]] = {}
     for sample in ran:
         outcome = sample.outcome
         if outcome.error is not None and (in_vain or not sample.in_vain):
-            line = (
-                None if outcome.status is Status.TIMEOUT else outcome.line
-            )  # a run stops at any line of a loop
+            line = None if outcome.status is Status.TIMEOUT else outcome.line  # any line of a loop
             rule = outcome.error.message.split('"')[1] if outcome.error.kind == VIOLATION else ""
             groups.setdefault((line, outcome.error.kind, rule), []).append(sample)
     for (_, kind, _), same in groups.items():
@@ -202,7 +200,7 @@ def _message(same: Sequence[Sample], ran: Sequence[Sample], room_map: RoomMap) -
 
 
 def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:
-    """Return the facts that only these runs share; only random worlds count if there are any."""
+    """Return the facts that only these runs share; if some worlds are random, the others do not count."""
     if not all(sample.is_chosen for sample in same):
         same, ran = ([sample for sample in those if not sample.is_chosen] for those in (same, ran))
     others = [sample for sample in ran if sample not in same]

@@ -1,6 +1,6 @@
-"""Static analysis: certain errors in reachable code that no handler catches, and misuse of skills.
+"""Static analysis: find definite, uncaught errors in reachable code, and misuse of skills.
 
-An isolated process with a time limit parses the programs.
+Programs are parsed in an isolated process with a time limit.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ EXAMPLE_PROGRAM = "def task_program():\n    if is_in_rom('mug'):\n        say('a
 
 @dataclass(frozen=True)
 class TextFindings:
-    """The certain errors of a program, found without running it."""
+    """The definite errors in a program, found without running it."""
 
     compiles: bool
     problems: tuple[Problem, ...]
 
 
 def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> TextFindings:
-    """Find the certain errors of a program, one problem per line; slow parsing is a problem, too."""
+    """Find the definite errors in a program, one problem per line; slow parsing counts as a problem, too."""
     try:
         compiles, problems = _findings(program, room_map, _without_functions(skills))
     except IsolatedCallError as error:
@@ -75,7 +75,7 @@ def _rooms(program: str, skills: SkillTable) -> tuple[list[str], bool]:
 
 
 def _without_functions(skills: SkillTable) -> SkillTable:
-    """Return the skills without users' code, which an isolated process cannot import."""
+    """Return the skills without the users' functions, which isolated processes cannot import."""
 
     def plain(value: ValueType) -> ValueType:
         return replace(value, enum=None)
@@ -88,7 +88,7 @@ def _without_functions(skills: SkillTable) -> SkillTable:
 
 
 def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: SkillTable) -> list[Problem]:
-    """Return the certain errors of a program, one problem per line."""
+    """Return the definite errors in a parsed program, one problem per line."""
     flaws = list(find_tree_flaws(tree, program, skills))
     try:
         if not room_map.guessed:
@@ -114,7 +114,7 @@ def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: S
 
 
 def _unreachable(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Yield unreachable statements: after a return, under a false condition, in an unused function."""
+    """Yield statements that never run: after a return, under a false condition or in an unused function."""
     named = {node.id for node in nodes(tree) if isinstance(node, ast.Name)} | {TASK_FUNCTION}
     for node in nodes(tree):
         match node:

@@ -20,7 +20,7 @@ STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
-    """Return the events of a trace as plain data, numbered from 1; with places if the trace has them."""
+    """Convert the events of a trace to plain data, numbered from 1; `has_places` includes places."""
     return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
 
 
@@ -41,14 +41,14 @@ def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]
 
 
 def event_from_step(step: Mapping[str, Any]) -> Event:
-    """Return the event of a step, without its place."""
+    """Convert a step back to an event without a place."""
     options = tuple(map(option_from, step.get("options", ())))
     more = tuple(step.get("more", ()))
     return Event(step["kind"], step["text"], options, step.get("answer"), step.get("found"), more=more)
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Draw the steps room by room; steps that explanations need are marked and always shown."""
+    """Draw the steps room by room; the steps in `needed` are marked and always shown."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
@@ -70,7 +70,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Yield runs of steps and whether to show them: of a long trace, both ends and the needed steps."""
+    """Group steps by whether they are shown; a long trace shows both ends and the needed steps."""
 
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
@@ -81,7 +81,7 @@ def select_steps(
 
 
 def step_text(step: Mapping[str, Any]) -> Text:
-    """Return a step of `steps_of` as one line."""
+    """Describe a step of `steps_of` in one line."""
     if step["kind"] == GOTO:
         return _drive(step)
     return Text(phrase(event_from_step(step), "past", show=shortened))
@@ -100,7 +100,7 @@ def _drive(step: Mapping[str, Any]) -> Text:
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:
-    """Return a table without lines; right-aligned columns, for numbers, never wrap."""
+    """Return a table without lines; right-aligned columns are for numbers and never wrap."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for side in justify:
         table.add_column(justify=side, no_wrap=side == "right", overflow="fold")

@@ -1,4 +1,4 @@
-"""`functools.cached_property` without its lock of Python 3.11."""
+"""`functools.cached_property` without the lock that it has in Python 3.11."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING or sys.version_info >= (3, 12):
-    from functools import cached_property  # noqa: TID251 - here it has no lock
+    from functools import cached_property  # noqa: TID251 - no lock in Python 3.12
 else:
 
     class cached_property:  # noqa: N801 - named as in functools
-        """A property that is computed once, or twice by simultaneous threads.
+        """A property computed on first access; simultaneous threads may compute it twice.
 
         The lock of functools is shared by all objects of a class: a process that forks while another thread
         holds it would deadlock.

@@ -1,4 +1,4 @@
-"""Errors that users can fix: mistakes, with file and line, and missing packages; errors of a robot."""
+"""Errors that users can fix, such as mistakes in files and missing packages, and errors of a robot."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ EXTRAS = {
     "pyrobosim": "pyrobosim",
     "ray": "ray",
 }
-"""The extra of this distribution that installs each package."""
+"""Maps each optional package to the extra of this distribution that installs it."""
 
 MAX_SENTENCE_LENGTH = 600
 
 
 class UserError(ValueError):
-    """A mistake in a user's input; one sentence says what is wrong, where, and how to fix it.
+    """Raised for a mistake in a user's input; one sentence says what is wrong, where, and how to fix it.
 
     Args:
         sentence: the problem and the fix; joined to one line, and shortened if very long.
@@ -44,7 +44,7 @@ class UserError(ValueError):
 
 
 def elide_middle(text: str, longest: int) -> str:
-    """Return a text, or both ends of a longer one."""
+    """Replace the middle of a long text with an ellipsis."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"
 
@@ -59,19 +59,19 @@ def expect_list(given: Sequence[str] | None, what: str) -> None:
 
 
 def install_command(package: str) -> str:
-    """Return the command that installs the extra with a package."""
+    """Return the command that installs a package together with the rest of its extra."""
     return f"pip install 'codebotler[{EXTRAS[package]}]'"
 
 
 def missing_package(error: ModuleNotFoundError) -> str:
-    """Return the package of an extra that an import did not find; empty for any other package."""
+    """Return the name of the missing package if one of our extras installs it, else an empty string."""
     package = (error.name or "").split(".")[0]
     return package if package in EXTRAS else ""
 
 
 @contextmanager
 def installed() -> Iterator[None]:
-    """Import packages of an extra; a missing one raises UserError with the command to install it."""
+    """Guard imports of optional packages: raise UserError with the install command if one is missing."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -82,15 +82,15 @@ def installed() -> Iterator[None]:
 
 
 VIOLATION = "RuleViolation"
-"""The kind of error with which a house rule ends a run or refuses a skill."""
+"""The kind of the error that a house rule raises to end a run or to refuse a skill."""
 
 
 class RobotError(Exception):
-    """A skill that the robot cannot execute.
+    """Raised when the robot cannot execute a skill.
 
     Args:
-        kind: one of the seven kinds of the taxonomy (paper, section V.B, and AskInvalidOptions), or
-            RuleViolation.
+        kind: RuleViolation or one of the seven kinds of robot errors (paper, section V.B, and
+            AskInvalidOptions).
         message: the reason, in a sentence.
     """
 

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 from codebotler.core.errors import UserError
 
-SYNC_UNSUPPORTED = (errno.EINVAL, errno.ENOTSUP)  # from a file system that does not sync folders
+SYNC_UNSUPPORTED = (errno.EINVAL, errno.ENOTSUP)  # raised by file systems that cannot sync folders
 
 MAX_FILE_BYTES = 5_000_000
 MAX_ROW = 5_000_000
@@ -32,7 +32,7 @@ def read_text(path: Path, *, limit: int = MAX_FILE_BYTES) -> str:
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """Read the first bytes of a file, or raise UserError."""
+    """Read at most `most` bytes from the start of a file, or raise UserError."""
     with _open(path, path) as file:
         try:
             return file.read(most)
@@ -41,7 +41,7 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -> str:
-    """Decode a file's bytes; use newlines as line ends and drop a byte order mark."""
+    """Decode the bytes of a UTF-8 file, normalize its line endings and drop a byte order mark."""
     if len(data) > limit:
         raise UserError(f"is larger than {limit:,} bytes", file=name)
     _expect_not_utf_16(data, name)
@@ -53,7 +53,7 @@ def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -
 
 
 def _expect_not_utf_16(data: bytes, name: Path | str) -> None:
-    """Reject UTF-16, which editors on Windows call Unicode, by its byte order mark."""
+    """Reject UTF-16, recognized by its byte order mark; editors on Windows call it Unicode."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise UserError("is UTF-16 text; save it as UTF-8", file=name)
 
@@ -75,7 +75,7 @@ def _open(path: Path, name: Path | str) -> BinaryIO:
 def read_lines(
     path: Path, *, limit: int = MAX_ROW, name: Path | str | None = None
 ) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines of a file with their numbers from 1; raise UserError for a line over the limit."""
+    """Yield the lines of a file, numbered from 1; raise UserError if a line is longer than the limit."""
     with _open(path, name or path) as file:
         for number in count(1):
             line = file.readline(limit + 1)
@@ -89,7 +89,7 @@ def read_lines(
 
 
 def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the line numbers and objects of a JSON Lines file; a growing file may end in a torn line."""
+    """Yield the lines of a JSON Lines file with their numbers; a growing file may end in a partial line."""
     for number, line in read_lines(path):
         if line.strip():
             try:
@@ -104,7 +104,7 @@ def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[
 
 
 def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
-    """Return the JSON object of a line; None if the line is not JSON; UserError if it is not an object."""
+    """Parse a line as a JSON object; return None if it is not JSON, raise UserError if it is other JSON."""
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
@@ -121,14 +121,14 @@ def to_line(row: object) -> bytes:
 
 
 def to_text(data: dict[str, Any]) -> bytes:
-    """Encode an indented JSON file for people to read."""
+    """Encode data as indented JSON, which is easy to read."""
     return json.dumps(data, indent=2, ensure_ascii=False).encode() + b"\n"
 
 
 class Appender:
-    """A file of lines that only grows; opening it cuts off a last line that a crash has torn.
+    """Appends lines to a file; opening it removes a partial last line that a crash left behind.
 
-    An exclusive one raises BlockingIOError if another process has locked the file.
+    With `exclusive`, opening raises BlockingIOError if another process has locked the file.
     """
 
     def __init__(self, path: Path, *, exclusive: bool = False) -> None:
@@ -148,7 +148,7 @@ class Appender:
             raise
 
     def append(self, line: bytes) -> None:
-        """Add a line completely or not at all; OSError if the disk is full."""
+        """Append a line completely or not at all; raise OSError if the disk is full."""
         descriptor = self._file.fileno()
         start = os.fstat(descriptor).st_size
         with name_in_errors(self.path):
@@ -161,13 +161,13 @@ class Appender:
                 raise
 
     def sync(self) -> None:
-        """Flush everything to the disk; may be called from another thread."""
+        """Flush the file to the disk; other threads may call this."""
         if self._is_file:
             with name_in_errors(self.path):
                 os.fsync(self._file.fileno())
 
     def close(self) -> None:
-        """Flush everything to the disk and close the file."""
+        """Flush the file to the disk and close it."""
         with self._file:
             self.sync()
 
@@ -185,7 +185,7 @@ def _intact_length(path: Path) -> int:
 
 @contextmanager
 def name_in_errors(path: Path) -> Iterator[None]:
-    """Add a file's name to errors of the system, which often lack it."""
+    """Add a file's name to system errors, which often lack it."""
     try:
         yield
     except OSError as error:
@@ -195,14 +195,14 @@ def name_in_errors(path: Path) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes | memoryview) -> None:
-    """Replace a file atomically: after a crash it has either the old or the new content."""
+    """Replace a file atomically: after a crash, it has either its old or its new content."""
     with open_replacement(path) as file:
         file.write(content)
 
 
 @contextmanager
 def open_replacement(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
-    """Open a file that replaces `path` atomically on success; after an error the old one stays."""
+    """Open a file that atomically replaces `path` on success; after an error, `path` is unchanged."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary or path.with_name(path.name + ".new")
     try:
@@ -233,7 +233,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def expect_replaceable(path: Path, *beginnings: bytes) -> None:
-    """Refuse to overwrite a file that does not begin like ours."""
+    """Raise UserError if a file does not begin like our own files, so that it is not overwritten."""
     if path.is_file():
         with path.open("rb") as file:
             start = file.read(max(map(len, beginnings)))
@@ -245,7 +245,7 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
 
 
 def home() -> Path:
-    """Return the state folder, which holds missions and need not exist."""
+    """Return the folder in which missions are stored; it may not exist yet."""
     folder = _user_folder("XDG_STATE_HOME", ".local/state")
     if folder is None:
         raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder")
@@ -253,7 +253,7 @@ def home() -> Path:
 
 
 def config_file() -> Path | None:
-    """Return the file of the user's settings, which need not exist; None without a home folder."""
+    """Return the path of the user's settings, which may not exist, or None if there is no home folder."""
     folder = _user_folder("XDG_CONFIG_HOME", ".config")
     return None if folder is None else folder / "config.yaml"
 
@@ -264,12 +264,12 @@ def _user_folder(variable: str, default: str) -> Path | None:
     base = os.environ.get(variable)
     try:
         return (Path(base) if base else Path.home() / default) / "codebotler"
-    except RuntimeError:  # the user has no home folder, as in containers
+    except RuntimeError:  # the user has no home folder, which is common in containers
         return None
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder to write into; UserError if that is not allowed."""
+    """Create a folder if it is missing; raise UserError if it is not writable."""
     with suppress(PermissionError):
         folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):

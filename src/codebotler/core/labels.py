@@ -1,9 +1,8 @@
-"""Validate labels of a world: regexes whose search cannot take exponential time.
+"""Validate the labels of a world, and reject regexes that may take exponential time.
 
-Python backtracks through every way to match, and nothing can interrupt it. So in a label, a repeat holds
-single characters only, at most one repeat has no limit, and few ways remain to match the same text. This
-simple rule also rejects some quick regexes, which names and answers do not need. `.*` at either end of a
-label is free.
+Python tries every way to match a regex and cannot be interrupted. In a label, a repeat may therefore contain
+only single characters, at most one repeat may be unlimited, and the ways to match one text are limited. This
+simple rule also rejects some fast regexes that labels do not need. `.*` at either end is always allowed.
 """
 
 from __future__ import annotations
@@ -17,8 +16,9 @@ from typing import Any
 from codebotler.core.regex_flags import scope_flags
 
 PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
-ENDLESS_REPEATS = 100  # a repeat of more counts as unlimited
-MAX_WAYS, MAX_WAYS_BESIDE_ENDLESS = 1_000, 40  # to match one text; the second with an unlimited repeat
+ENDLESS_REPEATS = 100  # repeats with a higher limit count as unlimited
+MAX_WAYS = 1_000  # to match one text
+MAX_WAYS_BESIDE_ENDLESS = 40  # to match one text if a repeat is unlimited
 ANY_LABEL = ".*"
 SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
 REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
@@ -28,11 +28,11 @@ UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
 
 
 class SlowRegexError(Exception):
-    """A regex that may be slow to search; the text says why and what to write instead."""
+    """Raised for a regex that may be slow to search; the message says why and what to write instead."""
 
 
 def check_label(text: str) -> str:
-    """Return a label.
+    """Return a label unchanged if it is valid.
 
     Raises:
         ValueError: it is not a regular expression, or it may be slow to search.
@@ -48,10 +48,10 @@ def check_label(text: str) -> str:
 
 
 def check_regex(text: str) -> str:
-    """Return a regular expression; raise ValueError for any other text."""
+    """Return a regular expression unchanged; raise ValueError if it is not valid."""
     try:
         re.compile(text)
-        re.compile(f"(?:{scope_flags(text)})")  # the pattern for whole words wraps it
+        re.compile(f"(?:{scope_flags(text)})")  # patterns for whole words wrap it like this
     except (re.error, RecursionError, OverflowError) as error:
         raise ValueError(f"it is not a valid regular expression: {error}") from None
     return text
@@ -59,19 +59,19 @@ def check_regex(text: str) -> str:
 
 @lru_cache(maxsize=1024)
 def expect_quick(pattern: str) -> None:
-    """Raise SlowRegexError if a regex breaks the rule of this module."""
+    """Raise SlowRegexError if a regex breaks the rule described at the top of this module."""
     if pattern != ANY_LABEL:
         pattern = pattern.removeprefix(ANY_LABEL)
         pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANY_LABEL)
     ways, endless = _cost(import_module("re._parser").parse(pattern))
     if endless > 1:
-        raise SlowRegexError("two repeats have no limit; write a limit, as in .{0,50}")
+        raise SlowRegexError("two repeats are unlimited; give them a limit, as in .{0,50}")
     if ways > (MAX_WAYS_BESIDE_ENDLESS if endless else MAX_WAYS):
         raise SlowRegexError("there are too many ways to match one text; use fewer repeats and choices")
 
 
-def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - of private classes of `re`
-    """Return the ways in which part of a regex may match one text, and its number of unlimited repeats."""
+def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
+    """Count the ways in which part of a regex can match one text, and its unlimited repeats."""
     costs = [(str(op), *_cost_of(str(op), value)) for op, value in tree]
     # Python never backtracks into a lookaround, so its cost is added to that of the rest.
     looks = [(ways, endless) for op, ways, endless in costs if op in LOOK_OPCODES]
@@ -82,9 +82,9 @@ def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - of private classes of
     )
 
 
-def _cost_of(op: str, value: Any) -> tuple[int, int]:  # noqa: ANN401 - the same
+def _cost_of(op: str, value: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
     if op in UNSUPPORTED_OPCODES:
-        raise SlowRegexError("it refers to one of its groups; write out what you mean")
+        raise SlowRegexError("it refers back to a group; write out the text instead")
     if op in REPEAT_OPCODES:
         return _cost_of_repeat(*value)
     if op == "BRANCH":
@@ -95,10 +95,10 @@ def _cost_of(op: str, value: Any) -> tuple[int, int]:  # noqa: ANN401 - the same
     return _cost(value[-1]) if op in GROUPS else (1, 0)
 
 
-def _cost_of_repeat(least: int, most: int, repeated: Any) -> tuple[int, int]:  # noqa: ANN401 - the same
+def _cost_of_repeat(least: int, most: int, repeated: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
     if most <= 1:
         ways, endless = _cost(repeated)
         return 1 + ways, endless
     if [str(op) for op, _ in repeated][1:] or str(repeated[0][0]) not in SINGLE:
-        raise SlowRegexError("a repeat holds more than one character; write out how often it may be there")
+        raise SlowRegexError("a repeat contains more than one character; write out the repetitions")
     return (1, 1) if most > ENDLESS_REPEATS else (most - least + 1, 0)

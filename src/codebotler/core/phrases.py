@@ -12,13 +12,13 @@ from codebotler.core.trace import Event, Option
 from codebotler.core.words import brief
 
 NO_ANSWER = "no answer"
-MAX_BRACKETED_OPTIONS = 20  # options
+MAX_BRACKETED_OPTIONS = 20
 
 
 def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, quote: str = '"') -> str:
     """Describe an event, such as `looked for "mug": found` or `asked "Tea?" [yes | no] → yes`.
 
-    The result, if any, follows the verb; for the forms `base` and `ing` in parentheses.
+    The result, if there is one, comes last; the forms `base` and `ing` put it in parentheses.
 
     Args:
         event: the event.
@@ -41,18 +41,18 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
 
 
 def verb_phrase(kind: str, form: VerbForm, given: Sequence[str], quote: str = '"') -> str:
-    """Return a form of the verb of a kind of event with the arguments of its skill."""
+    """Return the verb for a kind of event in the given form, followed by the arguments of the skill."""
     is_bare = not given or (not given[0] and by_event(kind) is None) or has_no_text(kind)
     return verb(kind).with_object(getattr(verb(kind), form), [] if is_bare else given, quote)
 
 
 def result_words(event: Event) -> str:
-    """Return the result of an event in words, such as `not found`; empty if it has none."""
+    """Return the result of an event in words, such as `not found`, or an empty string if it has none."""
     return "" if event.found is None else verb(event.kind).results[event.found]
 
 
 def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brief) -> str:
-    """Return the options of a question, such as `[yes | no]`."""
+    """Write the options of a question in brackets, such as `[yes | no]`."""
     shown = [
         f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in options[:MAX_BRACKETED_OPTIONS]
     ]
@@ -61,7 +61,7 @@ def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brie
 
 
 def verb(kind: str) -> Verb:
-    """The verb for a kind of event, also for one that no skill of this process leaves."""
+    """Return the verb for a kind of event; kinds that no loaded skill records get a generic verb."""
     if (known := verb_for(kind)) is not None:
         return known
     shown = visible(kind)

@@ -1,8 +1,8 @@
-"""Parse programs, and find the skills they call and certain errors.
+"""Parse programs, and find the skills they call and their definite errors.
 
-A limit on the length bounds the time to parse, which is quadratic for some texts in CPython 3.11. Nothing
-bounds the time to compile and to run `symtable` and pyflakes: apply them to untrusted text only in isolated
-processes (`codebotler.simulator.isolated_call`).
+CPython 3.11 parses some texts in quadratic time, so the length of programs is limited. The compiler,
+`symtable` and pyflakes may still take any time: apply them to untrusted text only in isolated processes
+(`codebotler.simulator.isolated_call`).
 """
 
 from __future__ import annotations
@@ -26,18 +26,16 @@ from codebotler.core.unicode import compose
 from codebotler.core.words import counted, listed
 
 TASK_FUNCTION = "task_program"
-MAX_PROGRAM_LENGTH = 20_000  # characters; parsing them takes at most a tenth of a second
+MAX_PROGRAM_LENGTH = 20_000  # characters, which take at most a tenth of a second to parse
 MAX_KNOWN_NAMES, MAX_MISSPELT_LENGTH, MAX_HINTS = 1_000, 60, 10  # limits of hints about misspelt names
-NAME_CUTOFF = 0.65  # the least similarity of a suggested name, from 0 to 1
-GIVEN_MODULES = ("time", "sys")  # modules that every program finds imported
+NAME_CUTOFF = 0.65  # the minimum similarity of a suggested name, from 0 to 1
+GIVEN_MODULES = ("time", "sys")  # modules that every program can use without an import
 SOURCE_NAME = "<program>"
 
-warnings.filterwarnings(
-    "ignore", module=SOURCE_NAME
-)  # about invalid escapes such as "\d" in the programs of models
+warnings.filterwarnings("ignore", module=SOURCE_NAME)  # about invalid escapes such as "\d" in programs
 
-# CPython before 3.13 adds up the depths of the trees that all threads are building: of two threads that
-# parse at the same time, one gets a SystemError. A forked process must not inherit a locked lock.
+# CPython before 3.13 counts the nesting depth of all threads together, so if two threads parse at the same
+# time, one gets a SystemError. A forked process must not inherit a locked lock.
 _PARSING = threading.Lock()
 os.register_at_fork(
     before=_PARSING.acquire, after_in_parent=_PARSING.release, after_in_child=_PARSING.release
@@ -46,12 +44,12 @@ os.register_at_fork(
 
 @dataclass(frozen=True)
 class Flaw:
-    """A certain error of a program."""
+    """A definite error in a program."""
 
-    line: int | None  # counted from 1; None where no line is to blame
-    kind: str  # the kind of failure it leads to, such as `NameError` or `AskEmptyOptions`
+    line: int | None  # counted from 1; None if no single line is at fault
+    kind: str  # the kind of error that it causes, such as `NameError` or `AskEmptyOptions`
     message: str  # one plain sentence
-    is_misuse: bool = False  # whether it misuses a skill, which a broad `except` hides but does not fix
+    is_misuse: bool = False  # whether it misuses a skill; a broad `except` hides this but does not fix it
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ class Program:
 
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """Return the syntax tree of a source, which callers must not change; raise as `ast.parse` does."""
+    """Return the syntax tree of a program, which callers must not change; raise what `ast.parse` raises."""
     with _PARSING:
         return ast.parse(compose(source), SOURCE_NAME)
 
@@ -93,16 +91,16 @@ def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
 
 
 def parse_expression(source: str) -> ast.expr:
-    """Return the syntax tree of an expression; raise as `ast.parse` does."""
+    """Return the syntax tree of an expression; raise what `ast.parse` raises."""
     with _PARSING:
         return ast.parse(source, SOURCE_NAME, mode="eval").body
 
 
 def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
-    """Return the syntax tree of any text, or the flaw that prevents parsing.
+    """Parse a program and return its syntax tree, or the flaw that prevents parsing.
 
-    With `compiled`, also find errors of the compiler, such as a stray `return`; only an isolated process may
-    do that with untrusted text.
+    With `compiled`, also find compile-time errors, such as a stray `return`; for untrusted text, do this only
+    in an isolated process.
     """
     if "\0" in source or len(source) > MAX_PROGRAM_LENGTH:
         return _text_flaw(source)
@@ -141,7 +139,7 @@ def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth valu
 
 
 def parse_leniently(source: str) -> ast.Module:
-    """Return the syntax tree of a source; an empty tree if it does not parse."""
+    """Return the syntax tree of a program, or an empty tree if it does not parse."""
     tree = parse_program(source)
     return ast.Module([], []) if isinstance(tree, Flaw) else tree
 
@@ -163,7 +161,7 @@ def task_definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFuncti
 
 
 def module_bound_names(source: str) -> set[str]:
-    """Return the names that a source binds at module level; none if it does not compile."""
+    """Return the names that a program binds at module level, or an empty set if it does not compile."""
     return set() if isinstance(parse_program(source, compiled=True), Flaw) else _bound_in_module(source)
 
 
@@ -174,7 +172,7 @@ def _bound_in_module(source: str) -> set[str]:
 
 
 def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """Return the names that a program binds in any scope; `*` after `from x import *`."""
+    """Return the names that a program binds in any scope; `from x import *` binds the name `*`."""
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -193,7 +191,7 @@ def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[s
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """Return the skills that a program uses and does not redefine, each with its first line."""
+    """Return the skills that a program uses and does not redefine, each with the line of its first use."""
     rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
@@ -203,7 +201,7 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
-    """Return line and name of each undefined name, and whether it is a local variable used too early."""
+    """Return the line of each undefined name, the name, and whether it is a local variable used too early."""
     messages, names_in = _pyflakes()
     # Names in string annotations are never looked up at run time.
     spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
@@ -224,9 +222,9 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - slow
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
-    class Names(Checker):  # type: ignore[misc]  # which has no types
+    class Names(Checker):  # type: ignore[misc]  # pyflakes has no types
         def addBinding(self, node: ast.AST | None, value: Any) -> None:  # noqa: ANN401, N802 - pyflakes' own
-            if node is None:  # one of some 170 builtins, for which the quick way suffices
+            if node is None:  # one of about 170 builtins, which need no further checks
                 self.scope[value.name] = value
             else:
                 super().addBinding(node, value)
@@ -234,14 +232,14 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
     return messages, Names
 
 
-# --- certain errors
+# --- definite errors
 
 
 def find_flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """Find the certain errors of a program, sorted by line, without running it.
+    """Find the definite errors in a program without running it, and sort them by line.
 
     Args:
-        source: the program; untrusted text only in an isolated process.
+        source: the program; pass untrusted text only in an isolated process.
         skills: the skills that the program may call.
     """
     tree = parse_program(source, compiled=True)
@@ -249,7 +247,7 @@ def find_flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
 
 
 def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """Find the certain errors of a program that compiles, sorted by line."""
+    """Find the definite errors in a program that compiles, and sort them by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:
@@ -296,7 +294,7 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 
 
 def _suggest_names(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
-    """Suggest known names for undefined ones, within a short time."""
+    """Suggest known names for undefined ones; limits keep this fast."""
     known = sorted({*all_bound_names(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
     if len(known) > MAX_KNOWN_NAMES:

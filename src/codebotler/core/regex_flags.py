@@ -8,7 +8,7 @@ _FLAGS = re.compile(r"\(\?([aiLmsux]+)\)")
 
 
 def scope_flags(pattern: str) -> str:
-    """Turn the flags at the start of a regex into flags of a group, so that it can be part of another."""
+    """Turn the flags at the start of a regex into flags of a group, so that it can be embedded in another."""
     found = _FLAGS.match(pattern)
     if found is None:
         return pattern

@@ -1,4 +1,4 @@
-"""All output of the commands, with control characters escaped."""
+"""Print the output of all commands, with control characters escaped."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 MAX_PIPE_WIDTH = 10_000
-QUIET_S = 2.0  # before a command says what it is doing
+QUIET_S = 2.0  # seconds before a command says what it is doing
 
 
 @contextmanager
 def report_problems() -> Iterator[None]:
-    """Print logs, warnings and tracebacks as notes; exit with 1 after an unexpected error."""
+    """Print logs, warnings and tracebacks to stderr; exit with status 1 after an unexpected error."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # for terminals without Unicode
     before = logging.lastResort, warnings.showwarning, threading.excepthook
@@ -57,7 +57,7 @@ def _note_error(error: BaseException | None) -> None:
 
 
 def open_streams() -> None:
-    """Open closed standard streams on /dev/null, or files that we open would take their numbers."""
+    """Open closed standard streams on /dev/null, so that our own files do not get their descriptors."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
@@ -69,7 +69,7 @@ def flush_output() -> None:
 
 
 def drop_output() -> None:
-    """Discard the rest of stdout."""
+    """Discard all further output to stdout."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -90,7 +90,7 @@ def console(*, stderr: bool = False, highlight: bool = True) -> Console:
 
 
 def progress(*columns: ProgressColumn) -> Progress:
-    """Return a progress bar on stderr, disabled without a terminal."""
+    """Return a progress bar on stderr, which is disabled if stderr is not a terminal."""
     from rich.progress import Progress
 
     where = console(stderr=True)
@@ -98,7 +98,7 @@ def progress(*columns: ProgressColumn) -> Progress:
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print to a terminal, or plainly to a pipe with lines of any length unless COLUMNS is set."""
+    """Print to a terminal, or print plain text to a pipe, with lines of any length unless COLUMNS is set."""
     from rich.measure import Measurement
 
     drawing = console()
@@ -115,7 +115,7 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show what a command is doing: a timer on a terminal, elsewhere a line after two seconds."""
+    """Show what a command is doing: with a timer on a terminal, else in a line after two seconds."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     line = Timer(QUIET_S, note, [f"{doing} ..."])
@@ -144,17 +144,17 @@ def print_source(text: str) -> None:
 
 
 def print_text(text: str) -> None:
-    """Print lines for people."""
+    """Print text to stdout with control characters escaped."""
     print(visible_lines(text), flush=True)
 
 
 def note(sentence: str) -> None:
-    """Print to stderr, apart from results on stdout."""
+    """Print a message to stderr, since stdout is for results."""
     print(visible_lines(sentence), file=sys.stderr)
 
 
 def confirm(question: str) -> bool:
-    """Ask a question on stderr; return True only for yes."""
+    """Ask a question on stderr, and return True only if the answer is yes."""
     print(f"{visible(question)} [y/N] ", end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
 
@@ -181,6 +181,6 @@ def visible_lines(text: str) -> str:
 
 
 def shortened(text: str, most: int = 500, shown: Callable[[str], str] = visible) -> str:
-    """Escape a text and shorten it for reading."""
+    """Escape a text, and cut it off after `most` characters with the number of the rest."""
     left = len(text) - most
     return shown(text) if left <= 0 else f"{shown(text[:most])}... {left:,} more characters"

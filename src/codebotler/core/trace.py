@@ -18,7 +18,7 @@ class Option(NamedTuple):
 
     Args:
         text: the option as text.
-        is_text: False if the program offered another type, such as a number, which RTL does not judge.
+        is_text: False if the program offered another type, such as a number, which RTL cannot judge.
     """
 
     text: str
@@ -34,17 +34,17 @@ def to_options(values: Iterable[object]) -> tuple[Option, ...]:
 
 @dataclass(frozen=True, init=False)
 class Event:
-    """One executed skill.
+    """A skill that the robot executed.
 
     Args:
-        kind: goto, say, ask, check, pick or place, or the kind of a further skill.
+        kind: goto, say, ask, check, pick or place, or the kind that a custom skill records.
         text: the program's request, stripped.
         options: the options of a question; empty for other kinds.
-        answer: the text of the chosen option; None without an answer and for other kinds.
+        answer: the text of the chosen option; None for an unanswered question and for other kinds.
         found: the result of a look or another yes-or-no skill; None for other kinds.
-        place: the world's name of the room where it happened (for a drive, where it started).
+        place: the name, in the world, of the room where it happened (for a drive, where it started).
         time: simulated seconds since the start of the run.
-        holding: what the robot held at its start; empty for nothing.
+        holding: what the robot held when it began; empty for nothing.
         to: the addressee of a question; None for other kinds.
         more: further arguments, as texts.
         destination: the room where a drive ended; None for a failed drive and for other kinds.
@@ -62,13 +62,13 @@ class Event:
     more: tuple[str, ...] = ()
     destination: str | None = field(default=None, compare=False)
 
-    def __init__(  # noqa: PLR0917 - like the generated one
+    def __init__(  # noqa: PLR0917 - the fields of the data class
         self,
         kind: str,
         text: str,
         options: tuple[Option, ...] = (),
         answer: str | None = None,
-        found: bool | None = None,  # noqa: FBT001 - the same
+        found: bool | None = None,  # noqa: FBT001 - a field of the data class
         place: str = "",
         time: float = 0.0,
         holding: str = "",
@@ -91,7 +91,7 @@ def attempted_event(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """Return the event that a skill records if it runs now, if any."""
+    """Return the event that a skill records if it runs now, or None if it records none."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))
@@ -117,7 +117,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class RunError:
-    """Why a run did not finish."""
+    """The reason why a run did not finish."""
 
     kind: str  # an exception's class, a robot error, TimeoutError, MemoryError, Crash or ForbiddenCall
     message: str  # one sentence
@@ -125,13 +125,13 @@ class RunError:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end and the trace of a run.
+    """How a run ended, and its trace.
 
     Args:
         status: how it ended.
         trace: the robot's actions.
         error: None if and only if the status is `finished`.
-        line: the line of the program where it ended, counted from 1, if known.
+        line: the line of the program where it ended, counted from 1; None if unknown.
     """
 
     status: Status
@@ -140,7 +140,7 @@ class Outcome:
     line: int | None = None
 
 
-# --- as plain data
+# --- conversion to plain data
 
 
 def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
@@ -197,7 +197,7 @@ def _event_from(element: object) -> Event:
 
 
 def option_data(option: Option) -> object:
-    """Convert an option to its text, or to a mapping if it is not a text."""
+    """Convert an option to its text, or to a mapping if the program offered another type."""
     return option.text if option.is_text else {"no text": option.text}
 
 

@@ -1,6 +1,6 @@
-"""Normalize all texts that are compared to NFC, in which a letter and its accent are one character.
+"""Normalize texts to NFC, where a letter and its accent are one character, so that they can be compared.
 
-This happens where texts enter: where programs are parsed, files and worlds read, and where formulas,
+Texts are normalized on entry: when programs are parsed, when files and worlds are read, and when formulas,
 instructions, replies and a robot's answers arrive.
 """
 
@@ -18,7 +18,7 @@ def compose(value: Composed) -> Composed:
         return normalize("NFC", value)  # type: ignore[return-value]  # a text, too
     if isinstance(value, list):
         return [compose(one) for one in value]  # type: ignore[return-value]
-    if isinstance(value, tuple) and type(value) is tuple:  # a named tuple has composed texts already
+    if isinstance(value, tuple) and type(value) is tuple:  # the texts in a named tuple are already composed
         return tuple(compose(one) for one in value)  # type: ignore[return-value]
     return value
 

@@ -6,23 +6,23 @@ from collections.abc import Sequence
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
-    """Join an enumeration: `a, b and c`."""
+    """Join words in an enumeration, such as `a, b and c`."""
     if len(parts) <= 1:
         return "".join(parts)
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number with a regular noun: `1 world`, `2,000 worlds`."""
+    """Return a number with a regular noun, such as `1 world` or `2,000 worlds`."""
     return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
 def times(number: int) -> str:
-    """Return a frequency: `once`, `twice`, `3 times`."""
+    """Return a frequency in words, such as `once`, `twice` or `3 times`."""
     return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number:,} times")
 
 
 def brief(text: str, most: int = 70) -> str:
-    """Return a text on one line, shortened for a sentence."""
+    """Put a text on one line, and shorten it to at most `most` characters."""
     line = " ".join(text.split())
     return line if len(line) <= most else f"{line[: most - 1].rstrip()}…"

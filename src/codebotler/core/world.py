@@ -25,10 +25,10 @@ Answer: TypeAlias = str | int
 class Person:
     """A person in a room who answers questions."""
 
-    name: str  # a regex for their names
-    answers: tuple[Answer, ...] = ()  # one per question, then the last one again; if empty, questions fail
-    topics: tuple[tuple[str, Answer], ...] = ()  # regexes for questions with their own answers
-    after_looks: int = 0  # the number of looks in vain before they arrive
+    name: str  # a regex that matches their names
+    answers: tuple[Answer, ...] = ()  # one per question; the last one repeats; if empty, questions fail
+    topics: tuple[tuple[str, Answer], ...] = ()  # regexes for questions, each with its own answer
+    after_looks: int = 0  # the number of unsuccessful looks before they arrive
     leaves: bool = False  # whether they leave after their last answer
 
     def __post_init__(self) -> None:
@@ -40,10 +40,10 @@ class Room:
     """A room that the robot can drive to.
 
     Args:
-        name: a regex to find in a program's request.
+        name: a regex that is searched for in a program's request.
         objects: the labels of its objects, in order.
-        people: the people there, in order.
-        footprint: its corners in metres; None if unknown.
+        people: the people in it, in order.
+        footprint: the positions of its corners in metres; None if unknown.
         stand_at: the point where the robot stops, in metres.
     """
 
@@ -59,14 +59,14 @@ class Room:
 
 @dataclass(frozen=True)
 class World:
-    """An initial state of the world (paper, section IV.A).
+    """The initial state of a simulated world (paper, section IV.A).
 
     Args:
-        rooms: at least one, with unique names, in the robot's order.
+        rooms: the rooms, at least one, with unique names, in the order in which the robot lists them.
         robot: the room where the robot starts.
         about: a short description.
         may_wait_forever: whether a program may wait here for something that never happens.
-        truths: further facts, and results of custom skills.
+        truths: values of further facts and results of custom skills.
     """
 
     rooms: tuple[Room, ...]
@@ -115,8 +115,8 @@ def _squared(room: Room) -> Room:
 def laid_out(world: World) -> World:
     """Give every room a footprint and a standing point, in a grid on both sides of a hallway.
 
-    Existing footprints stay; a room with only a standing point becomes a square metre around it, and other
-    rooms follow to the right.
+    Existing footprints are kept; a room with only a standing point gets a square metre around it, and other
+    rooms are placed to the right.
     """
     known = [_squared(room) for room in world.rooms]
     taken = [x for room in known for x, _ in room.footprint or ()]
@@ -159,13 +159,13 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
-MIN_PART = 1e-9  # of a way, or metres; less is a rounding error
+MIN_PART = 1e-9  # a fraction of a path, or metres; smaller values are rounding errors
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
-    """Yield the names of the rooms that contain each part of a straight way, from start to end."""
+    """Yield, for each part of a straight path from start to end, the names of the rooms that contain it."""
     here, way = complex(*start), complex(*end) - complex(*start) or MIN_PART
-    edges = {}  # for each room, the fractions of the way at which it crosses an edge
+    edges = {}  # for each room, the fractions of the path at which the path crosses its edges
     for room in rooms:
         corners = [(complex(*corner) - here) / way for corner in room.footprint or ()]
         edges[room.name] = crossings(0.0, [(corner.real, corner.imag) for corner in corners])
@@ -177,7 +177,7 @@ def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tup
 
 
 def crossings(y: float, corners: Sequence[Point]) -> list[float]:
-    """Return where the edges of a polygon cross a horizontal line, from left to right."""
+    """Return the x coordinates at which the edges of a polygon cross a horizontal line, in order."""
     edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
     return sorted(
         a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)

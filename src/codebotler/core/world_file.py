@@ -1,4 +1,4 @@
-"""Read worlds in YAML, alone or inside a task, and report mistakes in them."""
+"""Read YAML descriptions of worlds, alone or inside a task, and report mistakes in them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from codebotler.core.yaml_files import YamlFile, YamlPath
 
 
 def read_world(path: Path, skills: SkillTable | None = None) -> World:
-    """Read a world file; a UserError has the line of a mistake and the fix.
+    """Read a world file; raise UserError with the line of a mistake and its fix.
 
     Args:
         path: the file.
@@ -68,7 +68,7 @@ def _not_zero(option: int) -> int:
 
 
 class OptionFile(_Form):
-    """An answer in a world file, as the position of an option."""
+    """An answer in a world file, given as the position of an option."""
 
     option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
 
@@ -92,7 +92,7 @@ class PersonFile(_Form):
     leaves: Annotated[bool, Field(strict=True)] = False
 
     def person(self) -> Person:
-        """Return the person."""
+        """Convert the entry to a Person."""
         topics = tuple((topic, _answer(answer)) for topic, answer in self.topics.items())
         answers = tuple(map(_answer, self.answers))
         return Person(self.name, answers, topics, self.after_looks, self.leaves)
@@ -103,7 +103,7 @@ def _answer(form: AnswerFile) -> Answer:
 
 
 class RoomFile(_Form):
-    """A room in a world file: a name alone or with geometry."""
+    """A room in a world file: a name, alone or with geometry."""
 
     name: NamePattern
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
@@ -137,7 +137,7 @@ class WorldFile(_Form):
             yield asked, tuple(value) if isinstance(value, list) else value
 
     def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
-        """Return the world; raise UserError about a room, a regex or a truth."""
+        """Convert the file to a World; raise UserError if a room, a regex or a truth is wrong."""
         names: dict[str, str] = {}  # by lower-case name
         for index, room in enumerate(self.rooms):
             if other := names.get(room.name.lower()):
@@ -149,7 +149,7 @@ class WorldFile(_Form):
             if room.stand_at and room.footprint and not is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
-                raise file.wrong(f"{sentence}; move one of them", *at, "rooms", index, "stand_at")
+                raise file.wrong(f"{sentence}; move the point", *at, "rooms", index, "stand_at")
         rooms = dict.fromkeys(names.values())
         known = ", ".join(rooms)
         if self.robot not in rooms:
@@ -180,7 +180,7 @@ _CALL = re.compile(r"\w+\(.*\)")
 
 
 def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
-    """Return a statement in the form that skills use; raise ValueError if its value is impossible."""
+    """Return a statement as skills write it; raise ValueError if its value is impossible."""
     if not _CALL.fullmatch(statement):
         if not isinstance(value, bool):
             raise ValueError(f'"{statement}" is {value!r}; write true or false')
@@ -203,17 +203,17 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
 
 
 def _expect_possible(name: str, given: list[object], value: object, skills: SkillTable) -> None:
-    """Raise ValueError if a call cannot return a value, or code decides its result."""
+    """Raise ValueError if a call cannot return this value, or if the skill's code computes its result."""
     if name not in skills:
         alike = get_close_matches(name, skills, 1)
         raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
     row = skills[name]
     if not row.is_random:
-        raise ValueError(f"the code of {name} decides its result; set the truths that it asks for")
+        raise ValueError(f"the code of {name} computes its result; set the truths that it queries instead")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):
-        raise ValueError(f"{name} takes other arguments: {row.signature}")
+        raise ValueError(f"the arguments of {name} are wrong; its signature is {row.signature}")
     kinds = [kind for kind, _ in row.fails]
     if value in kinds or (row.returns.base is not None and row.returns.fits(value)):
         return

@@ -20,7 +20,7 @@ from codebotler.core.files import read_text
 from codebotler.core.unicode import compose
 
 YamlPath: TypeAlias = tuple[str | int, ...]
-"""A path of keys and positions in a file."""
+"""The keys and positions that lead to a part of a file."""
 
 FileModel = TypeVar("FileModel", bound=BaseModel)
 
@@ -40,7 +40,7 @@ SYNTAX_MENDS = {
 class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chosen above
     """A loader that stops before the nesting overflows the C stack."""
 
-    yaml_implicit_resolvers = {  # noqa: RUF012 - like the base class, but "<<" and "=" are texts
+    yaml_implicit_resolvers = {  # noqa: RUF012 - as in the base class, except that "<<" and "=" are texts
         first: forms for first, forms in Loader.yaml_implicit_resolvers.items() if first not in {"<", "="}
     }
     depth = 0
@@ -59,10 +59,10 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
         is_long = (
             isinstance(node, yaml.ScalarNode) and node.tag != TEXT_TAG and len(node.value) > MAX_NUMBER_LENGTH
         )
-        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # an impossible date, say
+        with suppress(ValueError, LookupError, AttributeError, OverflowError):  # such as an impossible date
             if not is_long:
                 made = super().construct_object(node, deep)
-                return compose(made) if isinstance(made, str) else made  # a list is filled later
+                return compose(made) if isinstance(made, str) else made  # lists are filled later
         problem = f"{_quoted(node.value)} is not a valid {node.tag.rpartition(':')[2]}"
         raise _fault(f"{problem}; put quotes around the text", node)
 
@@ -76,7 +76,7 @@ def _quoted(value: object) -> str:
 
 
 class YamlFile:
-    """A parsed YAML file with the lines of all its parts; raises UserError if it is not valid."""
+    """A parsed YAML file that knows the line of each part; invalid YAML raises UserError."""
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
@@ -97,21 +97,21 @@ class YamlFile:
         return cls(read_text(path), path)
 
     def line(self, place: Sequence[str | int]) -> int | None:
-        """Return the line of a place, or of the nearest part around it."""
+        """Return the line of a part of the file, or of the nearest part that contains it."""
         path = tuple(place)
         while path not in self._lines:
             if not path:
                 return None
-            *around, last = path  # a number may be a key, which is stored as text
+            *around, last = path  # a number may be a key, and keys are stored as text
             path = (*around, str(last)) if isinstance(last, int) else tuple(around)
         return self._lines[path]
 
     def part(self, key: str, data: object) -> YamlFile:
-        """Return the value of a key as a separate file with the same line numbers.
+        """Return the value of a key as a file of its own that keeps the line numbers.
 
         Args:
             key: a key of the file.
-            data: its value, possibly with other texts.
+            data: its value, in which texts may have been replaced.
         """
         found = copy(self)
         found.data, lines = data, self._lines.items()
@@ -119,11 +119,11 @@ class YamlFile:
         return found
 
     def wrong(self, sentence: str, *place: str | int) -> UserError:
-        """Return an error about a place in this file."""
+        """Return a UserError about a part of this file, with its line."""
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
-        """Validate the content, or the part at a place, as a model; raise UserError for the first mistake."""
+        """Validate the content, or `data` at a place, against a model; raise UserError if it does not fit."""
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
@@ -145,7 +145,7 @@ class YamlFile:
             problem = f"the character U+{error.character:04X} is not allowed"
             line = self._text.encode()[: error.position].count(b"\n") + 1
         else:
-            line = min(mark.line + 1, len(self._text.splitlines()))  # the mark may be behind the end
+            line = min(mark.line + 1, len(self._text.splitlines()))  # the mark may be after the end
         sentence = ", ".join(part for part in (context, problem) if part).replace(", but", " but")
         mend = f"; {SYNTAX_MENDS[problem]}" if problem in SYNTAX_MENDS else ""
         return UserError(f"not valid YAML: {sentence}{mend}", file=self.name, line=line)
@@ -170,7 +170,7 @@ class YamlFile:
                 self._lines[inner] = key.start_mark.line + 1
 
 
-# --- errors of pydantic in plain English
+# --- pydantic errors in plain English
 
 EXPECTED_TYPES = {
     "string_type": "a text",
@@ -201,7 +201,7 @@ VALUE_KINDS = (
 
 
 def _select_error(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
-    """Return the error to report and a hint: a missing key may be present but misspelt."""
+    """Return the error to report and a hint, since a missing key may be present but misspelt."""
     first = errors[0]
     *around, missing = first["loc"] or ("",)
     for other in errors[1:] if first["type"] == "missing" else ():

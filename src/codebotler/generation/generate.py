@@ -24,21 +24,21 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]
-"""Returns the problems of a program, a sentence each; none if the program is accepted."""
+"""Returns the problems of a program, one sentence each; none if the program is accepted."""
 
 
 @dataclass(frozen=True)
 class Attempt:
     """One reply of a model and its problems."""
 
-    number: int  # of the sample, from 0
-    prompt: Prompt = field(repr=False)  # a repair includes the previous program and its problems
+    number: int  # the number of the sample, counted from 0
+    prompt: Prompt = field(repr=False)  # for a repair, with the previous program and its problems
     reply: Reply = field(repr=False)
     problems: tuple[str, ...]  # empty if the program was accepted or not checked
     programless: ProgramlessReply | None = None  # set if the reply has no program
 
     def data(self, model: str) -> dict[str, Any]:
-        """Return the attempt as plain data for a row of JSON."""
+        """Convert the attempt to plain data for a row of JSON."""
         return {
             "instruction": self.prompt.instruction,
             "model": model,
@@ -61,22 +61,22 @@ class Generation:
 
     @property
     def program(self) -> str:
-        """The program of the last attempt; empty if its reply has none."""
+        """The program of the last attempt, or an empty string if its reply has no program."""
         return "" if self.programless else self.attempts[-1].reply.program
 
     @property
     def programless(self) -> ProgramlessReply | None:
-        """The description of the last reply, if it has no program."""
+        """The description of the last reply if it has no program, else None."""
         return self.attempts[-1].programless
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """The problems of the last program, or why there is none."""
+        """The problems of the last program, or the reason why there is no program."""
         return self.attempts[-1].problems
 
 
 def ignore_attempt(_attempt: Attempt) -> None:
-    """Ignore the attempt."""
+    """Do nothing with an attempt."""
 
 
 async def write_program(
@@ -89,10 +89,10 @@ async def write_program(
     on_text: TextListener = ignore_text,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until the check accepts a program (rejection sampling; paper, section V); close the model.
+    """Ask a model until the check accepts a program (rejection sampling; paper, section V), then close it.
 
-    Each further request is another sample; as a repair, it includes the rejected program and its problems,
-    or why the reply has no program.
+    Each further request draws another sample. With `repair`, it includes the rejected program and its
+    problems, or the reason why the reply has no program.
     """
     attempts: list[Attempt] = []
     limited, request = RateLimited(model, concurrency=1), prompt
@@ -113,7 +113,7 @@ async def write_program(
 async def _attempt(
     number: int, prompt: Prompt, reply: Reply, settings: SamplingSettings, find_problems: Checker | None
 ) -> Attempt:
-    """Check a reply; a missing program is its only problem."""
+    """Check the program in a reply; if there is no program, this is the only problem."""
     if (none := describe_programless(reply, settings)) is not None:
         return Attempt(number, prompt, reply, (none.sentence,), none)
     found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
@@ -172,9 +172,9 @@ def generate(
     settings: SamplingSettings | None = None,
     skills: SkillTable = SKILLS,
 ) -> Generation:
-    """Have a model write a program, and check it in sampled worlds.
+    """Ask a model for a program, and check the program in sampled worlds.
 
-    If all attempts have problems, return the last one with its problems.
+    If all attempts have problems, the last one decides the program and the problems of the result.
 
     Args:
         instruction: the robot's task, in plain words.
@@ -182,12 +182,12 @@ def generate(
         rooms: the names of all rooms, for the model and the check; by default those that the program visits.
         retries: how many times to ask again after problems, at least 0; by default 1 with `repair`, else 0.
         repair: whether to ask again with the program and its problems in the request.
-        settings: the model's settings, such as its temperature and server; the defaults if None.
-        skills: the robot's skills; `skills_from` reads further ones from a file.
+        settings: the model's settings, such as its temperature and server; None for the defaults.
+        skills: the robot's skills; `skills_from` reads custom skills from files.
 
     Raises:
         UserError: the model does not exist, or an argument is out of range.
-        ModelError: no complete reply arrived.
+        ModelError: the model sent no complete reply.
         EngineError: no isolated process could be started.
     """
     tries = int(repair) if retries is None else retries

@@ -9,28 +9,28 @@ from codebotler.models.base import Reply
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES, NoProgram
 from codebotler.models.sampling import CHAT_MAX_TOKENS, SamplingSettings
 
-LIMIT_FACTOR = 4  # times the limit that cut off a reply
+LIMIT_FACTOR = 4  # how much higher than the limit that cut off a reply
 MAX_REFUSAL_CHARACTERS = 200
 
 
 @dataclass(frozen=True)
 class ProgramlessReply:
-    """A reply without a program."""
+    """A model's reply that contains no program."""
 
     kind: NoProgram  # why there is no program
-    sentence: str  # the same for people
+    sentence: str  # the reason for people
     text: str = field(repr=False)  # the complete reply
     reasoning: str = field(repr=False)  # the model's reasoning
     higher_limit: int | None  # a limit that may be high enough, in tokens; None if no limit was reached
 
     @property
     def can_repair(self) -> bool:
-        """Whether asking again with the sentence may yield a program."""
+        """Whether the model may write a program if it is asked again with the sentence."""
         return self.kind != "filtered"
 
 
 def describe_programless(reply: Reply, settings: SamplingSettings) -> ProgramlessReply | None:
-    """Describe a reply without a program; return None if it has one."""
+    """Describe a reply without a program, or return None if the reply has a program."""
     kind = reply.no_program
     if kind is None:
         return None

@@ -1,4 +1,4 @@
-"""Split a partial reply into its text and its code."""
+"""Split a reply that is still arriving into its text and its code."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ REASONING_TAG = re.compile(r"\s*[<\[](?P<end>/?)(?:think(?:ing)?|thought|reason(
 
 @dataclass(frozen=True)
 class PartialReply:
-    """The part of a reply that has arrived."""
+    """The part of a reply that has arrived so far."""
 
     text: str = field(repr=False)  # such as an explanation or reasoning
-    code: str = field(repr=False)  # the last code so far; empty until code begins
+    code: str = field(repr=False)  # the last block of code so far; empty until code begins
 
 
 def split_partial(reply: str) -> PartialReply:
-    """Split the beginning of a reply into text and code; reasoning between tags contains no code."""
+    """Split the start of a reply into text and code; reasoning between tags counts as text."""
     if CONTINUATION.match(reply) and not REASONING_TAG.match(reply):
         return PartialReply("", reply)
     text: list[str] = []

@@ -1,4 +1,4 @@
-"""Prompts for models, from text files in this folder, and programs in their replies."""
+"""Write prompts for models from the text files in this folder, and read programs from replies."""
 
 from codebotler.prompts.rendering import (
     PictureMessage,

@@ -1,7 +1,7 @@
 """Extract the program from a model's reply, without fixing or completing it.
 
-Split the reply into thoughts, fenced code and text, then fences and text into blocks of code without prose
-and marks of chat templates, and choose one block as the program.
+The reply is split into thoughts, fenced code and text. Fences and text are then split into blocks of code,
+without prose and chat template tokens, and one block is chosen as the program.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from codebotler.prompts.lines import continues_prose, is_code, is_prose, parse_l
 from codebotler.prompts.segments import Segment, answer_of
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
-MAX_HELPER_DEPTH = 20  # helpers of helpers; replies have two or three levels
+MAX_HELPER_DEPTH = 20  # levels of helpers that call helpers; replies have two or three
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class ReplyContent:
     """The parts of a model's reply.
 
     Args:
-        program: the text of the program, or all of the reply without reasoning.
+        program: the text of the program, or the reply without reasoning if no program is found.
         reasoning: the model's reasoning between markers; may be empty.
-        has_code: whether the reply apart from reasoning may have code; False is certain.
+        has_code: False if the reply certainly has no code outside its reasoning.
     """
 
     program: str
@@ -44,7 +44,7 @@ class ReplyContent:
 
 
 def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
-    """Split a model's complete reply into program and reasoning; see `program_of`.
+    """Split a model's complete reply into a program and reasoning; see `program_of`.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -59,15 +59,15 @@ def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
 def program_of(reply: str, *, continues: bool = False) -> Program:
     """Return the program in a model's complete reply.
 
-    Of several definitions of `task_program`, the last complete one counts. Reasoning between markers such as
-    `<think>` and `</think>` is dropped; other pairs of markers also count if a program follows. Only lines
-    that are certainly not code, and marks of chat templates and fences, are dropped. A program that was cut
-    off stays cut off.
+    If `task_program` is defined several times, the last complete definition counts. Reasoning between markers
+    such as `<think>` and `</think>` is dropped; other pairs of markers also count if a program follows. Apart
+    from this, only chat template tokens, fences and lines that are certainly not code are dropped. A program
+    that was cut off is not completed.
 
     Args:
-        reply: code with or without fences and prose, or the indented body of `task_program` alone. One that
-            takes seconds to parse is returned unchanged.
-        continues: whether a base model continued the prompt: then the first version counts, and further
+        reply: code with or without fences and prose, or only the indented body of `task_program`. A reply
+            that takes seconds to parse is returned unchanged.
+        continues: whether a base model continued the prompt; if so, the first definition counts, and further
             examples are dropped.
 
     Raises:
@@ -77,7 +77,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
 
 
 def program_in(text: str) -> str:
-    """Return a text that defines `task_program`, or else the program in it; see `program_of`."""
+    """Return a text unchanged if it defines `task_program`, else the program in it; see `program_of`."""
     try:
         return text if defines_task(text) else program_of(text).source
     except IsolatedCallError:
@@ -94,7 +94,7 @@ def defines_task(text: str) -> bool:
     "Here it is:\n```python\ndef task_program():\n    greet()\n```\n```\ndef greet():\n    say('hello')\n```"
 )
 def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
-    """Return the program and the reasoning in a reply, and whether there is any code."""
+    """Return the program and the reasoning in a reply, and whether it has any code."""
     lines = re.split(r"\r\n|\r|\n", reply.removeprefix("\ufeff"))
     if _is_program(lines, continues=continues):
         return _join([lines]), "", True
@@ -106,7 +106,7 @@ def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
 
 
 def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
-    """Whether the complete reply is the program, whatever its strings look like."""
+    """Whether the complete reply is a program, even if its strings look like fences or prose."""
     tree = parse_lines(lines)
     is_one = tree is not None and not (continues and len(task_definitions(tree)) > 1)
     return (
@@ -121,12 +121,12 @@ def _is_program(lines: Sequence[str], *, continues: bool) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Lines of a reply that belong together as code."""
+    """A group of lines in a reply that belong together as code."""
 
     lines: Sequence[str]  # without common indentation
     tree: ast.Module | None  # None if they do not parse
     fenced: bool
-    headless: bool  # whether it was a body, and `def task_program():` was added
+    headless: bool  # whether it is a body to which `def task_program():` was added
 
     @property
     def defines_task(self) -> bool:
@@ -134,7 +134,7 @@ class _Block:
 
     @property
     def is_outline(self) -> bool:
-        """Whether its program has only a docstring, `...` or `pass`."""
+        """Whether its `task_program` contains nothing but a docstring, `...` or `pass`."""
         return self.tree is not None and any(
             all(map(_is_idle, e.body)) for e in task_definitions(self.tree)[-1:]
         )
@@ -150,7 +150,7 @@ _ENTRY = re.compile(rf"(?:async\s+)?def\s+{TASK_FUNCTION}\b|{TASK_FUNCTION}\s*=(
 
 
 def _blocks(segment: Segment, *, continues: bool) -> Iterator[_Block]:
-    """Yield the blocks of a segment: all of it if it parses, else the parts that are not prose."""
+    """Yield the blocks of a segment: the whole segment if it parses, else the parts that are not prose."""
     fenced = segment.kind == "fence"
     whole = _block(segment.code, fenced=fenced)
     found = [whole] if whole.tree else [_block(run, fenced=fenced) for run in _code_runs(segment.code)]
@@ -160,7 +160,7 @@ def _blocks(segment: Segment, *, continues: bool) -> Iterator[_Block]:
 
 
 def _block(lines: Sequence[str], *, fenced: bool) -> _Block:
-    """Make a block, without marks of a chat template if the lines parse only then."""
+    """Make a block of lines, without chat template tokens if the lines parse only without them."""
     block = _block_as_written(trim(lines), fenced=fenced)
     if block.tree:
         return block
@@ -188,9 +188,9 @@ def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
 
 
 def _as_body(lines: Sequence[str]) -> list[str] | None:
-    """Add a header to the lines if they are the body of `task_program`, else return None.
+    """Add a header to the lines if they are the body of `task_program`; otherwise, return None.
 
-    The first line may lack its indentation, since the prompt may end with it.
+    The first line may have no indentation, since the prompt may end with it.
     """
     code = _code_of(lines)
     if not code or is_prose(lines[code[0]].strip()):
@@ -211,10 +211,10 @@ def _as_body(lines: Sequence[str]) -> list[str] | None:
 
 
 def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
-    """Split a block before each further definition of `task_program` and its comment.
+    """Split a block before each further definition of `task_program` and the comments above it.
 
-    A chat model's block that parses stays whole, as its last definition counts; a base model may continue
-    with further examples.
+    A chat model's block that parses is not split, since its last definition counts; a base model's block may
+    contain further examples.
     """
     lines = block.lines
     starts = [i for i, line in enumerate(lines) if _ENTRY.match(line) and "=" not in line.split("(", 1)[0]]
@@ -226,7 +226,7 @@ def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
 
 
 def _introduction(lines: Sequence[str], start: int) -> int:
-    """Return the first line of the comments and decorators before a definition."""
+    """Return the index of the first comment or decorator above a definition."""
     while start and (not lines[start - 1].strip() or lines[start - 1].startswith(("#", "@"))):
         start -= 1
     return start
@@ -236,10 +236,10 @@ def _introduction(lines: Sequence[str], start: int) -> int:
 
 
 def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
-    """Choose the block that defines the program, or else one that may be the program.
+    """Choose the block that defines the program, or else a block that may be the program.
 
-    A base model's first block continues the prompt; in a chat, the last complete block that is more than an
-    outline counts.
+    The first block of a base model continues the prompt; for a chat model, the last complete block that is
+    more than an outline counts.
     """
     if continues and blocks and blocks[0].defines_task:
         return blocks[0]
@@ -254,7 +254,7 @@ def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
 
 
 def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
-    """Add the blocks, possibly earlier versions, that define names which the chosen block lacks."""
+    """Add the blocks that define names which the chosen block needs; they may be earlier versions."""
     at = blocks.index(chosen)
     kept = {at}
     tree = chosen.tree

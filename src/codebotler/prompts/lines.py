@@ -1,4 +1,4 @@
-"""Distinguish code, prose and marks of chat templates, line by line."""
+"""Tell code, prose and chat template tokens apart, line by line."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RESIDUE = re.compile(
 )
 KEYWORDS = "|".join((*(word for word in keyword.kwlist if word.islower()), "match", "case", "print", "exec"))
 WORD = rf"(?!(?:{KEYWORDS})\b)[^\W\d_][\w'\u2019-]*"
-ADJACENT_WORDS = re.compile(rf"\b{WORD}\s+{WORD}")  # never adjacent in code
+ADJACENT_WORDS = re.compile(rf"\b{WORD}\s+{WORD}")  # two words that are never adjacent in code
 STRING = re.compile(r"""("|').*?(?:\1|$)|\#.*""")
 STATEMENT = re.compile(
     r"""\s*(?:
@@ -39,7 +39,7 @@ INTERJECTION = re.compile(r" ?[A-Z][a-z]+\s*$")
 
 
 def is_prose(line: str) -> bool:
-    """Whether a line is certainly prose; in doubt it is code, so that no code is lost."""
+    """Whether a line is certainly prose; a doubtful line counts as code, so that no code is lost."""
     line = without_residue(line)
     if INTERJECTION.match(line) or (line.strip() and is_residue(line)):
         return True
@@ -62,25 +62,25 @@ def _has_words(line: str) -> bool:
 
 
 def is_residue(line: str) -> bool:
-    """Whether a line is blank or a mark of a chat template."""
+    """Whether a line is blank or a chat template token."""
     return bool(RESIDUE_LINE.fullmatch(line.strip()))
 
 
 def trim(lines: Sequence[str]) -> Sequence[str]:
-    """Drop blank lines and marks of chat templates at both ends."""
+    """Drop blank lines and chat template tokens at the start and the end."""
     kept = [i for i, line in enumerate(lines) if not is_residue(line)]
     return lines[kept[0] : kept[-1] + 1] if kept else []
 
 
 def without_residue(line: str) -> str:
-    """Drop marks of a chat template at the ends of a line, and a fence at its end."""
+    """Drop chat template tokens at both ends of a line, and a fence at its end."""
     while (shorter := RESIDUE.sub("", line)) != line:
         line = shorter
     return line
 
 
 def parse_lines(lines: Sequence[str]) -> ast.Module | None:
-    """Return the syntax tree of lines; None if they do not parse."""
+    """Return the syntax tree of some lines, or None if they do not parse."""
     return _parse_text("\n".join(lines))
 
 

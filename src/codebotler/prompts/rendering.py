@@ -1,4 +1,4 @@
-"""Render an instruction as chat messages, and as a text that base models continue."""
+"""Render an instruction as chat messages, and as a text for base models to continue."""
 
 from __future__ import annotations
 
@@ -22,10 +22,7 @@ from codebotler.core.words import listed
 
 PROMPT_FOLDER = Path(__file__).parent
 OPENING = f"def {TASK_FUNCTION}():\n"
-MAX_SEARCHED_LENGTH, MAX_END_TRIES = (
-    100_000,
-    20,
-)  # of a reply, within which the end of its function is looked for
+MAX_SEARCHED_LENGTH, MAX_END_TRIES = 100_000, 20  # limits of the search for the end of a function
 STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI accepts at most four
 
 
@@ -39,23 +36,23 @@ class PromptMessage:
 
 @dataclass(frozen=True)
 class PictureMessage(PromptMessage):
-    """A turn with a picture, as the bytes of a JPEG file."""
+    """A turn with a picture, which is a JPEG file."""
 
     jpeg: bytes
 
 
 @dataclass(frozen=True)
 class Example:
-    """An instruction with a correct program, for prompts."""
+    """An instruction with a correct program that prompts show as an example."""
 
     instruction: str
     program: str
-    skills: frozenset[str]  # that the program calls
+    skills: frozenset[str]  # the names of the skills that the program calls
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """A request for a program, for chat models and for base models."""
+    """A request for a program, in a form for chat models and a form for base models."""
 
     instruction: str
     messages: tuple[PromptMessage, ...] = field(repr=False)  # for chat models
@@ -64,7 +61,7 @@ class Prompt:
     opening: str  # the start of the program that base models continue
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
-        """Return a request to rewrite a program without these problems, in sentences."""
+        """Return a request to rewrite a program without these problems, each given in a sentence."""
         listed = "\n".join(f"- {problem}" for problem in problems)
         answer = PromptMessage("assistant", _fence(program))
         repair = PromptMessage("user", _fill("repair", problems=listed))
@@ -78,7 +75,7 @@ class Prompt:
         )
 
     def after_no_program(self, why: str) -> Prompt:
-        """Repeat the request after a reply without a program, with the reason for chat models."""
+        """Return the request to repeat after a reply without a program; chat models also get the reason."""
         *before, request = self.messages
         asked = f"{request.text}\n\n{_fill('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
@@ -86,14 +83,14 @@ class Prompt:
     def program_from(self, reply: str) -> str:
         """Return the program in a base model's continuation of `text`."""
         if re.match(rf"\s*(```|(async )?def {TASK_FUNCTION}\b)", reply):
-            return reply  # the model started again
+            return reply  # the model started the program again
         return self.opening + reply[: task_end(self.opening, reply, self.stop)]
 
 
 def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
-    """Return the index in a reply at which the function that `opening` begins ends.
+    """Return the index in a reply where the function ends that starts with `opening`.
 
-    It ends before a line without indentation, unless a bracket or string is open there.
+    The function ends before a line without indentation, unless a bracket or string is open there.
     """
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
@@ -106,7 +103,7 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
 
 
 def clean_instruction(instruction: str) -> str:
-    """Strip and normalize an instruction; UserError if it is empty."""
+    """Strip and normalize an instruction; raise UserError if it is empty."""
     if not (instruction := compose(instruction.strip())):
         raise UserError("the instruction is empty; say what the robot should do")
     return instruction
@@ -125,7 +122,7 @@ def prompt_for(
         instruction: the robot's task, in plain words.
         rooms: the names of all rooms, if known.
         rules: sentences that every program must obey.
-        skills: the skills that a program may call; examples with others are omitted.
+        skills: the skills that a program may call; examples that call other skills are omitted.
 
     Raises:
         UserError: the instruction is empty, or `rooms` is a string.
@@ -156,7 +153,7 @@ def prompt_for(
 
 
 def stub(skill: Skill) -> str:
-    """Return the stub of a skill; a custom skill gets an example and its failures."""
+    """Return the stub of a skill for prompts; for a custom skill, it has an example call and the errors."""
     lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")
@@ -170,7 +167,7 @@ def stub(skill: Skill) -> str:
 
 @cache
 def examples() -> tuple[Example, ...]:
-    """Return the examples in the order of their files."""
+    """Return all examples, in the order of their file names."""
     files = (path.read_text(encoding="utf-8") for path in sorted((PROMPT_FOLDER / "examples").glob("*.txt")))
     parts = (text.partition("\n\n") for text in files)
     return tuple(
@@ -181,7 +178,7 @@ def examples() -> tuple[Example, ...]:
 
 @cache
 def template_hash(skills: SkillTable = SKILLS) -> str:
-    """Return the hexadecimal SHA-256 of everything in a prompt except the instruction."""
+    """Return the SHA-256 hash, in hexadecimal, of everything in a prompt except the instruction."""
     plain = prompt_for("INSTRUCTION", skills=skills)
     with_rooms = prompt_for("INSTRUCTION", rooms=("ROOM", "OTHER ROOM"), skills=skills)
     shapes = [plain, with_rooms, plain.after("PROGRAM", ["PROBLEM", "OTHER PROBLEM"])]

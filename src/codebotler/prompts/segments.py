@@ -12,9 +12,9 @@ from typing import Literal, TypeAlias
 from codebotler.core.program import TASK_FUNCTION
 from codebotler.prompts.lines import is_code, is_residue
 
-FENCE_MARGIN = 3  # columns of indentation of a closing fence
-MAX_ENDS = 5  # ends of a fence to try until its code parses
-MAX_MARKERS = 9  # at the start of a line
+FENCE_MARGIN = 3  # maximum columns of indentation of a closing fence
+MAX_ENDS = 5  # possible ends of a fence to try until its code parses
+MAX_MARKERS = 9  # markers to try at the start of a line
 MARKER = re.compile(
     r"""(?ix) <\|channel\|?> \s* (?P<channel>[a-z]+) (?:<\|message\|>)?
     | [<\[\u25c1] (?P<left>[|\uff5c])? (?P<slash>/)?
@@ -35,17 +35,17 @@ NEXT_TURN = re.compile(
 )
 
 ParseTest: TypeAlias = Callable[[Sequence[str]], bool]
-"""Whether lines are a program or the body of one."""
+"""Returns whether lines are a program or the body of a program."""
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A part of a reply.
+    """A part of a model's reply.
 
     Args:
-        kind: `fence`, `thought` between two markers, `end` for a closing marker alone, or `text`.
-        text: the text; of a thought, without its markers.
-        code: the lines that may be code.
+        kind: `fence`, `thought` for text between markers, `end` for an unmatched closing marker, or `text`.
+        text: its text; a thought is without its markers.
+        code: its lines that may be code.
     """
 
     kind: Literal["text", "fence", "thought", "end"]
@@ -54,10 +54,10 @@ class Segment:
 
 
 def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
-    """Return the fences and texts of a reply's answer, and its reasoning.
+    """Split a reply into its answer, which consists of fences and texts, and its reasoning.
 
-    Everything before a closing marker alone is reasoning, as the prompt may have the opening one; a closing
-    marker at the end after other reasoning is ignored.
+    Everything before an unmatched closing marker is reasoning, since the opening marker may be in the prompt;
+    a closing marker at the very end, after other reasoning, is ignored.
     """
     segments = [*_segments(_first_turn(reply), parses)]
     answer: list[Segment] = []
@@ -74,7 +74,7 @@ def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
 
 
 def _first_turn(reply: str) -> str:
-    """Cut a reply where a model that did not stop asks for the next program itself."""
+    """Cut off a reply where a model that did not stop writes the next user's turn."""
     for turn in NEXT_TURN.finditer(reply):
         if DEFINITION.search(reply[: turn.start()]):
             return reply[: turn.start()]
@@ -92,7 +92,7 @@ def _segments(reply: str, parses: ParseTest) -> Iterator[Segment]:
 
 
 def _find_marked(reply: str, parses: ParseTest) -> Iterator[tuple[int, Segment, int]]:
-    """Yield start, segment and end of fences and thoughts; only the first one is certain."""
+    """Yield the start, segment and end of possible fences and thoughts; only the first is reliable."""
     for line in WHOLE_LINE.finditer(reply):
         start, end, text = line.start(), line.end(), line[0]
         if (fence := FENCE_LINE.match(text)) and not _is_in_code(fence, reply[:start]):
@@ -108,17 +108,17 @@ def _find_marked(reply: str, parses: ParseTest) -> Iterator[tuple[int, Segment, 
 
 
 def _is_in_code(fence: re.Match[str], before: str) -> bool:
-    """Whether an indented fence is in code, such as in a docstring, rather than in a list."""
+    """Whether an indented fence is inside code, such as a docstring, and not inside a list."""
     lines = reversed(before.split("\n"))
     head = next((line for line in lines if line and not line[0].isspace()), "")
     return not fence["indent"].strip() and len(fence["indent"]) > FENCE_MARGIN and is_code(head)
 
 
 def _read_fence(fence: re.Match[str], rest: str, parses: ParseTest) -> tuple[Sequence[str], int]:
-    """Return the code after a fence, and its length with the closing fence.
+    """Return the code after an opening fence, and the length of the code and the closing fence.
 
-    A string may contain a fence, and the closing fence may be on a line of code. So the first end at which
-    the code parses counts, or else the next fence.
+    A string may contain a fence, and a closing fence may be on a line of code. Therefore the code ends at the
+    first fence up to which it parses, or else at the next fence.
     """
     lines = rest.split("\n")
     indent = re.sub(r"\S", " ", fence["indent"])
@@ -138,7 +138,7 @@ def _read_fence(fence: re.Match[str], rest: str, parses: ParseTest) -> tuple[Seq
 
 
 def _interrupts(line: str) -> bool:
-    """Whether a line shows that a fence was not closed: it opens another or ends a thought."""
+    """Whether a line shows that a fence was not closed, since it opens another fence or ends a thought."""
     fence = FENCE_LINE.match(line)
     is_end = any(
         marker.is_last and marker.is_thought and marker.is_at_edge(line) for marker in _markers(line)
@@ -155,11 +155,11 @@ def _length(lines: Sequence[str]) -> int:
 
 @dataclass(frozen=True)
 class _Marker:
-    """One of a pair of markers, such as `<think>`, `[/THINK]` or `<|END_THINKING|>`."""
+    """A marker at the start or end of a thought, such as `<think>`, `[/THINK]` or `<|END_THINKING|>`."""
 
     name: str  # without words such as `begin` and `end`
     is_last: bool  # whether it closes the pair
-    is_token: bool  # of a chat template, by its bars
+    is_token: bool  # whether it is a chat template token, as its bars show
     start: int
     end: int
 
@@ -168,12 +168,12 @@ class _Marker:
         return bool(THOUGHT_TAG.search(self.name))
 
     def ends_with(self, other: _Marker) -> bool:
-        """Whether the other marker closes this one."""
+        """Whether another marker closes this one."""
         names = {self.name, "", "channel"} if self.is_token else {self.name}
         return other.is_last and (other.name in names or (self.is_thought and other.is_thought))
 
     def is_at_edge(self, text: str) -> bool:
-        """Whether it begins or ends a line of its text."""
+        """Whether the marker is at the start or the end of a line in the text."""
         before = text[text.rfind("\n", 0, self.start) + 1 : self.start]
         return not before.strip() or not text[self.end :].partition("\n")[0].strip()
 
@@ -193,9 +193,9 @@ def _markers_at_ends(line: str) -> Iterator[_Marker]:
 
 
 def _read_thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:
-    """Return the thought that a marker of the first line begins or ends, and its end, if any.
+    """Return the thought that a marker in the first line opens or closes and its end, or None.
 
-    A thought without an end was cut off. A pair with another name is a thought if a program follows.
+    A thought without an end was cut off. A pair of other markers encloses a thought if a program follows.
     """
     if marker.is_last:
         is_end = marker.is_thought and marker.is_at_edge(rest)

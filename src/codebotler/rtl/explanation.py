@@ -29,8 +29,8 @@ class Explanation:
     """The reason why a formula fails.
 
     Args:
-        clause: the smallest part of the formula, or its negation, that fails; all of it if an option is not
-            a text.
+        clause: the smallest failing part of the formula, or its negation; the whole formula if an option is
+            not a text.
         event: the position of the event that makes it fail; None if an event is missing.
         sentence: the reason in words, with steps counted from 1.
     """
@@ -86,7 +86,7 @@ def _failing_part(formula: formulas.Formula, trace: Trace) -> formulas.Formula:
 def _deciding_tests(
     formula: formulas.Formula, trace: Trace, *, is_true: bool
 ) -> Iterator[tuple[formulas.Test, bool]]:
-    """Yield the tests that decide a formula, each with its own truth."""
+    """Yield the tests that decide a formula, each with its truth value."""
     mention = _as_mention(formula)
     if mention is not None and not is_true and not holds(mention, trace):
         yield mention, False
@@ -119,7 +119,7 @@ def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     return None
 
 
-_MAX_QUOTED = 3  # other events
+_MAX_QUOTED = 3  # events shown in place of a missing one
 _AtPlace = formulas.ActAtFirst | formulas.ActAtSome
 
 
@@ -128,7 +128,7 @@ class _Fact(NamedTuple):
 
     event: int | None
     text: str
-    ending: str = ""  # the requirement, unless other facts follow
+    ending: str = ""  # the requirement; omitted if other facts follow
     detail: str = ""  # the closest event
     is_missing: bool = False  # whether the robot failed to do something
     short: str = ""  # the text without parts that other facts repeat
@@ -215,7 +215,7 @@ def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Se
 
 
 def _missing_bound(scopes: tuple[formulas.Scope, ...], trace: Trace) -> formulas.Scope | None:
-    """Return the first scope that is empty because its bounding event never happened."""
+    """Return the first scope that is empty because its bounding event never happened, or None."""
     span = range(len(trace))
     for scope in scopes:
         at = bounding_event(scope, trace, span)
@@ -284,7 +284,7 @@ def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -
 def _describe_instead(
     element: formulas.EventPattern, trace: Trace, here: Sequence[int]
 ) -> tuple[int | None, str]:
-    """Describe a matching event elsewhere, or other events of this kind here."""
+    """Describe a matching event outside the scope, or other events of this kind inside it."""
     done = [at for at in range(len(trace)) if _is_conclusive_match(element, trace, at)]
     if done:
         return done[0], f": it did so only at {_steps(done)}"

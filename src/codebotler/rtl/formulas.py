@@ -1,4 +1,4 @@
-"""The formulas of RTL as immutable values; `str` writes text that `parse` reads."""
+"""The formulas of RTL as immutable values; `parse` can read what `str` writes."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Without(Matcher):
 
 @dataclass(frozen=True)
 class Words(Matcher):
-    """Matches texts in which all of one or more parts are found, in any order."""
+    """Matches texts in which all parts are found, in any order."""
 
     parts: tuple[TextPattern, ...]
 
@@ -92,9 +92,9 @@ class EventPattern:
         holding: matches what the robot held at the start of the event; None for anything.
         to: matches the addressee of a question; None for anyone.
         more: match further arguments, in order.
-        offers: the least and the greatest number of options; None for any number.
-        has_text: whether such events have a text: False if their skill has no parameters.
-        means: the meaning of its texts after a verb, such as `that nobody is coming`; None for plain texts.
+        offers: the minimum and the maximum number of options; None for any number.
+        has_text: whether events of this kind have a text; False if their skill has no parameters.
+        means: words that explain its texts, such as `that nobody is coming`; None to show the texts.
     """
 
     kind: str
@@ -118,7 +118,7 @@ class EventPattern:
 
     @cached_property
     def is_about_more(self) -> bool:
-        """Whether it has conditions on more than text, options and room."""
+        """Whether it has conditions other than those on text, options and room."""
         wanted = self.answer, self.found, self.holding, self.to, self.offers
         return bool(self.more) or any(one is not None for one in wanted)
 
@@ -173,7 +173,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class _OfEvent:
-    """A test of one event, in nested scopes."""
+    """The base class of tests for one event in nested scopes."""
 
     element: EventPattern
     scopes: tuple[Scope, ...] = ()
@@ -183,16 +183,16 @@ class _OfEvent:
 
 
 class Exists(_OfEvent):
-    """Some event matches."""
+    """Holds if some event matches."""
 
 
 class Last(_OfEvent):
-    """There is a last event, and it matches."""
+    """Holds if there is a last event and it matches."""
 
 
 @dataclass(frozen=True)
 class _ActAtPlace:
-    """A test for an event during a stay in a room whose name the regex `place` matches."""
+    """The base class of tests for an event during a stay in a room whose name matches the regex `place`."""
 
     place: str
     element: EventPattern
@@ -213,16 +213,16 @@ class _ActAtPlace:
 
 
 class ActAtFirst(_ActAtPlace):
-    """An event matches during the first stay at a place."""
+    """Holds if a matching event occurs during the first stay at a place."""
 
 
 class ActAtSome(_ActAtPlace):
-    """An event matches during some stay at a place."""
+    """Holds if a matching event occurs during any stay at a place."""
 
 
 @dataclass(frozen=True)
 class _Counting:
-    """A test of the number of matching events."""
+    """The base class of tests that count matching events."""
 
     element: EventPattern
     number: int
@@ -233,16 +233,16 @@ class _Counting:
 
 
 class Count(_Counting):
-    """Exactly `number` events match."""
+    """Holds if exactly `number` events match."""
 
 
 class AtLeast(_Counting):
-    """At least `number` events match."""
+    """Holds if at least `number` events match."""
 
 
 @dataclass(frozen=True)
 class And:
-    """All of two or more parts hold; evaluation stops at the first that fails."""
+    """Conjunction: holds if all of its parts hold; evaluation stops at the first part that fails."""
 
     parts: tuple[Formula, ...]
 
@@ -252,7 +252,7 @@ class And:
 
 @dataclass(frozen=True)
 class Or:
-    """One of two or more parts holds; evaluation stops there."""
+    """Disjunction: holds if any of its parts holds; evaluation stops at the first part that holds."""
 
     parts: tuple[Formula, ...]
 
@@ -262,7 +262,7 @@ class Or:
 
 @dataclass(frozen=True)
 class Not:
-    """A formula does not hold."""
+    """Negation: holds if the given formula does not."""
 
     part: Formula
 

@@ -1,4 +1,4 @@
-"""Monitor a formula, one event at a time."""
+"""Evaluate a formula on a run, one event at a time."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ MAX_CACHED_STEPS = 4_000  # per formula
 
 
 class Monitor:
-    """Evaluates a formula on the events so far; `holds` is the result.
+    """Evaluates a formula on a growing trace; `holds` is the result for the events so far.
 
-    Each event takes constant time and memory. With `events`, the monitor also knows whether the result is
-    final.
+    An event takes constant time and memory. With `events`, the monitor also knows if the result is final.
 
     Args:
         formula: the formula.
-        events: all possible events, one for each way in which the formula distinguishes them; None for any.
+        events: an example of every kind of event that the formula distinguishes; None to allow any event.
     """
 
     def __init__(self, formula: formulas.Formula, events: Iterable[Event] | None = None) -> None:
@@ -38,12 +37,12 @@ class Monitor:
 
     @property
     def state(self) -> object:
-        """The state of the automaton; equal states give equal results from now on."""
+        """The state of the automaton; monitors in equal states give equal results for the same events."""
         return self._state
 
     @property
     def is_final(self) -> bool | None:
-        """Whether the result is final; None without `events`, or if that takes too long to decide."""
+        """Whether the result is final; None without `events`, or if deciding this takes too long."""
         return None if self._future is None else self._future.is_final
 
     def feed(self, event: Event) -> bool:
@@ -62,16 +61,16 @@ class Monitor:
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
-        """Whether the formula would hold after this event; Inconclusive if an option is not a text."""
+        """Return whether the formula would hold after an event; Inconclusive if an option is not a text."""
         machine = self._machine
         mask = machine.mask(event, self._seen)
         return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
 
 
 class _Machine:
-    """The automaton of a formula with cached steps, shared by all its monitors.
+    """The automaton of a formula with cached steps, which all monitors of the formula share.
 
-    Letters are bit masks of the matching patterns of the formula.
+    A letter is a bit mask of the formula's patterns that match an event.
     """
 
     def __init__(self, formula: formulas.Formula) -> None:
@@ -117,7 +116,7 @@ class _Future:
 
     @classmethod
     def of(cls, formula: formulas.Formula, letters: Iterable[Letter]) -> _Future | None:
-        """That of a formula at the start; None if it would take too long to find."""
+        """Return the start state for a formula, or None if building its automaton takes too long."""
         different = tuple(dict.fromkeys(letters))
         try:
             return cls(Automaton.of(formula, different), different)
@@ -126,11 +125,10 @@ class _Future:
 
     @property
     def is_final(self) -> bool:
-        """Whether the formula is true, or false, whatever comes."""
+        """Whether no further event can change the result."""
         return None in {self._automaton.distances[self._state], self._opposite.distances[self._state]}
 
     def step(self, letter: Letter) -> None:
-        """Go on by an event."""
         if letter not in self._letters:
-            raise ValueError("this event is not one of those that can happen")
+            raise ValueError("this is not one of the possible events")
         self._state = self._automaton.rows[self._state][self._letters.index(letter)]

@@ -9,7 +9,7 @@ from typing import Any
 from codebotler.core.regex_flags import scope_flags
 
 Tree = Any
-"""A parsed regex or a part of one: pairs of an operation and its arguments, in private classes of `re`."""
+"""A parsed regex or part of a regex: pairs of an operation and its arguments, in private classes of `re`."""
 
 PATTERN_FLAGS = re.IGNORECASE | re.DOTALL
 
@@ -20,7 +20,7 @@ def compile_regex(pattern: str) -> re.Pattern[str]:
 
 
 def parse_tree(pattern: str) -> Tree:
-    """Parse a regex to a tree."""
+    """Parse a regex, and return its syntax tree."""
     return import_module("re._parser").parse(pattern, PATTERN_FLAGS)
 
 

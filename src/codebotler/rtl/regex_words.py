@@ -1,4 +1,4 @@
-"""Find the plain texts that a regex matches, for readers who do not know regexes."""
+"""List the plain texts that a regex matches, for readers who do not know regexes."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from codebotler.rtl.pattern import Tree, parse_tree
 
 MATCH_ALL_PATTERNS = frozenset({"", ".*", ".+", "^.*$"})
 UNCLEAR = "(…)"
-_MAX_TEXTS = 40  # of one regex
-_MIN_RANGE = 3  # more consecutive numbers are shown as a range
+_MAX_TEXTS = 40  # for one regex
+_MIN_RANGE = 3  # longer sequences of numbers are shown as a range
 _MAX_SHOWN = 5
 
 
 @lru_cache(maxsize=4096)
 def choices(pattern: str) -> tuple[str, ...] | None:
-    """Return the texts that a regex finds, such as `bread` and `toast`, each in its shortest form.
+    """Return the texts that a regex finds, such as `bread` and `toast`, in their shortest form.
 
-    Combine consecutive numbers: `7[3-9]` gives `73 to 79`. Return None if there are too many texts, or if the
-    regex has no certain ones.
+    Consecutive numbers are combined: `7[3-9]` gives `73 to 79`. Return None if there are too many texts, or
+    if they cannot be determined.
     """
     try:
         found = [" ".join(text.split()) for text in _texts(parse_tree(pattern))]
@@ -38,20 +38,20 @@ def choices(pattern: str) -> tuple[str, ...] | None:
 
 
 def one_of(texts: tuple[str, ...], quote: str = '"') -> str:
-    """Join alternatives, such as `"bread" or "toast"`, and count those after the fifth."""
+    """Join alternatives, such as `"bread" or "toast"`; after the fifth, only give the number of the rest."""
     left = len(texts) - _MAX_SHOWN
     shown = [f"{quote}{brief(text)}{quote}" for text in texts[: _MAX_SHOWN if left > 1 else None]]
     return listed([*shown, f"{left} more"] if left > 1 else shown, "or")
 
 
 def first_choice(pattern: str) -> str:
-    """Return the first plain text that a regex finds; `(…)` if it has no certain one."""
+    """Return the first plain text that a regex finds, or `(…)` if it cannot be determined."""
     first = "anything" if pattern in MATCH_ALL_PATTERNS else (choices(pattern) or (UNCLEAR,))[0]
     return pattern if first == pattern.strip() or not pattern else first
 
 
 class _UnclearError(Exception):
-    """A regex has no certain words."""
+    """Raised if the texts of a regex cannot be determined."""
 
 
 def _texts(tree: Tree) -> list[str]:
@@ -64,7 +64,7 @@ def _texts(tree: Tree) -> list[str]:
     return texts
 
 
-def _node_texts(op: str, arguments: Any) -> list[str]:  # noqa: ANN401 - as Python's parser made them
+def _node_texts(op: str, arguments: Any) -> list[str]:  # noqa: ANN401 - private classes of `re`
     if op == "LITERAL":
         return [chr(arguments)]
     if op == "IN":
@@ -75,7 +75,7 @@ def _node_texts(op: str, arguments: Any) -> list[str]:  # noqa: ANN401 - as Pyth
     if op.endswith("REPEAT"):
         return _repeat_texts(*arguments)
     if op == "ASSERT_NOT":
-        _texts(arguments[-1])  # a regex for cheese that is not grilled finds `cheese`
+        _texts(arguments[-1])  # so that a regex for cheese that is not grilled gives `cheese`
     elif op not in {"AT", "ANY"}:
         raise _UnclearError
     return ["…" if op == "ANY" else ""]
@@ -100,8 +100,8 @@ def _is_category(tree: Tree, *names: str) -> bool:
     )
 
 
-def _set_texts(members: Any) -> list[str]:  # noqa: ANN401 - as in `_node_texts`
-    """Return the characters of a set; only the first one of punctuation, which is a mere variant."""
+def _set_texts(members: Any) -> list[str]:  # noqa: ANN401 - private classes of `re`
+    """Return the characters of a set; only the first if it contains punctuation, which hardly matters."""
     characters: list[str] = []
     for op, value in members:
         if str(op) not in {"LITERAL", "RANGE"}:

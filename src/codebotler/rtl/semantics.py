@@ -1,6 +1,6 @@
 """Evaluate formulas on traces in linear time.
 
-Scopes are ranges of positions. A test reads the events once, in order, and stops as soon as it is decided.
+A scope is a range of positions. A test reads the events once, in order, and stops as soon as it is decided.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import formulas
 
 
-class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a third verdict
-    """A formula depends on an option of a question that is not a text.
+class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of the caller
+    """Raised if a formula depends on an option of a question that is not a text.
 
     Args:
         event: the question's position in the trace.
@@ -34,7 +34,7 @@ class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a
 
 
 def holds(formula: formulas.Formula, trace: Trace) -> bool:
-    """Whether a formula is true of a trace.
+    """Whether a formula holds on a trace.
 
     Raises:
         Inconclusive: the formula depends on an option that is not a text.
@@ -49,7 +49,7 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
 
 
 def visible(trace: Trace) -> tuple[object, ...]:
-    """Return all of a trace that formulas can distinguish, which is everything but times."""
+    """Return everything in a trace that formulas can distinguish: all but the times."""
     return tuple(
         (e.kind, e.text, e.options, e.answer, e.found, e.place, e.holding, e.to, e.more) for e in trace
     )
@@ -94,7 +94,7 @@ def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
 
 
 def _fits(element: formulas.EventPattern, event: Event) -> bool:
-    """Whether result, answer, held object, addressee, further arguments and number of options match."""
+    """Whether the result, answer, held object, addressee, further arguments and number of options match."""
     least, most = element.offers or (0, None)
     if not least <= len(event.options) <= (len(event.options) if most is None else most):
         return False
@@ -119,8 +119,8 @@ def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
 
 
 def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> Iterator[int]:
-    """Yield the positions of matching events."""
-    kind = element.kind  # most events have another kind and need no call
+    """Yield the positions of all matching events in a span."""
+    kind = element.kind  # compared first, since most events have another kind
     for at in span:
         event = trace[at]
         if event.kind == kind and is_match(element, event, at):
@@ -128,17 +128,17 @@ def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> It
 
 
 def first(element: formulas.EventPattern, trace: Trace, span: range) -> int | None:
-    """Return the position of the first matching event."""
+    """Return the position of the first matching event in a span, or None."""
     return next(occurrences(element, trace, span), None)
 
 
 def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: range) -> int:
-    """Count matching events up to `number`."""
+    """Count the matching events in a span, but not further than `number`."""
     return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
 
 
 def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> range:
-    """Return the positions of a trace within all scopes."""
+    """Return the positions in a trace that are within all scopes."""
     span = range(len(trace))
     for scope in scopes:
         span = narrow(scope, bounding_event(scope, trace, span), span)
@@ -146,20 +146,20 @@ def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> ran
 
 
 def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
-    """Return the position of the event that bounds a scope."""
+    """Return the position of the event that bounds a scope, or None if there is no such event."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Restrict a span to a scope bounded at a position, or not bounded if None."""
+    """Restrict a span to a scope; `at` is the position of its bounding event, or None without one."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)
 
 
 def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> range | None:
-    """Return the positions between the first arrival at the place of a test and the next departure."""
+    """Return the positions between the first arrival at a test's place and the next departure."""
     arrival = first(test.arrival, trace, span)
     if arrival is None:
         return None
@@ -169,9 +169,9 @@ def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, spa
 
 
 def during_stays(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> Iterator[int]:
-    """Yield the positions during all stays at the place of a test.
+    """Yield the positions during all stays at a test's place.
 
-    A stay excludes the move that ends it; the move that begins it counts only within an earlier stay.
+    A stay excludes the move that ends it; the move that begins it counts only as part of an earlier stay.
     """
     is_there = False
     for at in span:

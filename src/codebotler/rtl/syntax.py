@@ -1,4 +1,4 @@
-"""Parse RTL formulas as Python expressions, without running them."""
+"""Parse RTL formulas as Python expressions without running them."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions 
 
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
-MAX_FORMULA_DEPTH = 50  # small enough for Python's stack in every evaluation
-MAX_OPTIONS = 100  # that a formula may require of a question
+MAX_FORMULA_DEPTH = 50  # low enough for Python's stack during every evaluation
+MAX_OPTIONS = 100  # that a formula may require in a question
 _MAX_SHOWN_LENGTH = 40
 
 
 class RtlSyntaxError(ValueError):
-    """A text is not a formula; the message says where and why.
+    """Raised for a text that is not a formula; the message says where and why.
 
     Args:
         column: the position, counted from 1.
@@ -61,8 +61,8 @@ def parse(
     Args:
         text: the formula; a line break counts as a space.
         skills: the skills whose events the formula may name.
-        means: for explanations, the meaning of the texts of a kind of event, such as `that nobody is coming`
-            for `say`; for answered questions, under `answered`.
+        means: words for explanations, by kind of event: what its texts mean, such as `that nobody is coming`
+            for `say`; answered questions have the key `answered`.
 
     Raises:
         RtlSyntaxError: the text is not a formula.
@@ -98,7 +98,7 @@ class _Parser:
         except ValueError as error:
             raise RtlSyntaxError(self.indent + 1, f"this cannot be read ({error})") from None
         end = tree.end_col_offset or 0
-        if b"#" in self.bytes[end:]:  # it would hide all following lines
+        if b"#" in self.bytes[end:]:  # a comment would hide all following lines
             raise self.error(end, "RTL has no comments, but one starts after this")
         return self.constraint(tree, 0)
 
@@ -184,7 +184,7 @@ class _Parser:
         raise self.expected('an element such as goto("lobby")', node)
 
     def plain_element(self, kind: str, node: ast.Call) -> formulas.EventPattern:
-        """Parse an event without options: its text and further arguments."""
+        """Parse an event without options, with its text and further arguments."""
         recording = self.recordings[kind]
         if not recording.text:
             self.arguments(node, node, kind, 0)
@@ -201,7 +201,7 @@ class _Parser:
         return formulas.EventPattern(kind, first, more=tuple(more))
 
     def value(self, node: ast.expr, wanted: ValueType) -> formulas.TextPattern:
-        """Parse a pattern for an argument; a number or a truth value may be literal."""
+        """Parse a pattern for an argument; numbers and truth values may be literals."""
         if wanted.base == "str":
             text = self.matched(node)
             if wanted.choices and not any(text.matches(as_text(one)) for one in wanted.choices):
@@ -223,7 +223,7 @@ class _Parser:
 
     def around_arguments(self, name: str, node: ast.Call) -> list[ast.expr]:
         if name == "options" and len(node.args) not in {2, 3}:
-            raise self.error(node, "options takes the least number, optionally the most, and a question")
+            raise self.error(node, "options takes a minimum, an optional maximum and a question")
         return self.arguments(node, node, name, None if name == "options" else 2)
 
     def around(self, name: str, node: ast.Call) -> formulas.EventPattern:
@@ -248,11 +248,11 @@ class _Parser:
                     raise self.expected("True or False", what)
                 if not self.skill_of[element.kind].returns == TRUTH_TYPE:
                     raise self.error(
-                        inner, f"returned is about skills that return True or False; {element.kind} does not"
+                        inner, f"returned needs a skill that returns True or False; {element.kind} does not"
                     )
                 return replace(element, found=what.value)
         if element.kind != self.question:
-            raise self.error(inner, f"{name} is about questions; use ask, mention or answered")
+            raise self.error(inner, f"{name} needs a question; use ask, mention or answered")
         if name == "to":
             return replace(element, to=self.matched(what))
         least, most = self.number(what), self.number(given[-1])
@@ -324,7 +324,7 @@ class _Parser:
 
     def arguments(self, call: ast.Call, at: ast.expr, name: str, wanted: int | None = None) -> list[ast.expr]:
         for keyword in call.keywords:
-            raise self.error(keyword.col_offset, "arguments have no names in RTL")
+            raise self.error(keyword.col_offset, "RTL has no keyword arguments; remove the name")
         found = len(call.args)
         if wanted is not None and found != wanted and name == self.question:
             hint = f'{name} takes a question and an option, as in {name}("tea", ".*")'
@@ -338,9 +338,9 @@ class _Parser:
         close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
         if name == INSIDE:
-            hint = "only house rules have it, since traces hold no poses"
+            hint = "only house rules can use it, since traces contain no poses"
         elif what == "element" and not close:
-            hint += ", or a skill of your own, whose file --skills or a suite names"
+            hint += ", or your own skill, if --skills or a suite gives its file"
         return self.error(at, f"unknown {what} {name}; {hint}")
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:

@@ -25,7 +25,7 @@ _OFFERS: Mapping[VerbForm, str] = {"base": "offer", "past": "offered", "ing": "o
 _ANSWERS: Mapping[VerbForm, str] = {"base": "get", "past": "got", "ing": "getting"}
 _CLAUSES = ("that ", "to ", "whether ", "what ", "in one ")
 _MOST_LISTED = 5
-_UNCLEAR = "that fits the requirement"  # for a regex without certain words
+_UNCLEAR = "that fits the requirement"  # for a regex whose words cannot be determined
 
 
 def describe_action(
@@ -36,8 +36,8 @@ def describe_action(
     Args:
         element: the pattern that an event must match.
         form: the form of the verb.
-        negated: whether the phrase follows a negation, and so has `anything`.
-        when: a phrase with a leading space; it precedes a clause such as `that nobody is in`.
+        negated: whether the phrase follows a negation, and so needs `anything`.
+        when: a phrase with a leading space; it comes before a clause such as `that nobody is in`.
         where: a phrase after that, such as ` after going to the lobby (step 1)`.
     """
     thing = "anything" if negated else "something"
@@ -94,7 +94,7 @@ def _describe_details(element: EventPattern, means: str | None) -> str:
 
 
 def is_plain(element: EventPattern) -> bool:
-    """Whether the event itself shows all that the pattern requires."""
+    """Whether a description of the event already shows everything that the pattern requires."""
     if element.is_about_more or not isinstance(element.text, Regex):
         return False
     return (is_any(element.text) and is_any(element.options)) or not is_spoken(element.kind)
@@ -126,14 +126,14 @@ def _describe_object(element: EventPattern, thing: str) -> str:
 
 
 def _describe_thing(text: TextPattern, thing: str) -> str:
-    """Describe a thing by its text, such as `something with "hello"`; a number or time alone."""
+    """Describe a thing by its text, such as `something with "hello"`, or a number or time on its own."""
     if isinstance(text, Number | Time):
         return describe_text(text).removeprefix("with ")
     return f"{thing} {describe_text(text)}".rstrip()
 
 
 def _quote_choices(text: TextPattern) -> str:
-    """Quote the plain texts that a regex finds; empty if it matches anything or has no certain words."""
+    """Quote the texts that a regex finds; empty if it matches anything or they cannot be determined."""
     return _words_of(text.pattern) if isinstance(text, Regex) and not is_any(text) else ""
 
 
@@ -142,7 +142,7 @@ def _words_of(pattern: str) -> str:
 
 
 def describe_event(event: Event, element: EventPattern) -> str:
-    """Describe the object of an event and whatever else a pattern compares."""
+    """Describe the object of an event and everything else that a pattern compares."""
     doing = verb(event.kind)
     if doing.object:
         thing = doing.with_object("", [brief(text) for text in (event.text, *event.more)], "").strip()
@@ -190,7 +190,7 @@ def room_name(name: str) -> str:
 
 
 def describe_text(text: TextPattern) -> str:
-    """Describe a text, such as `with "5" or "five" and without "no"`; empty if any text matches."""
+    """Describe a text pattern, such as `with "5" or "five" and without "no"`; empty if any text matches."""
     return listed(elide_list([*dict.fromkeys(_qualities(text))]))
 
 
@@ -220,16 +220,16 @@ def _qualities(text: TextPattern) -> Iterator[str]:
 
 
 def is_any(text: TextPattern | None) -> bool:
-    """Whether there is no pattern, or it is written to match every string."""
+    """Whether there is no pattern, or a regex such as `.*` that matches every string."""
     return text is None or (isinstance(text, Regex) and text.pattern in MATCH_ALL_PATTERNS)
 
 
 def elide_list(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:
-    """Return the first parts of an enumeration and the number of the others."""
+    """Shorten an enumeration to its first parts and the number of the rest."""
     more = len(parts) - most
     return [*parts[:most], f"{more:,} more"] if more > 0 else [*parts]
 
 
 def quoted(text: str) -> str:
-    """Quote a text on one line, shortened for a sentence."""
+    """Put a text in quotes, on one line and shortened for a sentence."""
     return f'"{brief(text)}"'

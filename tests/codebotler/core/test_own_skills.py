@@ -213,31 +213,31 @@ def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
 
 
 BAD = {
-    "@skill\ndef wiggle(): 'Wiggle.'": "must take the simulation and then, by position, what programs pass",
-    "@skill\ndef wiggle(sim, *who: str) -> None: 'Wiggle.'": "must take the simulation and then, by position",
+    "@skill\ndef wiggle(): 'Wiggle.'": "must take the simulation first, then the arguments",
+    "@skill\ndef wiggle(sim, *who: str) -> None: 'Wiggle.'": "must take the simulation first, then",
     "@skill\ndef wiggle(sim, who) -> None: 'Wiggle.'": "who of wiggle has no type; write who: str",
     "@skill\ndef wiggle(sim, who: str = 'a') -> None: 'Wiggle.'": "wiggle has a default value",
-    "@skill\ndef wiggle(sim, who: dict) -> None: 'Wiggle.'": "the parameter who of wiggle, dict, is none",
+    "@skill\ndef wiggle(sim, who: dict) -> None: 'Wiggle.'": "who of wiggle is dict",
     "@skill\ndef wiggle(sim, who: 'Nobody') -> None: 'Wiggle.'": "who of wiggle cannot be read: name",
     "@skill\ndef wiggle(sim, who: None) -> None: 'Wiggle.'": "a parameter of wiggle cannot be None",
     "@skill\ndef wiggle(sim, who: str): 'Wiggle.'": "wiggle does not say what it returns; write -> None",
     "@skill\ndef wiggle(sim, who: str) -> None: pass": "wiggle has no docstring",
-    "@skill\ndef print(sim, who: str) -> None: 'Wiggle.'": "print is a name that Python, every program",
-    "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": "found means something else in formulas",
-    "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is a skill go_to already",
+    "@skill\ndef print(sim, who: str) -> None: 'Wiggle.'": "print is a reserved name",
+    "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": "found has another meaning in formulas",
+    "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is already a skill go_to",
     "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
     "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "which is not a parameter",
-    "@skill(ros='Wave')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"Wave" is no ROS action',
-    "@skill(fails={'KeyError': 'x'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "must have a name",
-    "@skill\ndef wiggle(who: str) -> None: 'Wiggle.'": "wiggle must take the simulation and then",
-    "@skill\nasync def wiggle(sim) -> None: 'Wiggle.'": "wiggle is async, but the function of a skill is not",
+    "@skill(ros='Wave')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"Wave" is not a ROS action',
+    "@skill(fails={'KeyError': 'x'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"KeyError" cannot name',
+    "@skill\ndef wiggle(who: str) -> None: 'Wiggle.'": "wiggle must take the simulation first, then",
+    "@skill\nasync def wiggle(sim) -> None: 'Wiggle.'": "wiggle is async, but skills must be",
     "@skill(fail={})\ndef wiggle(sim) -> None: 'Wiggle.'": "@skill has no option fail; did you mean fails?",
     "@skill(fails=['A'])\ndef wiggle(sim) -> None: 'Wiggle.'": "fails of wiggle must be errors with clauses",
-    "@skill(seconds='2')\ndef wiggle(sim) -> None: 'Wiggle.'": "must be a number from 0 on, not '2'",
+    "@skill(seconds='2')\ndef wiggle(sim) -> None: 'Wiggle.'": "must be a number of at least 0, not '2'",
     "@skill(results=('a', 'b', 'c'))\ndef wiggle(sim) -> bool: 'Wiggle.'": "must be two texts",
     "@skill(names={'who': 'room'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "names of wiggle must be",
     "@skill(event='a b')\ndef wiggle(sim) -> None: 'Wiggle.'": "event of wiggle must be a name, or None",
-    "@skill\ndef wiggle(sim, who: str) -> 'int | None': 'Wiggle.'": "the result of wiggle, int | None,",
+    "@skill\ndef wiggle(sim, who: str) -> 'int | None': 'Wiggle.'": "the result of wiggle is int | None,",
     "@skill(text='whom')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "wiggle has no parameter whom",
     "def wiggle(sim, who: str) -> None: 'Wiggle.'": "it declares no skill; put @skill above a function",
     "def wiggle(": "it is not Python",
@@ -278,9 +278,9 @@ def test_a_function_that_fails_ends_the_command_with_a_sentence(
 
 TRUTHS = {
     "reed('a'): 1": "there is no skill reed; did you mean read?",
-    "open_gate('a'): true": "the code of open_gate decides its result",
-    "read(3): 1": "read takes other arguments: read(what: str) -> int",
-    "read('a', 'b'): 1": "read takes other arguments",
+    "open_gate('a'): true": "the code of open_gate computes its result",
+    "read(3): 1": "its signature is read(what: str) -> int",
+    "read('a', 'b'): 1": "the arguments of read are wrong",
     "read('a'): 1.5": "read cannot return 1.5; write a whole number or Broken",
     "read('a'): Broke": "read cannot return 'Broke'; write a whole number or Broken",
     "read(a): 1": "is not a call; write it as in",
@@ -366,7 +366,7 @@ def test_minus_zero_is_zero_to_formulas(pool: WorkerPool, every: SkillTable) -> 
         ('tr.Exists(paint("red", "floor"))', "this is not one of door, wall"),
         ('tr.Exists(whole("two"))', "expected a whole number, or a regex for it"),
         ("tr.Exists(truth(1))", "expected True or False"),
-        ("tr.Exists(returned(True, whole(1)))", "returned is about skills that return True or False"),
+        ("tr.Exists(returned(True, whole(1)))", "returned needs a skill that returns True or False"),
         ("tr.Exists(nothing(1))", "nothing takes no argument, not 1"),
         ('tr.Exists(paint("red", "door", "x"))', "paint takes 1 to 2 arguments, not 3"),
     ],
@@ -384,7 +384,7 @@ def test_a_file_may_import_what_lies_beside_it_and_declares_each_name_once(tmp_p
     )
     assert list(skills_from(tmp_path / "lab.py", tmp_path / "lab.py"))[len(SKILLS) :] == ["wiggle"]
     (tmp_path / "twice.py").write_text(HEAD + "@skill\ndef wiggle(sim) -> None: 'Wiggle.'\n" * 2)
-    with pytest.raises(UserError, match="there is a skill wiggle already"):
+    with pytest.raises(UserError, match="there is already a skill wiggle"):
         skills_from(tmp_path / "twice.py")
 
 
@@ -394,7 +394,7 @@ def test_two_skills_with_one_ros_action_are_refused(tmp_path: Path) -> None:
     path.write_text(
         HEAD + f"{action}def wiggle(sim) -> None: 'W.'\n{action}def jiggle(sim, how: str) -> None: 'J.'\n"
     )
-    with pytest.raises(UserError, match="another skill has the ROS action /wiggle already"):
+    with pytest.raises(UserError, match="another skill already uses the ROS action /wiggle"):
         skills_from(path)
 
 

@@ -68,7 +68,7 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("says(what)", '"says(what, )"', 6, '"says(what, )"'),
         ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is not valid'),
         ("goto(", "gote(", 5, 'the check "goes" is not valid'),
-        ("goto(", "inside(", 5, "only house rules have it"),
+        ("goto(", "inside(", 5, "only house rules can use it"),
         ("goes: {", "goes: {means: {go: there}, ", 5, '"go"'),
         ("goes: {", "goes: {means: 'that {it} is', ", 5, '"it" is not a parameter'),
         ("[goes,", "[gose,", 11, 'no check "gose"'),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from types import TracebackType
+from collections.abc import Sequence
+from traceback import walk_tb
 from typing import Any
 
 from codebotler.core.errors import RobotError, UserError
@@ -11,11 +11,11 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import plain
 
 SKILL_FAILED = "SkillFailed"
-"""The kind of error when the function of a custom skill raises an undeclared error."""
+"""The kind of the error reported when a custom skill's function raises an undeclared exception."""
 
 
-def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of its type
-    """Call the function of a skill; UserError if its result does not have the declared type."""
+def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the declared type
+    """Call the function of a skill; raise UserError if its result does not have the declared type."""
     assert row.does is not None, "a custom skill has a function"
     given = [
         [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)
@@ -27,12 +27,9 @@ def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # n
     except (RobotError, UserError, KeyboardInterrupt):
         raise
     except BaseException as error:
-        lines = [
-            tb.tb_lineno for tb in _tracebacks(error) if tb.tb_frame.f_code.co_filename == code.co_filename
-        ]
-        file = code.co_filename.rpartition("/")[
-            2
-        ]  # without the folder, so that results are equal on all machines
+        frames = walk_tb(error.__traceback__)
+        lines = [line for frame, line in frames if frame.f_code.co_filename == code.co_filename]
+        file = code.co_filename.rpartition("/")[2]  # results must not depend on the folder
         where = f"{file}, line {lines[-1] if lines else code.co_firstlineno}"
         said = str(error).replace(type(robot).__name__, "Simulation")
         raise RobotError(
@@ -42,10 +39,3 @@ def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # n
     if (asks and result not in asks[0]) or not row.returns.fits(result):
         row.wrong(f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")
     return result
-
-
-def _tracebacks(error: BaseException) -> Iterator[TracebackType]:
-    traceback = error.__traceback__
-    while traceback is not None:
-        yield traceback
-        traceback = traceback.tb_next

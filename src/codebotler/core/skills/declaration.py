@@ -1,4 +1,4 @@
-"""Declare a skill by one typed function, whose signature and docstring programs and models see."""
+"""Declare a skill as one typed function; models see its signature and its docstring."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a l
 
 
 def by_name(name: str) -> Skill | None:
-    """Return the skill of this name that this process has declared."""
+    """Return the skill that this process has declared under a name, or None."""
     return _DECLARED.get(name)
 
 
@@ -53,13 +53,13 @@ def all_names() -> list[str]:
 
 
 def by_event(kind: str) -> Skill | None:
-    """Return the skill, declared in this process, that records a kind of event."""
+    """Return the skill declared in this process that records a kind of event, or None."""
     other = POSE_IN_ROOM if kind == INSIDE else None
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 
 
 def verb_for(kind: str) -> Verb | None:
-    """Return the verb for a kind of event, if declared."""
+    """Return the verb for a kind of event, or None if none is declared."""
     row = by_event(kind)
     return None if row is None else row.verb
 
@@ -107,27 +107,27 @@ def skill(
     is_idle: bool = False,
     adds_event: bool = True,
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
-    """Declare a skill by its effect on a simulated robot, the first parameter of the function.
+    """Declare a skill as a function that acts on a simulated robot, its first parameter.
 
-    A function without code (`...`) records the event of the skill and returns a random value of its type; in
-    some sampled worlds, it fails with one of its errors.
+    A function with an empty body (`...`) records the skill's event and returns a random value of its type; in
+    some sampled worlds, it fails with one of the skill's errors.
 
     Args:
-        does: the function.
+        does: the function, if `@skill` is used without options.
         verb: the English verb, such as `open {door}`, with parameters in braces.
         past: the past form of an irregular verb that is not in the list, such as `wove`.
         results: the meanings of False and True in words.
         fails: the kinds of its errors, each with a clause that says when it occurs.
-        ros: its action on a robot, such as `lab_msgs/OpenDoor:/open_door`.
-        example: a call for prompts; by default one with the names of parameters as arguments.
-        event: the kind of its event; by default the name of the function; None for no event.
-        text: the parameter with the text of the event; by default the first one.
+        ros: the ROS action that executes it, such as `lab_msgs/OpenDoor:/open_door`.
+        example: an example call for prompts; by default, its arguments are the names of the parameters.
+        event: the kind of event that it records; by default the name of the function; None for no event.
+        text: the parameter that becomes the text of the event; by default the first one.
         names: the sort of thing that the text names, such as `room`; empty for speech.
-        to: the parameter with the addressee of a question.
-        when_tried: whether failed attempts are events, too.
-        seconds: its duration on the simulated clock, without driving.
+        to: the parameter that names the addressee of a question.
+        when_tried: whether failed attempts are recorded, too.
+        seconds: its duration on the simulated clock in seconds, without driving.
         is_idle: whether it changes neither the robot nor its world.
-        adds_event: whether the robot adds its event at the end, rather than the function.
+        adds_event: whether the simulation records the event afterwards; False if the function does it.
 
     Raises:
         UserError: the function cannot be a skill; the sentence has the file and the line.
@@ -143,7 +143,7 @@ def skill(
 
 
 class _Declaration:
-    """A function and the options of its declaration."""
+    """Builds a skill from a function and the options of its declaration."""
 
     def __init__(self, does: Callable[..., Any], said: Mapping[str, Any]) -> None:
         self.does, self.said = does, said
@@ -208,16 +208,16 @@ class _Declaration:
         kind = self.said["event"] or self.name
         is_second = isinstance(self.does.__globals__.get(self.name), Skill)
         if is_second and is_own_module(self.does.__module__):
-            self.wrong(f"there is a skill {self.name} already; choose another name")
+            self.wrong(f"there is already a skill {self.name}; choose another name")
         if self.name in RESERVED_NAMES:
-            self.wrong(f"{self.name} is a name that Python, every program or every robot has; choose another")
+            self.wrong(f"{self.name} is a reserved name; choose another one")
         if kind in RTL_WORDS:
-            self.wrong(f"{kind} means something else in formulas; choose another name")
+            self.wrong(f"{kind} has another meaning in formulas; choose another name")
 
     def parameters(self) -> tuple[Parameter, ...]:
         code = self.does.__code__
         if code.co_flags & COROUTINE_FLAG:
-            self.wrong(f"{self.name} is async, but the function of a skill is not; write def")
+            self.wrong(f"{self.name} is async, but skills must be ordinary functions; write def")
         first = self.annotation(code.co_varnames[0]) if code.co_argcount else None
         if (
             not code.co_argcount
@@ -226,7 +226,7 @@ class _Declaration:
             or value_type(first or object) is not None
         ):
             self.wrong(
-                f"{self.name} must take the simulation and then, by position, what programs pass, "
+                f"{self.name} must take the simulation first, then the arguments of programs by position, "
                 "as in (sim: Simulation, door: str)"
             )
         if self.does.__defaults__:
@@ -235,7 +235,7 @@ class _Declaration:
         for name in names:
             if name not in self.does.__annotations__:
                 self.wrong(
-                    f"the parameter {name} of {self.name} has no type; write {name}: str, or another one"
+                    f"the parameter {name} of {self.name} has no type; write {name}: str, or another type"
                 )
         types = [self.type_of(name, f"the type of the parameter {name}") for name in names]
         if NO_VALUE in types:
@@ -254,16 +254,16 @@ class _Declaration:
     def type_of(self, name: str, what: str) -> ValueType:
         try:
             annotation = self.annotation(name)
-        except Exception as error:  # noqa: BLE001 - whatever it is, that is no type
+        except Exception as error:  # noqa: BLE001 - evaluating it may raise anything
             self.wrong(f"{what} of {self.name} cannot be read: {error}")
         found = value_type(annotation)
         if found is None:
             written = getattr(annotation, "__name__", str(annotation))
-            self.wrong(f"{what} of {self.name}, {written}, is none that skills can have; use {USABLE}")
+            self.wrong(f"{what} of {self.name} is {written}, which skills cannot use; use {USABLE}")
         return found
 
     def annotation(self, name: str) -> object:
-        """Return an annotation, evaluated if it is a string; that of the simulation may be undefined."""
+        """Return an annotation, evaluated if it is a string; the simulation's may be an undefined name."""
         annotation: object = self.does.__annotations__.get(name)
         if not isinstance(annotation, str):
             return annotation
@@ -283,7 +283,7 @@ class _Declaration:
             if name not in names:
                 self.wrong(f"{self.name} has no parameter {name}")
         if to and options is None:
-            self.wrong("`to` is about questions, which have a parameter options: list[str]; leave it out")
+            self.wrong("`to` is only for questions, which have a parameter options: list[str]; leave it out")
         more = tuple(name for name in names if name not in {text, to})
         return Recording(
             event or self.name, text, options, to, self.said["names"], self.said["when_tried"], more
@@ -294,14 +294,14 @@ class _Declaration:
         for kind in fails:
             if not kind.isidentifier() or iskeyword(kind) or kind == VIOLATION or hasattr(builtins, kind):
                 self.wrong(
-                    f'the error "{kind}" of {self.name} must have a name of its own, such as "DoorLocked"'
+                    f'"{kind}" cannot name an error of {self.name}; choose another name, such as "DoorLocked"'
                 )
         return fails
 
     def verb(self, parameters: tuple[Parameter, ...], recording: Recording | None) -> Verb | None:
         verb = self.said["verb"]
         if not isinstance(verb, str):
-            return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb is a text")
+            return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb must be a text")
         try:
             names = [each.name for each in parameters]
             if recording is not None:  # in the order of the event
@@ -324,18 +324,18 @@ class _Declaration:
             and server.strip("/")
         ):
             self.wrong(
-                f'"{ros}" is no ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
+                f'"{ros}" is not a ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
             )
         unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
         if unusable:
-            self.wrong(f"{unusable[0]} of {self.name} cannot be a field of a ROS message; use small letters")
+            self.wrong(f"{unusable[0]} of {self.name} cannot be a ROS field; use lower-case letters")
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)
 
 
 SORTS_OF_THINGS = ("room", "object", "object or person", "thing", "")
-COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # among the flags of code
+COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # bits of `co_flags`
 SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a text such as "open {door}"'),
     "past": (lambda it: isinstance(it, str), "a text"),
@@ -353,7 +353,7 @@ SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         lambda it: it is None or isinstance(it, str | RosAction),
         "a text such as lab_msgs/OpenDoor:/open_door",
     ),
-    "example": (lambda it: isinstance(it, str), "a text, the call of the skill"),
+    "example": (lambda it: isinstance(it, str), "a text that calls the skill"),
     "event": (
         lambda it: it is None or (isinstance(it, str) and (it or "x").isidentifier()),
         "a name, or None",
@@ -362,7 +362,7 @@ SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "names": (lambda it: it in SORTS_OF_THINGS, "one of " + ", ".join(f'"{one}"' for one in SORTS_OF_THINGS)),
     "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
     "when_tried": (lambda it: isinstance(it, bool), "True or False"),
-    "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number from 0 on"),
+    "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number of at least 0"),
     "is_idle": (lambda it: isinstance(it, bool), "True or False"),
     "adds_event": (lambda it: isinstance(it, bool), "True or False"),
 }

@@ -1,4 +1,4 @@
-"""Load files of custom skills; they are the user's own code and run in this process."""
+"""Load files of custom skills, which are the user's own code and run in this process."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from codebotler.core.skills.table import Skill, SkillTable
 
 
 def skills_from(*files: Path | str) -> SkillTable:
-    """Return the eight skills of the paper and those that files declare with `@skill`.
+    """Return the eight skills of the paper and the skills that files declare with `@skill`.
 
     Args:
-        files: Python files, which this runs.
+        files: Python files, which are executed.
 
     Raises:
         UserError: a file fails, declares no skill, or declares one whose name is taken.
@@ -43,14 +43,14 @@ def _declared_skills(path: Path) -> list[Skill]:
 
 
 def files_of(skills: SkillTable) -> dict[str, str]:
-    """Return the names of the files that declare skills of a table, with SHA-256 hashes of their content."""
+    """Return the name and the SHA-256 hash of each file that declares skills of a table."""
     modules = {getattr(row.does, "__module__", "") for row in skills.rows}
     paths = {Path(location_of(name)) for name in modules if is_own_module(name)}
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}
 
 
 def load_skill_module(path: Path) -> ModuleType:
-    """Run a file once and return its module; UserError if it fails."""
+    """Run a file once and return its module; raise UserError if it fails."""
     try:
         return load_own_module(path)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the file may raise anything
@@ -71,7 +71,7 @@ def _as_user_error(path: Path, error: BaseException) -> UserError:
     sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
     if named := UNKNOWN_OPTION.match(str(error)):
         alike = get_close_matches(named[1], SKILL_OPTIONS, 1)
-        hint = f"did you mean {alike[0]}?" if alike else f"it has {', '.join(SKILL_OPTIONS)}"
+        hint = f"did you mean {alike[0]}?" if alike else f"its options are {', '.join(SKILL_OPTIONS)}"
         sentence = f"@skill has no option {named[1]}; {hint}"
     return UserError(sentence, file=path, line=lines[-1] if lines else None)
 
@@ -80,8 +80,8 @@ def _expect_new(row: Skill, rows: list[Skill]) -> None:
     kinds = {other.recording.kind for other in rows if other.recording is not None}
     topic = None if row.ros is None else row.ros.server
     if topic is not None and topic in {other.ros.server for other in rows if other.ros is not None}:
-        row.wrong(f"another skill has the ROS action {topic} already; choose another topic")
+        row.wrong(f"another skill already uses the ROS action {topic}; choose another topic")
     if row.name in {other.name for other in rows}:
-        row.wrong(f"there is a skill {row.name} already; choose another name")
+        row.wrong(f"there is already a skill {row.name}; choose another name")
     if row.recording is not None and row.recording.kind in kinds:
         row.wrong(f'the events of another skill are called "{row.recording.kind}"; choose another name')

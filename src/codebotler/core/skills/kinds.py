@@ -1,4 +1,4 @@
-"""The kinds of events: those of the paper's skills, and one for the robot's pose."""
+"""The kinds of events that the paper's skills record, and one for the robot's pose."""
 
 from __future__ import annotations
 

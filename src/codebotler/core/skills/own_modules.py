@@ -12,7 +12,7 @@ from types import ModuleType
 from codebotler.core.errors import UserError
 
 OWN_MODULES = "codebotler_skills_"
-"""The prefix of the names of these modules."""
+"""The prefix of the module names of custom skill files."""
 
 
 def is_own_module(name: str) -> bool:
@@ -25,7 +25,7 @@ def load_own_module(path: Path) -> ModuleType:
 
     Raises:
         UserError: the file cannot be read.
-        BaseException: any error of the file.
+        BaseException: any error that the file raises.
     """
     try:
         source = path.read_bytes()
@@ -52,11 +52,11 @@ def load_own_module(path: Path) -> ModuleType:
 
 
 def location_of(module: str) -> str:
-    """Return the location for `find_object`: the path of a custom file, or the module's name."""
+    """Return the `place` for `find_object`: the path of a custom skill file, or else the module's name."""
     return str(sys.modules[module].__file__) if is_own_module(module) else module
 
 
 def find_object(place: str, name: str) -> object:
-    """Return what a module calls `name`; `location_of` gives the place."""
+    """Return the object named `name` in a module; `place` is a result of `location_of`."""
     module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)

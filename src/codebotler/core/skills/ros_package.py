@@ -1,4 +1,4 @@
-"""Generate ROS 2 packages with the actions of skills, for colcon."""
+"""Generate ROS 2 packages that define the actions of skills, for colcon."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ament_package()
 
 
 def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
-    """Return the files of each ROS 2 package with actions of the skills, by package name."""
+    """Return the files of the ROS 2 packages that define the actions of skills, by package name."""
     packages: dict[str, dict[str, str]] = {}
     for skill in skills.rows:
         if skill.ros is not None:
@@ -59,10 +59,10 @@ def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
 
 
 def write_ros_packages(skills: SkillTable, folder: Path) -> list[Path]:
-    """Write the ROS 2 packages of some skills, and return their folders.
+    """Write the ROS 2 packages that define the actions of skills, and return their folders.
 
     Args:
-        skills: at least one with an action.
+        skills: the skills, at least one with a ROS action.
         folder: the parent, such as `src` of a workspace; existing packages are overwritten.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The interface of a simulated robot for functions of skills."""
+"""The interface through which the functions of skills act on a simulated robot."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, NoReturn, Protocol
 
 
 class Simulation(Protocol):
-    """A robot in a simulated world; operations fail with a RobotError."""
+    """A robot in a simulated world; an operation that fails raises a RobotError."""
 
     @property
     def room(self) -> str:
@@ -18,32 +18,32 @@ class Simulation(Protocol):
         """All rooms."""
 
     def drive(self, location: str) -> None:
-        """Drive to the room that a request means."""
+        """Drive to the room that a request refers to."""
 
     def look(self, entity: str) -> bool:
-        """Look whether an object or a person is here."""
+        """Return whether an object or a person is in the robot's room."""
 
     def ask(self, person: str, question: str, options: Sequence[Any]) -> Any:  # noqa: ANN401 - an option, or its number
-        """Ask a person here, who chooses one of the options."""
+        """Ask a person in the robot's room, and return the option that they choose."""
 
     def take(self, obj: str) -> None:
-        """Pick up an object here."""
+        """Pick up an object in the robot's room."""
 
     def put(self, obj: str) -> None:
         """Put down the object that the robot holds."""
 
     def record(self, kind: str, text: str) -> None:
-        """Add an event at the current place and time."""
+        """Record an event at the current place and time."""
 
     @property
     def state(self) -> dict[str, Any]:
         """Data that skills keep between calls; empty at the start of a run."""
 
-    def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of the skill's type
-        """Return a random result of a skill without code, or raise one of its errors."""
+    def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the skill's type
+        """Return a random result for a skill with an empty body, or raise one of its errors."""
 
     def truth(self, statement: str) -> bool:
-        """Whether a statement is true in this world: by `truths` in its file, or at random."""
+        """Return the truth of a statement in this world: from `truths` in its file, or at random."""
 
     def fail(self, kind: str) -> NoReturn:
-        """Fail with an error that the skill declares under `fails`."""
+        """Raise an error that the skill declares under `fails`."""

@@ -16,34 +16,34 @@ from codebotler.core.skills.verbs import Verb
 
 @dataclass(frozen=True)
 class Parameter:
-    """One argument of a skill."""
+    """A parameter of a skill."""
 
     name: str
     type: ValueType = TEXT_TYPE
-    is_options: bool = False  # whether it lists the options of a question, of any type
+    is_options: bool = False  # whether it lists the options of a question, which may have any type
 
     @property
     def kind(self) -> str:
-        """The name of the type for the sandbox."""
+        """The name by which the sandbox knows the type."""
         return "list" if self.is_options else self.type.kind
 
     @property
     def words(self) -> str:
-        """The expected values, in words."""
+        """A description of the expected values."""
         return "a list" if self.is_options else self.type.words
 
 
 @dataclass(frozen=True)
 class Recording:
-    """The event that a skill leaves in the trace."""
+    """The event that a skill records in the trace."""
 
     kind: str  # the kind of event and its name in RTL, such as `goto`
-    text: str  # the parameter with the event's text; empty if it has none
+    text: str  # the parameter that becomes the event's text; empty for no text
     options: str | None = None  # the parameter with the options of a question
-    to: str | None = None  # the parameter with the addressee
-    names: str = ""  # the sort of thing that the text names, such as `room`; empty for speech
-    when_tried: bool = False  # whether failed attempts are events, too
-    more: tuple[str, ...] = ()  # the parameters whose values follow the text
+    to: str | None = None  # the parameter that names the addressee
+    names: str = ""  # the sort of thing that the text names, such as `room`; empty if the text is spoken
+    when_tried: bool = False  # whether failed attempts are recorded, too
+    more: tuple[str, ...] = ()  # further parameters whose values the event contains
 
     @property
     def is_spoken(self) -> bool:
@@ -67,8 +67,8 @@ class RosAction:
     type: str
     server: str  # the topic under which the robot offers it
     goal: tuple[str, ...] = ()  # the fields, in the order of the parameters
-    result: str | None = None  # the type of the only field, if any
-    failure: str = ""  # the kind of its only error; if empty, the robot names the kind
+    result: str | None = None  # the type of the only field of the result; None for no field
+    failure: str = ""  # the kind of its only error; if empty, the robot reports the kind
     package: str = ROS_PACKAGE
 
     @property
@@ -80,22 +80,22 @@ class RosAction:
 
 @dataclass(frozen=True)
 class Skill:
-    """A robot primitive of the paper's figure 2a, or a custom one.
+    """A skill of the robot, from the paper (figure 2a) or custom.
 
     Args:
         name: the function that programs call.
         parameters: its parameters, in order.
         returns: the type of its result.
-        doc: a sentence about it for authors of programs.
+        doc: a sentence that explains it to authors of programs.
         recording: its event in the trace, if any.
-        ros: its action on a robot.
+        ros: the ROS action that executes it.
         verb: its English verb; None to show its name and arguments instead.
-        seconds: its duration on the simulated clock, without driving.
+        seconds: its duration on the simulated clock in seconds, without driving.
         is_idle: whether it changes neither the robot nor its world.
-        does: its effect on a simulated robot, the first argument.
-        adds_event: whether the robot adds its event, rather than `does`.
+        does: the function that acts on a simulated robot, its first argument.
+        adds_event: whether the simulation records the event; False if `does` records it.
         fails: the kinds of its errors, and when each occurs.
-        example: a call for prompts.
+        example: an example call for prompts.
     """
 
     name: str
@@ -113,7 +113,7 @@ class Skill:
     example: str = ""
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
-        """Pickle by name if its module binds the name to this skill."""
+        """Pickle the skill by reference if its module binds its name to it."""
         name = getattr(self.does, "__module__", "")
         module = sys.modules.get(name)
         if module is not None and getattr(module, self.name, None) is self:
@@ -121,7 +121,7 @@ class Skill:
         return super().__reduce_ex__(protocol)
 
     def with_function(self, does: Callable[..., Any]) -> Skill:
-        """Return this skill with another function."""
+        """Return a copy of this skill with another function."""
         return replace(self, does=does, is_idle=False)
 
     @property
@@ -131,12 +131,12 @@ class Skill:
 
     @property
     def is_random(self) -> bool:
-        """Whether its results are random, since its function has no code."""
+        """Whether its results are random because its function has an empty body."""
         return hasattr(self.does, "__wrapped__")
 
     @property
     def call(self) -> str:
-        """A call for prompts."""
+        """An example call for prompts."""
         return self.example or written_call(self.name, [_sample(each) for each in self.parameters])
 
     def wrong(self, sentence: str) -> NoReturn:
@@ -159,7 +159,7 @@ def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
 
 
 def _sample(parameter: Parameter) -> object:
-    """Return an example argument: the parameter's name if it is a text."""
+    """Return an example argument; for a text, this is the parameter's name."""
     value = parameter.type
     if value.choices:
         one: object = value.choices[0]
@@ -220,23 +220,23 @@ class SkillTable(Mapping[str, Skill]):
         return f"SkillTable({', '.join(self)})"
 
     def with_skill(self, skill: Skill) -> SkillTable:
-        """Return this table with another skill."""
+        """Return a copy of this table with one more skill."""
         return SkillTable((*self.rows, skill))
 
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """Return this table with the missing skills of another one."""
+        """Return a copy of this table with the skills added that only the other table has."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def without(self, names: Iterable[str]) -> SkillTable:
-        """Return this table without the skills of these names."""
+        """Return a copy of this table without the skills that have these names."""
         omitted = {*names}
         return SkillTable(tuple(row for row in self.rows if row.name not in omitted))
 
     def with_functions(self, **does: Callable[..., Any]) -> SkillTable:
-        """Return these skills, some with other functions."""
+        """Return a copy of this table in which the named skills have other functions."""
         return SkillTable(tuple(s.with_function(does[s.name]) if s.name in does else s for s in self.rows))
 
     @property
     def verbs(self) -> Mapping[str, Verb]:
-        """The verbs of events, by kind."""
+        """The verb for each kind of event."""
         return {s.recording.kind: s.verb for s in self.rows if s.recording and s.verb}

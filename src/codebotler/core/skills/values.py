@@ -24,9 +24,9 @@ class ValueType:
 
     Args:
         base: the type of a single value; None for no value.
-        is_list: whether it is a list of these values.
-        choices: the allowed values; empty for all of the type.
-        enum: the enumeration that the function of the skill gets instead of a plain choice.
+        is_list: whether the value is a list of `base` values.
+        choices: the allowed values; empty if every value of the type is allowed.
+        enum: the enumeration whose members the skill's function receives instead of plain choices.
     """
 
     base: Base | None = "str"
@@ -36,19 +36,19 @@ class ValueType:
 
     @property
     def kind(self) -> str:
-        """The name of the type for the sandbox, without choices."""
+        """The name by which the sandbox knows the type, without choices."""
         return f"list[{self.base}]" if self.is_list else str(self.base)
 
     @property
     def annotation(self) -> str:
-        """The annotation for programs and models, such as `list[str]` or `Literal["red", "green"]`."""
+        """The annotation that models see, such as `list[str]` or `Literal["red", "green"]`."""
         quoted = map(_written, self.choices)
         one = f"Literal[{', '.join(quoted)}]" if self.choices else str(self.base)
         return f"list[{one}]" if self.is_list else one
 
     @property
     def words(self) -> str:
-        """The expected values, in words."""
+        """A description of the expected values."""
         if self.base is None:
             return "nothing"
         quoted = [f'"{one}"' if isinstance(one, str) else str(one) for one in self.choices]
@@ -73,8 +73,8 @@ class ValueType:
             return False
         return not self.choices or value in self.choices
 
-    def wanted(self, value: Any) -> Any:  # noqa: ANN401 - of any of these types
-        """Convert a value of this type for the function of the skill."""
+    def wanted(self, value: Any) -> Any:  # noqa: ANN401 - any of these types
+        """Convert a value of this type to the one that the skill's function receives."""
         if isinstance(value, list | tuple):
             return [self.wanted(each) for each in value]
         if self.enum is not None:
@@ -91,15 +91,15 @@ TYPE_NAMES: Mapping[Base, Sequence[str]] = {
 TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None)
 
 
-def plain(value: Any) -> Any:  # noqa: ANN401 - of any of these types
-    """Replace members of enumerations by their values."""
+def plain(value: Any) -> Any:  # noqa: ANN401 - any of these types
+    """Replace members of enumerations with their values."""
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.value if isinstance(value, Enum) else value
 
 
 def value_type(annotation: object) -> ValueType | None:
-    """Return the type that an annotation means; None if skills cannot have it."""
+    """Return the type for an annotation, or None if skills cannot use it."""
     if annotation is None or annotation is type(None):
         return NO_VALUE
     if isinstance(annotation, type) and annotation in BASE_TYPES:
@@ -123,7 +123,7 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def sample_values(value: ValueType) -> tuple[Any, ...]:
-    """Return some values of a type, as candidates for random results."""
+    """Return some values of a type, from which random results are chosen."""
     if value.is_list:
         some = sample_values(ValueType(value.base, choices=value.choices))
         return [some[0]], [], [some[0], some[-1]]
@@ -141,7 +141,7 @@ SCALAR_SAMPLES: Mapping[Base, tuple[Scalar, ...]] = {
 
 
 def written_call(name: str, arguments: Sequence[object]) -> str:
-    """Write a call in Python, such as `open_door("glass door")`."""
+    """Return the Python source of a call, such as `open_door("glass door")`."""
     return f"{name}({', '.join(map(_written, arguments))})"
 
 
@@ -152,7 +152,7 @@ def _written(value: object) -> str:
 
 
 def as_text(value: object) -> str:
-    """Write an argument for events and rules: `3`, `0.5`, `red`, `true`, `cup, plate`."""
+    """Convert an argument to text for events and rules: `3`, `0.5`, `red`, `true`, `cup, plate`."""
     if isinstance(value, list | tuple):
         return ", ".join(map(as_text, value))
     if isinstance(value, float) and value.is_integer():

@@ -34,18 +34,18 @@ VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
 
 @dataclass(frozen=True)
 class Verb:
-    """The verb of a skill; the event's text follows it or fills in `object`."""
+    """The English verb of a skill; the event's text follows it or fills the braces in `object`."""
 
     base: str  # `pick up`
     third: str  # `picks up`
     past: str  # `picked up`
     ing: str  # `picking up`
-    alone: str = ""  # `picked something up`, without an object
+    alone: str = ""  # `picked something up`, used when the object is not shown
     results: tuple[str, str] = ("no", "yes")  # the meanings of False and True
-    object: str = ""  # `{} ml of {} into {}`, for several texts
+    object: str = ""  # `{} ml of {} into {}`, used for several texts
 
     def with_object(self, form: str, arguments: Sequence[str], quote: str = '"') -> str:
-        """Return a form of the verb with its objects, which are quoted unless words surround them."""
+        """Return a form of the verb with its objects, in quotes unless `object` puts words around them."""
         if not self.object:
             return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
         missing = ["something"] * (self.object.count("{") - len(arguments))
@@ -53,7 +53,7 @@ class Verb:
 
 
 def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], past: str = "") -> Verb:
-    """Return the verb that a template such as `open {door}` declares.
+    """Build the verb that a template such as `open {door}` declares.
 
     Raises:
         ValueError: the template has no verb, or braces around anything but a parameter.
@@ -66,7 +66,7 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
         if name not in parameters:
             raise ValueError(f'the verb "{template}" names {{{name}}}, which is not a parameter')
     if set("{}") & set(PARAMETER.sub("", template)):
-        raise ValueError(f'the verb "{template}" may have braces around parameters only')
+        raise ValueError(f'the verb "{template}" may use braces only around parameters')
     fixed, brace, _ = rest.partition("{")
     particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
     if rest and not brace:
@@ -103,6 +103,6 @@ def _ing(verb: str) -> str:
 
 
 def _doubled(verb: str) -> str:
-    """Return the stem before `ed` and `ing`, with a doubled consonant after a short, stressed vowel."""
+    """Return the stem for `ed` and `ing`; its consonant is doubled after a short, stressed vowel."""
     is_short = re.fullmatch(r"(?:[^aeiou]*|.*qu)[aeiou][^aeiouwxy]", verb) is not None
     return verb + verb[-1] if is_short or verb in STRESSED_AT_THE_END else verb

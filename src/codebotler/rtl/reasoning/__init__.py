@@ -1,7 +1,7 @@
-"""Decide whether formulas are satisfiable, equivalent or implied by others.
+"""Decide whether formulas are satisfiable, equivalent or implied by other formulas.
 
 Each function answers one question, and raises `Undecided` if that would take too long. A `Reasoner` answers
-several, also for the rooms of one world; `satisfiability.py` has the search.
+several questions, optionally for the rooms of one world; `satisfiability.py` contains the search.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def is_satisfiable(*formulas: Formula) -> bool:
 
 
 def satisfying_trace(*formulas: Formula) -> Trace | None:
-    """Return a shortest trace that satisfies all formulas; None if they contradict each other."""
+    """Return a shortest trace that satisfies all formulas, or None if they contradict each other."""
     return Reasoner(formulas).trace(formulas, shortest=True)
 
 
 def conflict(*formulas: Formula) -> list[Formula] | None:
-    """Return a minimal subset of contradictory formulas; None if all can hold."""
+    """Return a minimal subset of formulas that contradict each other, or None if all can hold."""
     return Reasoner(formulas).conflict(formulas)
 
 
@@ -51,7 +51,7 @@ def are_equivalent(one: Formula, other: Formula) -> bool:
 
 
 def distinguishing_trace(one: Formula, other: Formula) -> Trace | None:
-    """Return a shortest trace on which only one of two formulas holds; None if they are equivalent."""
+    """Return a shortest trace on which only one of two formulas holds, or None if they are equivalent."""
     reasoner = Reasoner([one, other])
     found = (reasoner.trace([a, Not(b)], shortest=True) for a, b in ((one, other), (other, one)))
     return min((trace for trace in found if trace is not None), key=len, default=None)

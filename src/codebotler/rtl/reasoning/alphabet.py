@@ -1,4 +1,4 @@
-"""Reduce all possible events to a finite set that formulas can distinguish."""
+"""Reduce all possible events to a finite set of events that formulas can distinguish."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MATCH_ANY = Regex("")
 
 
 def elements(formula: Formula) -> Iterator[EventPattern]:
-    """Yield all event patterns of a formula in order, and those of the moves that bound its stays."""
+    """Yield all event patterns of a formula in order, including those of moves that begin or end a stay."""
     match formula:
         case And(parts) | Or(parts):
             for part in parts:
@@ -44,12 +44,12 @@ def alphabet(
     rooms: Sequence[str] | None = None,
     moves: Sequence[str] | None = None,
 ) -> list[Event]:
-    """Return an event for each combination of matching patterns for which strings were found.
+    """Return one event for each combination of patterns that some generated event matches.
 
     Args:
         wanted: the patterns.
-        rooms: rooms that all get events; by default rooms of any names.
-        moves: requests to move that all get events; by default any texts.
+        rooms: the rooms, for each of which events are generated; by default rooms with any names.
+        moves: the requests to move, for each of which events are generated; by default any texts.
     """
     kinds: dict[str, list[EventPattern]] = {}
     for element in dict.fromkeys(wanted):
@@ -90,7 +90,7 @@ def alphabet(
 
 
 def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
-    """Split a pattern into patterns for one aspect each, whose conjunction it is."""
+    """Split a pattern into one pattern for each aspect; it matches an event if all of them match."""
     kind = element.kind
     return (
         EventPattern(
@@ -105,7 +105,7 @@ def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
 def _distinct_events(
     alike: Sequence[EventPattern], aspects: Sequence[Sequence[Event]], *, by_room: bool, by_text: bool
 ) -> Iterable[Event]:
-    """Combine aspects to events, and keep the first for each set of matching patterns.
+    """Combine aspects into events, and keep the first event for each set of matching patterns.
 
     Bit masks of the patterns identify the sets, since there may be hundreds of thousands of combinations.
     """
@@ -134,7 +134,7 @@ def _distinct(texts: Iterable[TextPattern | None]) -> tuple[TextPattern, ...]:
 
 
 def _places(wanted: Sequence[EventPattern], rooms: Sequence[str] | None) -> Sequence[str]:
-    """Return rooms that match places in all combinations; an empty name if no pattern has a place."""
+    """Return rooms for all combinations of places, or an empty name if no pattern has a place."""
     regexes = _distinct(Regex(e.place_regex.pattern) for e in wanted if e.place_regex is not None)
     if not regexes:
         return [""]
@@ -153,7 +153,7 @@ def _texts(wanted: Sequence[TextPattern | None]) -> list[str | None]:
 
 
 def _held(wanted: Sequence[TextPattern | None]) -> list[str]:
-    """Return things that match in all combinations; an empty text means that the robot holds nothing."""
+    """Return things for all combinations of patterns; an empty text means that the robot holds nothing."""
     texts = _distinct(wanted)
     x_is_like_empty = all(text.matches("x") == text.matches("") for text in texts)
     strings = (string or "x" for string in _texts(texts)[1:] if string or x_is_like_empty)
@@ -161,7 +161,7 @@ def _held(wanted: Sequence[TextPattern | None]) -> list[str]:
 
 
 def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
-    """Yield options that match in all combinations, and in all required numbers."""
+    """Yield options for all combinations of patterns and all required numbers of options."""
     texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
     found: dict[frozenset[TextPattern], tuple[Option, ...]] = {frozenset(): ()}
     other: tuple[Option, ...] = ()

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias, assert_never
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl import formulas
 
-MAX_STATES = 1_000  # of an automaton before it is minimized
+MAX_STATES = 1_000  # in an automaton before it is minimized
 
 AutomatonState: TypeAlias = Hashable
 Letter: TypeAlias = frozenset[formulas.EventPattern]
@@ -18,12 +18,12 @@ Letter: TypeAlias = frozenset[formulas.EventPattern]
 
 
 class Undecided(Exception):  # noqa: N818 - not a mistake of the caller
-    """The answer to a question would take too long to find."""
+    """Raised if the answer to a question would take too long to find."""
 
 
 @dataclass(frozen=True)
 class Automaton:
-    """The smallest deterministic automaton of a formula; it starts in state 0."""
+    """The minimal deterministic automaton of a formula; it starts in state 0."""
 
     rows: tuple[tuple[int, ...], ...]  # for each state, the next state for each letter
     accepts: tuple[bool, ...]  # for each state, whether the formula holds there
@@ -31,7 +31,7 @@ class Automaton:
     @classmethod
     @lru_cache(maxsize=1_000)  # worlds of a task share most requirements
     def of(cls, formula: formulas.Formula, letters: tuple[Letter, ...]) -> Automaton:
-        """Return the automaton of a formula over these letters."""
+        """Build the minimal automaton of a formula over these letters."""
         machine = machine_of(formula)
         number: dict[AutomatonState, int] = {machine.start: 0}
         rows: list[list[int]] = []
@@ -61,7 +61,7 @@ class Automaton:
 
     @cached_property
     def always(self) -> Automaton:
-        """The automaton of traces on all of whose prefixes the formula holds."""
+        """The automaton of the traces for which the formula holds after every event."""
         rows = tuple(
             row if accepted else (state,) * len(row)
             for state, (row, accepted) in enumerate(zip(self.rows, self.accepts, strict=True))
@@ -70,7 +70,7 @@ class Automaton:
 
     @cached_property
     def distances(self) -> tuple[int | None, ...]:
-        """For each state, the least number of events to an accepting one; None if there is none."""
+        """The minimum number of events from each state to an accepting one, or None if none is reachable."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
         distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
         while border:
@@ -82,7 +82,7 @@ class Automaton:
 
 
 class Machine(NamedTuple):
-    """An automaton before its states are numbered."""
+    """An automaton whose states are computed as they are needed."""
 
     start: AutomatonState
     step: Callable[[Any, Letter], AutomatonState]
@@ -90,7 +90,7 @@ class Machine(NamedTuple):
 
 
 def machine_of(formula: formulas.Formula) -> Machine:
-    """Return the automaton of a formula with lazily computed states."""
+    """Build the automaton of a formula with lazily computed states."""
     match formula:
         case formulas.And(parts) | formulas.Or(parts):
             return _together([*map(machine_of, parts)], all if isinstance(formula, formulas.And) else any)
@@ -149,7 +149,7 @@ def _during_stays(test: formulas.ActAtSome) -> Machine:
 
 
 def _within(scope: formulas.Scope, inner: Machine) -> Machine:
-    """Restrict a machine to the events in a scope; the state is (bound seen, inner state)."""
+    """Restrict a machine to the events in a scope; a state is (whether the bound was seen, inner state)."""
     at, (start, step, accepts) = scope.element, inner
     which = scope.name.removeprefix("Only")
     if which == "BeforeLast":
@@ -170,7 +170,7 @@ def _within(scope: formulas.Scope, inner: Machine) -> Machine:
 
 
 def _before_last(scope: formulas.Scope, inner: Machine) -> Machine:
-    """Restrict a machine to the events before a last one; the state has a copy from the last bound."""
+    """Restrict a machine to the events before the last bound; a state includes the inner state there."""
     at, (start, step, accepts) = scope.element, inner
     nothing = (start,) if scope.is_only else ()
     return Machine(

@@ -1,4 +1,4 @@
-"""Find regexes that are slow on some text that a program may say, by trying."""
+"""Find regexes that are slow by searching for them in texts that a program may say."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SUFFIXES = ("", "\0 x y z")
 
 
 class RepeatedText(NamedTuple):
-    """A repetitive text of any length."""
+    """A repetitive text that can have any length."""
 
     unit: str
     prefix: str = ""
@@ -33,7 +33,7 @@ class RepeatedText(NamedTuple):
 
 @cache
 def slow_text(pattern: str) -> str | None:
-    """Return the start of a text on which a regex is slow; None if none was found."""
+    """Return the start of a text on which a regex is slow, or None if no such text was found."""
     for find, sizes in ((failing_regex(pattern), SHORT_SIZES), (compile_regex(pattern), LONG_SIZES)):
         for text in texts_to_try(pattern):
             if is_slow(find.findall, text, sizes):
@@ -47,7 +47,7 @@ def is_slow(
     sizes: Sequence[int] = (*SHORT_SIZES, *LONG_SIZES),
     seconds: float = SLOW_SECONDS,
 ) -> bool:
-    """Whether a function needs more processor time than `seconds` for a text of one of the sizes."""
+    """Whether a function takes more than `seconds` of processor time for a text of any of the sizes."""
     for size in sizes:
         duration = _measure(read, text.of(size))
         if duration > seconds and _measure(read, text.of(size)) > seconds:  # the machine may be busy once
@@ -59,7 +59,7 @@ def is_slow(
 
 @cache
 def texts_to_try(pattern: str) -> list[RepeatedText]:
-    """Return texts that may be slow for a regex, deterministically; none if it has no repeat."""
+    """Return texts that may be slow for a regex, always the same ones; none if it has no repeat."""
     tree = parse_tree(pattern)
     if "REPEAT" not in str(tree):
         return []

@@ -1,4 +1,4 @@
-"""Generate sample strings of a regex from Python's syntax tree."""
+"""Generate strings that match a regex from its syntax tree."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LONGEST = 10_000
 
 
 def failing_regex(pattern: str) -> re.Pattern[str]:
-    """Compile a variant of a regex that never matches, so that a search tries every way."""
+    """Compile a variant of a regex that never matches, so that a search tries all possibilities."""
     tree = parse_tree(pattern)
     _loosen(tree)
     tree.append(parse_tree("(?!)")[0])
@@ -35,7 +35,7 @@ def _loosen(tree: Tree) -> None:
             _loosen(inner)
 
 
-def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Python's parser made them
+def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - private classes of `re`
     """Return the trees directly inside a node."""
     match op:
         case "BRANCH":
@@ -51,7 +51,7 @@ def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Pyt
 
 @cache
 def samples(pattern: str) -> tuple[str, ...]:
-    """Return up to four strings in which a regex is found, if possible without outer spaces."""
+    """Return up to four strings in which a regex is found, without outer spaces if possible."""
     words = _spell_in_all_ways(parse_tree(pattern))
     forms = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in words]
     tries = (map(str.strip, forms), forms, _guesses(pattern))
@@ -60,7 +60,7 @@ def samples(pattern: str) -> tuple[str, ...]:
 
 
 def counter_samples(pattern: str) -> list[str]:
-    """Return strings from the negative lookaheads of a regex, which prevent a match."""
+    """Return strings that a regex excludes by its negative lookaheads."""
     denied = (arguments[-1] for op, arguments in parse_tree(pattern) if str(op) == "ASSERT_NOT")
     words = (word.strip() for tree in denied for word in _spell_in_all_ways(tree)[:_MOST_SPELLED])
     return [*dict.fromkeys(filter(None, words))]
@@ -72,14 +72,14 @@ def _guesses(pattern: str) -> Iterator[str]:
 
 
 def _spell_in_all_ways(tree: Tree) -> list[str]:
-    """Spell out a tree without gaps, with gaps, and with gaps and lookaheads last."""
+    """Spell out a tree in three ways: without gaps, with gaps, and with gaps and its lookaheads last."""
     behind = sorted(tree, key=lambda node: str(node[0]) == "ASSERT")
     ways = zip_longest(spell_out(tree), spell_out(tree, " "), spell_out(behind, " "))
     return [*dict.fromkeys(text for text in chain.from_iterable(ways) if text is not None)]
 
 
 def spell_out(tree: Tree, gap: str = "") -> list[str]:
-    """Return some strings that a tree matches, with a gap wherever it allows any character."""
+    """Return some strings that a tree matches; `gap` takes the place of any character."""
     texts = [""]
     for op, arguments in tree:
         parts = _spell_node(op, arguments, gap)
@@ -87,7 +87,7 @@ def spell_out(tree: Tree, gap: str = "") -> list[str]:
     return texts
 
 
-def _spell_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
+def _spell_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - private classes of `re`
     inner = [spell_out(tree, gap) for tree in inner_trees(str(op), arguments)]
     match str(op):
         case "LITERAL":
@@ -107,8 +107,8 @@ def _spell_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN
     return [""]
 
 
-def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
-    """Return some characters of a set, literal ones first; one if the set has nearly all."""
+def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - private classes of `re`
+    """Return some characters of a set, literal ones first; only one if the set contains nearly all."""
     parser = import_module("re._parser")
     one = import_module("re._compiler").compile(
         parser.SubPattern(parser.State(), [(op, arguments)]), PATTERN_FLAGS

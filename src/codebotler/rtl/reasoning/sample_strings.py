@@ -1,6 +1,6 @@
-"""Generate strings that match some regexes of formulas but not others.
+"""Generate strings that match some of the regexes in formulas but not the others.
 
-Samples of the regexes are combined and tried, so a combination without a result may still be possible.
+Combinations of samples are tried, so a set of regexes for which none is found may still have a string.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ _MOST_ALIKE = 2
 
 @cache
 def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> tuple[str, ...]:
-    """Return a short string for each combination of patterns that a candidate matches.
+    """Return one short string for each combination of patterns that some candidate matches.
 
-    `outer` allows outer spaces, which options may have and texts of events may not.
+    `outer` allows outer spaces, which options may have but texts of events may not.
     """
     found: dict[tuple[bool, ...], str] = {}
     for candidate in _candidates(texts, outer=outer):
@@ -55,12 +55,13 @@ def _candidates(texts: tuple[TextPattern, ...], *, outer: bool) -> tuple[str, ..
     groups = [[*group] for one in regexes for group in (samples(one), counter_samples(one)) if group]
     words = [*dict.fromkeys([*chain.from_iterable(groups), *chain.from_iterable(map(_claims, texts))])]
     whole = [word for word in words if word]
+    different = _distinguishable(whole, texts)
     every = chain(
         ["", "x"],
         words,
         (f"x{word}x" for word in whole),
         (form for word in whole for form in (f"x {word}", f"{word} x")),
-        _pairs(_distinguishable(whole, texts)),
+        map(" ".join, product([*different, *(f"x{word}x" for word in different)], repeat=2)),
         _subsets([group[0] for group in groups]),
         *(_join_parts(text.parts) for text in texts if isinstance(text, Words)),
         (form for word in words for form in (f" {word}", f"{word} ", f" {word} ")),
@@ -69,7 +70,7 @@ def _candidates(texts: tuple[TextPattern, ...], *, outer: bool) -> tuple[str, ..
 
 
 def _claims(text: TextPattern) -> Iterator[str]:
-    """Yield strings with the claim of a pattern or a different one."""
+    """Yield strings that make the claim of a pattern, or a different claim."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(_claims, parts))
@@ -84,7 +85,7 @@ def _claims(text: TextPattern) -> Iterator[str]:
 
 
 def _distinguishable(words: Iterable[str], texts: Sequence[TextPattern]) -> list[str]:
-    """Keep the first two of all words that the patterns, their parts and regexes do not distinguish."""
+    """Keep two words of each group that neither the patterns nor their parts and regexes distinguish."""
     parts = chain.from_iterable(text.parts if isinstance(text, Words) else (text,) for text in texts)
     wanted = [*dict.fromkeys([*parts, *(Regex(pattern) for text in texts for pattern in patterns(text))])]
     alike: defaultdict[tuple[bool, ...], list[str]] = defaultdict(list)
@@ -93,12 +94,8 @@ def _distinguishable(words: Iterable[str], texts: Sequence[TextPattern]) -> list
     return [word for several in alike.values() for word in several[:_MOST_ALIKE]]
 
 
-def _pairs(words: Sequence[str]) -> Iterator[str]:
-    return map(" ".join, product([*words, *(f"x{word}x" for word in words)], repeat=2))
-
-
 def _subsets(words: Sequence[str]) -> Iterator[str]:
-    """Yield all subsets of three or more words, the largest first, forwards and backwards."""
+    """Yield all subsets of three or more words, the largest first, in both directions."""
     subsets = chain.from_iterable(combinations(words, size) for size in range(len(words), 2, -1))
     return (" ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1]))
 

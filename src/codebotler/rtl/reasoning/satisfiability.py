@@ -1,8 +1,8 @@
-"""Search for a trace on which formulas hold.
+"""Search for a trace on which several formulas hold.
 
-The search covers the product of the formulas' automata, so "none" is a proof for all sequences of events of
-the alphabet. The only gap is a text that satisfies a combination of conditions which no text of the alphabet
-does. Options that are not texts are ignored.
+The search covers the product of the formulas' automata, so the result "none" is a proof for all sequences of
+events of the alphabet. It misses only texts that meet a combination of conditions which no text of the
+alphabet meets. Options that are not texts are ignored.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from codebotler.rtl.reasoning.alphabet import alphabet, elements
 from codebotler.rtl.reasoning.automaton import Automaton, Undecided
 from codebotler.rtl.semantics import holds, is_match
 
-MAX_VISITED_STATES = 20_000  # of the product in one search
+MAX_VISITED_STATES = 20_000  # states of the product automaton in one search
 
 Reading: TypeAlias = tuple[Automaton, list[int]]
-"""An automaton, and its letter for each event of the alphabet."""
+"""An automaton and, for each event of the alphabet, the index of its letter."""
 
 
 class Reasoner:
-    """Answers questions about formulas, for a robot anywhere or in the rooms of one world.
+    """Answers questions about formulas, for a robot in any rooms or in the rooms of one world.
 
     Args:
-        formulas: all formulas of later questions, whose regexes determine the alphabet.
-        moves: the room for each request to move; by default any text may lead anywhere.
-        start: the robot's first room; only with `moves`.
+        formulas: all formulas of later questions; their regexes determine the alphabet.
+        moves: the room to which each request to move leads; by default any text may lead anywhere.
+        start: the robot's first room; only used with `moves`.
     """
 
     def __init__(
@@ -56,16 +56,16 @@ class Reasoner:
             self._driving = _driving_automaton(self.events, rooms, moves)
 
     def conflict(self, formulas: Sequence[Formula], denied: Formula | None = None) -> list[Formula] | None:
-        """Return a minimal subset of contradictory formulas, in order; None if all can hold.
+        """Return a minimal subset of formulas that contradict each other, in order, or None if all can hold.
 
         Args:
             formulas: the formulas that should hold.
-            denied: a formula that should fail; formulas that contradict this imply it.
+            denied: a formula that should fail; if this is a contradiction, the subset implies the formula.
 
         Raises:
             Undecided: the search would take too long.
         """
-        # Adding only formulas that the last trace breaks keeps the proofs small.
+        # Add only formulas that the last trace breaks, so that the proofs stay small.
         given = [] if denied is None else [Not(denied)]
         wanted = {element for one in given for element in elements(one)}
         nearest = sorted(formulas, key=lambda one: -len(wanted.intersection(elements(one))))
@@ -84,11 +84,11 @@ class Reasoner:
     def trace(
         self, formulas: Iterable[Formula], *, always: Iterable[Formula] = (), shortest: bool = False
     ) -> Trace | None:
-        """Return a trace of events of the alphabet on which formulas hold; None if there is none.
+        """Return a trace of events of the alphabet on which formulas hold, or None if there is none.
 
         Args:
             formulas: the formulas that must hold.
-            always: formulas that must hold on every prefix.
+            always: formulas that must hold at the start and after every event.
             shortest: whether the trace must have minimal length, which takes longer.
 
         Raises:
@@ -98,7 +98,7 @@ class Reasoner:
         readings += [(machine.always, read) for machine, read in map(self._reading, always)]
         if self._driving is not None:
             readings.append(self._driving)
-        letters: dict[States, Event] = {}  # the first of the events that no automaton distinguishes
+        letters: dict[States, Event] = {}  # the first of the events that all automata treat alike
         for event, *of_event in zip(self.events, *(numbers for _, numbers in readings), strict=True):
             letters.setdefault(tuple(of_event), event)
         return _search([automaton for automaton, _ in readings], letters, shortest=shortest)
@@ -107,7 +107,7 @@ class Reasoner:
         if formula not in self._readings:
             seen = [*dict.fromkeys(elements(formula))]
             rows = [*zip(*map(self._matched.__getitem__, seen), strict=True)]
-            different = sorted(set(rows))  # in an order that does not depend on the events
+            different = sorted(set(rows))  # so that the order does not depend on the events
             letters = tuple(frozenset(compress(seen, row)) for row in different)
             number = {row: index for index, row in enumerate(different)}
             self._readings[formula] = Automaton.of(formula, letters), [number[row] for row in rows]
@@ -115,7 +115,7 @@ class Reasoner:
 
 
 def _driving_automaton(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
-    """Return the automaton of traces in which each event happens where the robot is."""
+    """Build the automaton of the traces in which each event happens in the robot's current room."""
     lost = len(rooms)
     kinds = [(event.text if event.kind == GOTO else "", event.place) for event in events]
     number = {kind: index for index, kind in enumerate(dict.fromkeys(kinds))}
@@ -135,13 +135,13 @@ def _driving_automaton(events: Sequence[Event], rooms: Sequence[str], moves: Map
 
 
 States: TypeAlias = tuple[int, ...]
-"""One state of each automaton of a product."""
+"""A state of the product automaton: one state of each automaton."""
 
 
 def _search(
     automata: Sequence[Automaton], letters: Mapping[States, Event], *, shortest: bool
 ) -> Trace | None:
-    """Return a trace that all automata accept, by greedy search, or a shortest one, by A*."""
+    """Find a trace that all automata accept with a greedy search, or a shortest one with A*."""
     tables = [automaton.rows for automaton in automata]
     distances = [automaton.distances for automaton in automata]
     start = (0,) * len(automata)

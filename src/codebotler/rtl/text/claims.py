@@ -1,4 +1,4 @@
-"""Text patterns for claims: a number, a time of day, an affirmation or a denial."""
+"""Text patterns for claims: numbers, times of day, affirmations and denials."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from codebotler.rtl.text.times import TimeOfDay, times_in
 
 @dataclass(frozen=True)
 class Number(Matcher):
-    """Matches texts that give a number of a thing, and no other number of it.
+    """Matches texts that give one number for a thing, and no other number for it.
 
     Args:
         number: the number.
         thing: a regex for the thing, as a whole word in the singular or the plural.
-        others: regexes for other things, whose numbers are ignored.
+        others: regexes for other things; their numbers are ignored.
         other: whether the text must give a different number instead.
     """
 
@@ -39,10 +39,10 @@ class Number(Matcher):
         return bool(given) and (given != {self.number}) == self.other
 
     def given(self, text: str) -> frozenset[float]:
-        """Return all numbers that a text gives of the thing.
+        """Return all numbers that a text gives for the thing.
 
-        A number belongs to the thing after it, or, in clauses that begin with a thing, to the one before it.
-        In a text that does not name the thing, all numbers count that belong to no other thing.
+        A number belongs to the thing after it or, in clauses that begin with a thing, to the thing before it.
+        If a text does not name the thing, all numbers that belong to no other thing count.
         """
         return _given(self.kinds, text)
 
@@ -73,32 +73,32 @@ _PLACE = re.compile(
     r"|(?:all|each|every) (?:the )?)$",
     re.IGNORECASE,
 )
-_MAX_PLACE_PREFIX = 30  # characters before a thing in which to look for such words
+_MAX_PLACE_PREFIX = 30  # characters before a thing that are searched for these words
 
 
 def _word(pattern: str) -> re.Pattern[str]:
-    """Compile a regex for whole words, singular or plural; a sign such as `%` may touch a word."""
+    """Compile a regex for whole words, singular or plural; a sign such as `%` may be next to a word."""
     return compile_regex(rf"(?:\b|(?=\W))(?:{scope_flags(pattern)})(?:e?s)?(?:\b|(?<=\W))")
 
 
 Mark = tuple[int | None, tuple[float, ...]]
-"""The index of a thing and no numbers, or None and the numbers that stand together."""
+"""The index of a thing without numbers, or None with one or more alternative numbers."""
 
 
 def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
-    """Yield the things and numbers in a text, in order; ignore digits in names of things."""
+    """Yield the things and numbers in a text in order, but not the digits in names of things."""
     things = [*_things(text, kinds)]
     starts = [start for start, _, _ in things]
     found: list[tuple[int, Mark]] = [(start, (kind, ())) for start, _, kind in things]
     for start, end, numbers in numerals(text):
-        before = bisect_left(starts, end)  # the last of these ends last
+        before = bisect_left(starts, end)  # the last of the earlier things also ends last
         if not before or things[before - 1][1] <= start:
             found.append((start, (None, numbers)))
     yield from (mark for _, mark in sorted(found, key=lambda one: one[0]))
 
 
 def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int, int, int]]:
-    """Yield start, end and index of each thing; of overlapping names, the first, then the longest."""
+    """Yield start, end and index of each thing; overlapping names give the first, or else the longest."""
     named = [
         (match.start(), -match.end(), kind)
         for kind, regex in enumerate(kinds)
@@ -113,7 +113,7 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
 
 
 def _numbers_of_thing(marks: list[Mark]) -> Iterator[float]:
-    """Yield the numbers of the first thing: before it, or after it if the marks begin with a thing."""
+    """Yield the numbers of the first thing, before it or, if the marks begin with a thing, after it."""
     ordered = marks if marks and marks[0][0] is None else marks[::-1]
     numbers: tuple[float, ...] = ()
     for kind, given in ordered:
@@ -126,14 +126,14 @@ def _numbers_of_thing(marks: list[Mark]) -> Iterator[float]:
 
 @dataclass(frozen=True)
 class Time(Matcher):
-    """Matches texts that name times of day, all within a span.
+    """Matches texts that name times of day if all of them are within a span.
 
-    An ambiguous time, morning or afternoon, is within the span if one reading is.
+    A time that may be morning or afternoon is within the span if one of the two is.
 
     Args:
-        start: the earliest, such as `11:00`.
-        end: the latest.
-        other: whether some time must be outside the span instead.
+        start: the earliest time, such as `11:00`.
+        end: the latest time.
+        other: whether at least one time must be outside the span instead.
     """
 
     start: str
@@ -156,7 +156,7 @@ class Time(Matcher):
 
 
 def minutes(time: str) -> TimeOfDay:
-    """Convert a time such as `11:30` to minutes since midnight; raise ValueError for other texts."""
+    """Convert a time such as `11:30` to minutes since midnight; raise ValueError for any other text."""
     match = re.fullmatch(r"(\d\d?):(\d\d)", time)
     if match is None or int(match[1]) > 24 or int(match[2]) > 59:  # noqa: PLR2004 - hours and minutes
         raise ValueError(f'"{time}" is not a time of day such as "11:30"')
@@ -165,11 +165,11 @@ def minutes(time: str) -> TimeOfDay:
 
 @dataclass(frozen=True)
 class Claim(Matcher):
-    """Matches texts with a clause that affirms, or one that denies, a thing.
+    """Matches texts with a clause that affirms a thing or, with `denied`, one that denies it.
 
     Args:
         pattern: a regex for the thing, as a whole word.
-        denied: whether the clause must deny.
+        denied: whether the clause must deny the thing.
     """
 
     pattern: str

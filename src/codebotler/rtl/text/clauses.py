@@ -1,4 +1,4 @@
-"""Split a text into sentences, and a sentence into clauses."""
+"""Split texts into sentences, and sentences into clauses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from codebotler.rtl.text.polarity import denies_something
 
-_HALF_DAY = re.compile(r"(?<![^\W\d])([ap])\.\s?m\.?", re.IGNORECASE)  # a digit may touch it
+_HALF_DAY = re.compile(r"(?<![^\W\d])([ap])\.\s?m\.?", re.IGNORECASE)  # a digit may come directly before it
 _END = re.compile(r"(?<=\?)(?!\?)|[!;\n]+|\.(?!\d)")
 _JOINT = re.compile(
     r"(,(?!\d)|(?<!\d),|\b(?:and|(?<!anything )but|while|whereas|however|although|though)\b"
@@ -60,9 +60,9 @@ _NO_SUBJECT = re.compile(
     re.IGNORECASE,
 )
 _SINGULAR = re.compile(r"\b(?:(is|was|has|does)|are|were|have|do)(?:\b|n['\u2019]t)", re.IGNORECASE)
-# A clause that ends with such a word lists nothing: `Bob is in`, `butter is missing`, `Alice has accepted`.
+# A clause that ends with one of these words is not a list: `Bob is in`, `butter is missing`.
 _STATES = r"(?:there|here|in|out|gone|(?:un)?available|absent|yes|no|not|too|\w+(?:ed|ing))\b"
-_STATE_LENGTH = 40  # characters at the end of a clause in which to look for such a word
+_STATE_LENGTH = 40  # characters at the end of a clause that are searched for these words
 _STATE = re.compile(rf"\b{_STATES}\W*$", re.IGNORECASE)
 _LACK = re.compile(r"\b(?:missing|lacking|absent|unavailable|gone)\b", re.IGNORECASE)
 _UNFINISHED = re.compile(
@@ -96,7 +96,7 @@ _IN_VAIN_THERE = re.compile(
     re.IGNORECASE,
 )
 
-# "2 people said yes to the question: do you like it?" asks nothing.
+# "2 people said yes to the question: do you like it?" is not a question.
 _QUOTED = re.compile(
     r"(\bto(?:(?: the question)?: ?| the question | (?=[\"'\u2018\u201c]))[\"'\u2018\u201c]?"
     r"(?:is|are|was|were|did|does|do|will|would|can|could|has|have|had|should|who|what|which|when|where|why|how)\b"
@@ -106,27 +106,27 @@ _QUOTED = re.compile(
 
 
 def sentences(text: str) -> list[str]:
-    """Return the sentences of a text, questions with their marks; `4 p.m.` and `1.5` do not end one.
+    """Split a text into sentences; questions keep their marks, and `4 p.m.` and `1.5` do not end a sentence.
 
-    A question with its answer, as in `Butter? No`, is one sentence and not a question.
+    A question together with its answer, as in `Butter? No`, is one sentence that is not a question.
     """
     text = _QUOTED.sub(r"\1", _ANSWERED.sub(r"\1: \2", _HALF_DAY.sub(r"\1m", text)))
     return [part for part in _END.split(text) if part.strip().strip("?")]
 
 
 class _Part(NamedTuple):
-    joint: str  # the comma or word before it, in lower case
+    joint: str  # the comma or word before the part, in lower case
     text: str
 
 
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
     """Split a sentence at commas and words such as `but`; questions keep their `?`.
 
-    With `lists`, a few words without a verb belong to the full clause before or after them:
+    With `lists`, a few words without a verb are added to the full clause before or after them:
     `Alice and Bob are in` is one clause, and `he has bread and butter, but cheese is missing` is two.
     """
     sentence = _ASIDE.sub(" ", _TAG.sub("", sentence))
-    if _PROPOSES.match(sentence):  # "How about 75 degrees?" is no question
+    if _PROPOSES.match(sentence):  # "How about 75 degrees?" is not a question
         sentence = sentence.rstrip("? ")
     if lists and not sentence.rstrip().endswith("?"):
         sentence = _DASH.sub(", ", sentence)
@@ -145,7 +145,7 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
 
 
 def complete_clauses(parts: Iterable[str]) -> Iterator[str]:
-    """Yield clauses with their omitted word: `it is not missing` for `it is not`."""
+    """Yield clauses with omitted words restored, such as `it is not missing` for `it is not`."""
     names_lack = False
     for part in parts:
         is_unfinished = names_lack and _UNFINISHED.search(part) is not None
@@ -158,14 +158,14 @@ def _split_at_joints(sentence: str) -> Iterator[_Part]:
     # "She would love to, but is busy" does not affirm.
     for at, piece in enumerate(_JOINT.split(_IN_VAIN.sub("might", sentence))):
         if at % 2:
-            joint = piece.lower() if joint in ("", ",") else joint  # in ", but" the word counts
+            joint = piece.lower() if joint in ("", ",") else joint  # ", but" counts as "but"
         elif piece.strip():
             yield _Part(joint, piece)
             joint = ""
 
 
 def _split_exception(sentence: str) -> str:
-    """Turn an exception into a clause: `all come, without Bob` for `all but Bob come`."""
+    """Turn an exception into a clause of its own: `all come, without Bob` for `all but Bob come`."""
     match = _EXCEPT.search(sentence)
     if match is None:
         return sentence
@@ -216,7 +216,7 @@ def _join_lists(parts: Sequence[_Part]) -> Iterator[str]:
             continue
         names = [name.text for name in waiting]
         if waiting and part.text.endswith("?") and _INVERTED.match(part.text):
-            done.append(" ".join(names))  # "Good day, how are you?" asks nothing of the day
+            done.append(" ".join(names))  # as in "Good day, how are you?"
             done.append(part.text)
         else:
             end = _find_end_of_list(done, waiting, part)
@@ -231,10 +231,10 @@ def _join_lists(parts: Sequence[_Part]) -> Iterator[str]:
 
 
 def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part) -> int:
-    """Count the names that belong to the clause before them, or form a clause of their own.
+    """Count the names that belong to the previous clause or form a clause of their own.
 
-    A list ends at a contrast, or where the next clause cannot begin with it. Otherwise, if a list is what the
-    clause before ends with, it ends with `and` and one more name: `he has tea and milk, sugar is missing`.
+    A list ends at a contrast, or if the next clause cannot begin with it. Otherwise, a list at the end of the
+    previous clause ends after `and` and one more name, as in `he has tea and milk, sugar is missing`.
     """
     if not waiting or _belongs_to_next(waiting, part.text):
         return 0
@@ -242,7 +242,7 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
     contrasts = [at for at, joint in enumerate(joints) if at and joint not in (",", "and")]
     if contrasts and (done or not (_PLACE.match(waiting[0].text) or joints[-1] in ("however", "though"))):
         return contrasts[-1]
-    if done and joints[0] not in (",", "and"):  # names after a contrast do not belong to the clause before it
+    if done and joints[0] not in (",", "and"):  # names after a contrast do not belong to the previous clause
         return 0
     may_list = bool(done) and _STATE.search(done[-1][-_STATE_LENGTH:]) is None
     has_no_subject = _NO_SUBJECT.match(part.text) is not None and (may_list or joints[-1] == "and")
@@ -256,7 +256,7 @@ def _find_end_of_list(done: Sequence[str], waiting: Sequence[_Part], part: _Part
 
 
 def _belongs_to_next(waiting: Sequence[_Part], part: str) -> bool:
-    """Whether the words before a clause belong to it: `in room 3, there is one`."""
+    """Whether the words before a clause belong to it, as in `in room 3, there is one`."""
     if any(_ASKED.search(name.text) for name in waiting):
         return True
     is_place_after = bool(_PLACE.match(waiting[-1].text)) and bool(_THERE.match(part))
@@ -264,6 +264,6 @@ def _belongs_to_next(waiting: Sequence[_Part], part: str) -> bool:
 
 
 def _is_item(part: str) -> bool:
-    """Whether a part is a few words that claim nothing by themselves, such as a name."""
+    """Whether a part consists of a few words that make no claim, such as a name."""
     says_something = _SUBJECT.match(part) or _VERB.search(part) or denies_something(part)
     return _ITEM.fullmatch(part) is not None and not says_something

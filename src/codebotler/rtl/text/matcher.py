@@ -1,4 +1,4 @@
-"""`Matcher`: a text pattern with a cache."""
+"""The base class of text patterns, which caches their results."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ MAX_CACHED_LENGTH, MAX_CACHED_TEXTS = 200, 1_000  # characters of a cached text,
 
 
 class Matcher(ABC):
-    """A pattern for texts."""
+    """A pattern that texts match or not."""
 
     def matches(self, text: str) -> bool:
-        """Whether a text matches; results are cached, since programs repeat texts."""
+        """Whether a text matches; the result is cached, since programs repeat texts."""
         known = self._known
         found = known.get(text)
         if found is None:

@@ -1,4 +1,4 @@
-"""Find numbers in a text, in digits or in words."""
+"""Find numbers in a text, written in digits or in words."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _NOTHING = (
     r"|(?:(?<=\bnot )|(?<=n['\u2019]t ))(?:needed|wanted|chosen|picked)"
 )
 
-_NEAR = 60  # characters within which words belong together; a limit keeps long texts fast
+_NEAR = 60  # characters between words that belong together; the limit keeps long texts fast
 
-# Suffixes of a number; a single F or C needs two digits or more, because 3C may be a room.
+# Suffixes of a number; F and C need at least two digits before them, because 3C may be a room.
 _GLUED = (
     r"x|[ap]m|h|hrs?|hours?|days?|mins?|minutes?|s|secs?|seconds?|k?g|lbs?|oz|m?l|[kcm]m|m|ft|degrees?|percent"
     r"|pcs?|pieces?|people|(?:deg|\u00ba)[fc]?|fahrenheit|celsius|(?<=\d\d)[fc]"
@@ -41,7 +41,7 @@ _PRONOUN = re.compile(
 )
 _TAKES = re.compile(r"\b(?:takes?|took)[ -]$", re.IGNORECASE)
 _LAST = re.compile(r"\s*(?:[.,;!)]|and\b|but\b|$)", re.IGNORECASE)
-# "2 of 4" gives 2, and "a total of 2" gives 2 as well; "2 of a total of 4" does not give 4.
+# "2 of 4" and "a total of 2" both give 2; "2 of a total of 4" does not give 4.
 _OF = re.compile(
     r"(?:(?:(?<!\btotal )|(?<=\bof a total )|(?<=\bof the total ))"
     r"\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$",
@@ -60,10 +60,10 @@ _TOGETHER = re.compile(
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
-    """Yield start, end and values of the numbers in a text; group alternatives such as `2 or 3`.
+    """Yield the start, end and values of each number in a text; alternatives such as `2 or 3` are one number.
 
-    `no`, `nobody` and the like are 0; `x2`, `2x` and `2kg` are 2. `2 of 4` and `a total of 2` give 2;
-    `the one`, `not 3` and `at least 3` give none.
+    Words such as `no` and `nobody` are 0; `x2`, `2x` and `2kg` are 2. `2 of 4` and `a total of 2` give 2;
+    `the one`, `not 3` and `at least 3` give no number.
     """
     together: list[re.Match[str]] = []
     for match in _NUMBER.finditer(text):

@@ -1,4 +1,4 @@
-"""Decide whether a clause affirms, denies or leaves open."""
+"""Decide whether a clause affirms something, denies it or leaves it open."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import Enum
 _WORDS = r"(?:[\w'\u2019]+\s+)"
 _NOT = r"(?:not|never|cannot|cant|dont|doesnt|wont|isnt|\w+n['\u2019]t)"
 
-# Phrases with a word of denial that deny nothing; they are removed first.
+# Phrases with a negative word that deny nothing; they are removed first.
 _HARMLESS = re.compile(
     r"\bno (?:problem|worr(?:y|ies)|doubt|trouble|questions?|objections?|hurry|rush|matter|wonder|need)\b"
     r"|\b(?:no|not) (?:more|less|fewer|later|earlier|sooner|before|after)\b(?: than\b)?|\bnot (?:only|just)\b"
@@ -17,7 +17,7 @@ _HARMLESS = re.compile(
     rf"|\b{_NOT} (?:even )?(?:worry|mind|forget|hesitate|panic|get lost|be (?:late|afraid|shy))\b"
     r"|\b(?:can(?:no|['\u2019])t|can not) wait\b|\bcould(?:n['\u2019]t| not) be (?:happier|better)\b"
     rf"|\b{_NOT} miss\b|\bno shortage\b|\b(?:nobody|no ?one|nothing) else\b"
-    # A double denial affirms.
+    # A double negative affirms.
     rf"|\b(?:no|nothing|nobody|no ?one|none|neither|nowhere|{_NOT})\s+{_WORDS}{{0,4}}"
     r"(?:lack\w*|miss(?:es|ing)|absent|alone|declin\w*|refus\w*|without)\b"
     r"|\b(?:lacking|missing|lacks?|without)\W{1,3}(?:nothing|none|no ?one|nobody)\b",
@@ -39,7 +39,7 @@ _OPEN = re.compile(
     r"|\bmay\b(?! (?:i|we|your?|want|need)\b)|\bhop(?:e|es|ing)\b(?!.{0,60}\b(?:you|your|every\w+|all)\b)"
     rf"|\b{_NOT} (?:yet )?(?:be )?(?:know|knows|sure|certain|clear|decided?|told|tell)\b"
     r"|\bno (?:idea|answer)\b"
-    # Announcements of the robot, and people who have yet to answer.
+    # Announcements by the robot, and people who have not answered yet.
     r"|\bi(?:['\u2019]ll| will|(?:['\u2019]m| am) (?:going|about) to| (?:still )?(?:have|need) to)"
     r"(?: \w+){0,2}? (?:look|check|search|ask|find out|see whether)\b"
     r"|\b(?:needs?|has|have|wants?) to think\b|\b(?:wants?|wanted|would like) to know\b"
@@ -51,7 +51,7 @@ _OPEN = re.compile(
 
 
 class Polarity(Enum):
-    """Whether a clause affirms or denies what it names."""
+    """Whether a clause affirms the things it names, denies them or leaves them open."""
 
     AFFIRMS = "affirms"
     DENIES = "denies"
@@ -59,14 +59,14 @@ class Polarity(Enum):
 
 
 def polarity(clause: str) -> Polarity:
-    """Return the polarity of a clause: `nobody` and `declined` deny, a question and `maybe` leave open."""
+    """Return the polarity of a clause: `nobody` and `declined` deny, while questions and `maybe` are open."""
     if clause.rstrip().endswith("?") or _OPEN.search(clause):
         return Polarity.OPEN
     return Polarity.DENIES if denies_something(clause) else Polarity.AFFIRMS
 
 
 def denies_something(clause: str) -> bool:
-    """Whether a clause has a word of denial outside phrases such as `no problem`."""
+    """Whether a clause has a negative word outside phrases such as `no problem`."""
     return _DENIAL.search(without_harmless(clause)) is not None
 
 

@@ -41,16 +41,16 @@ _ALONE = re.compile(rf"\s*(?:(?:at|around|about)\s+)?{_hour('')}\s*", re.IGNOREC
 _EXCLUDED = re.compile(
     r"\b(?:before|after|except|(?:any ?(?:thing|time)|all|everything) but|not)\s+(?:at\s+)?$", re.IGNORECASE
 )
-_NEAR = 30  # characters before a time in which to look for an exclusion
+_NEAR = 30  # characters before a time that are searched for an exclusion
 _DAY = 24 * 60
 
 
 @lru_cache(maxsize=1024)  # several formulas read the same text
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
-    """Return the times of day in a text, each with two readings if it may be morning or afternoon.
+    """Return the times of day in a text; a time that may be morning or afternoon has both values.
 
     `12 pm`, `12:00`, `noon`, `twelve o'clock`, `half past twelve` and `six in the evening` are times, and so
-    is an hour alone; `before 12 pm` is not a time.
+    is a text that consists of an hour; `before 12 pm` is not a time.
     """
     plain = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
     plain = _IN_THE.sub(lambda match: f"{match[1]} {'am' if match[2].lower() == 'morning' else 'pm'}", plain)
