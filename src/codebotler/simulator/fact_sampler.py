@@ -26,7 +26,7 @@ class FactSampler:
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
 
     def answer(self, count: int, agreeing: int, *question: str) -> int:
-        """Draw which of `count` options a person chooses; `agreeing` is the option that says yes."""
+        """Draw which of `count` options a person chooses; `agreeing` is the most affirmative one."""
         known = self._forced("answer", count, agreeing, *question)
         if known is not None:
             return known

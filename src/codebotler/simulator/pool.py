@@ -42,7 +42,7 @@ class WorkerPool:
     """Runs functions in threads that each own one worker.
 
     The first worker starts in the background. As a context manager, the pool waits for it on entry; with
-    `contextlib.closing`, the first call waits. Without seccomp, warn, or fail if isolation is required.
+    `contextlib.closing`, the first call waits. Without seccomp, it warns, or fails if isolation is required.
     """
 
     def __init__(
@@ -181,7 +181,7 @@ def map_batches(
     Args:
         submit: starts a call for a few keys; the call returns one result per key.
         keys: the keys, of which a few are read in advance.
-        workers: the number of threads.
+        workers: the number of calls that run at the same time.
         name: returns a short, unique name for a key.
         then: converts each result in the caller's thread; what it returns is pickled.
     """

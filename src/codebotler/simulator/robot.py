@@ -240,7 +240,7 @@ class SimulatedRobot:
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the held object; its name must be the picked one, or match if events are as-happened."""
+        """Put down the held object, using the name it was picked up under or, if as-happened, any match."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):

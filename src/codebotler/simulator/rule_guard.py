@@ -20,7 +20,7 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return the name that rules compare for a room or thing: its label, or the request if that is a regex."""
+    """Return the name that rules compare for a room or thing: its label, or for a regex the request."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
@@ -135,7 +135,7 @@ class RuleGuard:
         late: RuleViolationError | None = None
         event = _trimmed(event)
         for rule, monitor in self._history.monitors:
-            if event.kind == INSIDE and not rule.inside:  # hidden from rules that do not refer to poses
+            if event.kind == INSIDE and not rule.inside:  # must not count as the last event for other rules
                 continue
             try:
                 holds = monitor.feed(event)
@@ -148,7 +148,7 @@ class RuleGuard:
             raise late
 
     def moved(self, start: Point, end: Point, holding: str) -> None:
-        """Add a straight drive between two poses to the history; raise RuleViolationError if it broke a rule."""
+        """Add a straight drive between two poses; raise RuleViolationError if it broke a rule."""
         if self.judges_poses:
             self._enter(rooms_along(self._rooms, start, end), holding)
 

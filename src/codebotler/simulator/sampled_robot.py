@@ -106,7 +106,7 @@ class Whereabouts:
 
 @dataclass(frozen=True)
 class GivenAnswer:
-    """The fact that a person gives a certain answer to a question."""
+    """The fact that a person answers a question in a particular way."""
 
     room: str
     question: str
@@ -122,7 +122,7 @@ class GivenAnswer:
 
 @dataclass(frozen=True)
 class RandomOutcome:
-    """The fact that a statement is true or false, or that a skill has a certain result."""
+    """The fact that a statement is true or false, or that a skill has a particular result."""
 
     statement: str
     outcome: str
@@ -172,8 +172,8 @@ class SampledRobot(SimulatedRobot):
     Whether a person or thing that the program looks for is present is random. Without a look, the program's
     assumptions hold: a person answers, and a thing can be picked up. Answers are random options.
 
-    A program that searches several rooms assumes that the thing is in one of them. If it is in none, `excuses`
-    holds the resulting errors, which are not the program's fault.
+    A program that searches several rooms assumes that the thing is in one of them. If that is not so,
+    `excuses` holds the resulting errors, which are not the program's fault.
     """
 
     is_copied = True

@@ -1,7 +1,7 @@
 """Talks to the engine over a socket: sends JSON, and receives Python's `marshal` format.
 
-Only messages from the engine are ever unmarshalled. A program that changes `json`, `os` or the builtins has no
-effect here, since this module holds its own references.
+Only messages from the engine are ever unmarshalled. Changes that a program makes to `json`, `os` or the
+builtins have no effect here, since this module holds its own references.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def simulate_environment(run: ProgramRun) -> None:
-    """Give programs a simulated clock and locks, empty input, discarded output and no environment variables."""
+    """Give programs a simulated clock and locks, empty input, discarded output and an empty environment."""
     simulate_time(run)
     simulate_locks(run)
     sys.stdin = io.StringIO("")
@@ -53,7 +53,7 @@ def forbid_watching() -> None:
 
 
 class _Nowhere(io.BufferedIOBase):
-    """An output that discards everything."""
+    """An output stream that discards everything."""
 
     def writable(self) -> bool:
         return True
