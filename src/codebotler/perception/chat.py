@@ -69,7 +69,7 @@ class ChatDetector:
             answer = [PromptMessage("assistant", text)] if text else []
             messages = (*messages[:2], *answer, PromptMessage("user", RETRY_PROMPT.format(fault=fault)))
         last = f"; it replied: {error_text(text)}" if text else ""
-        raise PerceptionError(f"{self.name} gave no valid answer in {MAX_REPLIES} tries: {fault}{last}")
+        raise PerceptionError(f"{self.name} gave no valid answer in {MAX_REPLIES} attempts: {fault}{last}")
 
     def close(self) -> None:
         """Close the connections."""

@@ -51,8 +51,8 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
         raise UserError(f"{name} is not a JPEG, PNG or WebP file") from None
     except Image.DecompressionBombError:
         raise UserError(f"{name} has more than {MAX_PIXELS:,} pixels; use a smaller one") from None
-    except Exception as error:  # noqa: BLE001 - decoders raise many types
-        raise UserError(f"{name} is broken or cut off ({error_text(error)})") from None
+    except Exception as error:  # noqa: BLE001 - a decoder may raise any error
+        raise UserError(f"{name} is damaged or incomplete ({error_text(error)})") from None
 
 
 def read_image(path: Path) -> Image.Image:
@@ -86,7 +86,7 @@ def _decode_raw(
     encoding: str, size: tuple[int, int], step: int, data: bytes, *, is_big: bool, name: str
 ) -> Image.Image:
     if encoding not in ENCODINGS:
-        raise UserError(f'{name} has the encoding "{encoding}", not one of {", ".join(ENCODINGS)}')
+        raise UserError(f'{name} has the unknown encoding "{encoding}"; use one of {", ".join(ENCODINGS)}')
     mode, order, width = ENCODINGS[encoding]
     _check_size(*size, name)
     if step < size[0] * width or len(data) < step * size[1]:
@@ -125,7 +125,7 @@ def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
 def _check_size(width: int, height: int, name: str) -> None:
     if width * height > MAX_PIXELS:
         raise UserError(
-            f"{name} has {width:,} x {height:,} pixels, more than {MAX_PIXELS:,} in all; use a smaller one"
+            f"{name} has {width:,} x {height:,} pixels, more than {MAX_PIXELS:,} in total; use a smaller one"
         )
     if min(width, height) < MIN_SIDE:
         raise UserError(

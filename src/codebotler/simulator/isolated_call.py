@@ -105,7 +105,7 @@ def isolated(
 
 
 class ClosedProcess:
-    """A process that calls the isolated functions of one module."""
+    """A closed process in which the isolated functions of one module are called."""
 
     def __init__(self, module: str) -> None:
         flags = ["-S", "-s", "-P", "-W", "ignore", *(["-B"] if sys.dont_write_bytecode else [])]
@@ -129,7 +129,7 @@ class ClosedProcess:
             self.end()
             raise LostProcessError("a closed process did not start")
 
-    def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - any result
+    def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - a function may return any type
         """Call a function in the process, and return its result."""
         self._channel.send((name, arguments), at_once=True)
         try:

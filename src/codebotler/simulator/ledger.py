@@ -15,7 +15,7 @@ from codebotler.simulator.settings import Limits, SimulationSettings
 
 UNREMEMBERED_CALLS = 50  # calls of a run before answers are cached
 OPTION_OVERHEAD = 10  # characters counted for each option, since even an empty one takes memory
-WAITS = "it waits for something that can never come"
+WAITS = "it waits for something that can never happen"
 MAX_LINE = 1_000_000
 MAX_MESSAGE = 1_000  # characters, since a robot's error may quote a whole request
 SkillAnswer: TypeAlias = tuple[str, Any]
@@ -91,7 +91,7 @@ class Ledger:
                 return Outcome(Status.FINISHED, self.robot.trace)
             case {"end": "timeout"}:
                 return self.outcome(
-                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
+                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} loop iterations", line
                 )
             case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.errors):
                 error = self.errors[number]
@@ -124,7 +124,7 @@ class Ledger:
         elif size + OPTION_OVERHEAD * len(arguments) > limits.text and longest(arguments) > limits.text:
             self.limit = too_long(limits)
         elif self.text > limits.trace:
-            self.limit = f"texts of more than {limits.trace:,} characters in all"
+            self.limit = f"texts of more than {limits.trace:,} characters in total"
 
 
 def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:

@@ -195,7 +195,7 @@ def map_batches(
             while len(running) < calls and (batch := distinct.batch(workers)):
                 try:
                     future = submit(list(batch.values()))
-                except Exception as error:  # noqa: BLE001 - raised after earlier results
+                except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
                     failed.update(dict.fromkeys(batch, error))
                     continue
                 running[future] = list(batch)
@@ -271,7 +271,7 @@ class DistinctKeys(Generic[_Key]):
                     self._new[name] = key
         except StopIteration:
             pass
-        except Exception as error:  # noqa: BLE001 - raised after earlier results
+        except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
             self._keys = iter(())
             self.waiting.append(UNREADABLE_KEY)
             self.failed[UNREADABLE_KEY] = error

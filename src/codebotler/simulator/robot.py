@@ -84,7 +84,7 @@ class Somebody:
         if not self.answers:
             return None
         answer = self.answers[0]
-        if len(self.answers) > 1:  # the last answer repeats
+        if len(self.answers) > 1:  # the last answer is repeated
             del self.answers[0]
         else:
             self.is_gone = self.person.leaves
@@ -126,7 +126,7 @@ class SimulatedRobot:
 
     @cached_property
     def people(self) -> dict[str, list[Somebody]]:
-        """The people in each room, including those who will come later."""
+        """The people in each room, including people who arrive later."""
         return {room.name: [Somebody(person) for person in room.people] for room in self.world.rooms}
 
     @property
@@ -266,7 +266,7 @@ class SimulatedRobot:
             raise UserError(f'the world sets "{statement}" to {known!r}; use true or false')
         return known
 
-    def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of the skill's type
+    def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Return the result of a skill without simulation code: given by the world, else random."""
         row, call = self.skills[skill], written_call(skill, plain(arguments))
         known, kinds = dict(self.world.truths).get(call), [kind for kind, _ in row.fails]
@@ -365,7 +365,7 @@ class SimulatedRobot:
         self.events += [replace(event, time=self.now) for event in events]
 
     def amend(self, answer: str) -> None:
-        """Add an answer to the last event."""
+        """Add the answer to the last event, which is a question."""
         self.events[-1] = replace(self.events[-1], answer=answer)
 
 

@@ -253,7 +253,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def answer(self, options: Sequence[str], *question: str) -> str:
-        """Draw the answer to a question."""
+        """Draw the answer to a question from its options."""
         agreeing = next((i for i, text in enumerate(options) if AGREEING_TEXT.match(text)), 0)
         drawn = self.sampler.answer(len(options), agreeing, *question)
         self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))

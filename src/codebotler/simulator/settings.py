@@ -42,7 +42,7 @@ class SimulationSettings:
     matching: Matching = "label-in-request"
     # Whether people answer to any name, or only to their own, to a word for people and to no name at all.
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
-    words_for_people: tuple[str, ...] = ()  # regexes
+    words_for_people: tuple[str, ...] = ()  # regexes for words that mean any person
     # Regexes for other words for yes and no in options. An option with a word for no never means yes. People
     # who say yes choose an option that has neither, if there is only one.
     words_for_yes: tuple[str, ...] = ()
@@ -55,7 +55,7 @@ class SimulationSettings:
 
 
 PAPER_SETTINGS = SimulationSettings()
-ENDLESS = Limits(calls=10**12, trace=10**12)  # on a robot, where each skill refuels the program
+ENDLESS = Limits(calls=10**12, trace=10**12)  # for live robots, where each skill refuels the program
 
 
 # --- matching requests with labels

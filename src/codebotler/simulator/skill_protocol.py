@@ -128,7 +128,7 @@ def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
         if parameter.is_options and isinstance(value, list):
             arguments.append(tuple(_option(option) for option in value))
         elif not parameter.is_options and parameter.type.fits(value):
-            arguments.append(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]  # fits
+            arguments.append(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]  # `fits` has checked its type
         else:
             raise ProtocolError("an argument has the wrong type")
     return arguments

@@ -22,7 +22,7 @@ from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import SkillProtocol
 
-run_log = logging.getLogger("codebotler.engine.events")  # start and end of each run, at DEBUG
+run_log = logging.getLogger("codebotler.engine.events")  # logs the start and end of each run, at DEBUG
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 """A program, and one function per run that creates its robot."""
@@ -53,7 +53,7 @@ class Worker:
         except LostProcessError as error:
             self._preparer.close()
             raise EngineError(f"the engine cannot start: {error}") from None
-        except BaseException:  # an interrupt
+        except BaseException:  # such as an interrupt
             self._preparer.close()
             raise
 
@@ -107,7 +107,7 @@ class Worker:
             fork_server.kill()
 
     def stay_on(self, core: int) -> None:
-        """Pin the processes to one core."""
+        """Pin the worker's fork servers and their children to one core."""
         for fork_server in self._fork_servers.values():
             os.sched_setaffinity(fork_server.pid, {core})
 

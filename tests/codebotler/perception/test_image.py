@@ -169,7 +169,7 @@ def test_compressed_picture_of_a_camera() -> None:
 @pytest.mark.parametrize(
     ("said", "sentence"),
     [
-        (message("16UC1", b"\0\0"), '"16UC1", not one of rgb8, bgr8,'),
+        (message("16UC1", b"\0\0"), '"16UC1"; use one of rgb8, bgr8,'),
         (message("rgb8", b"\0\0\0", height=21), "2,400 bytes are too few for 40 x 21 pixels"),
         (message("rgb8", b"\0\0\0", step=60), "is cut off"),
         (message("rgb8", b"\0\0\0", width=100_000, height=100_000), "40,000,000"),

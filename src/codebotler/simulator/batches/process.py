@@ -149,7 +149,7 @@ class TranscribedRun(ProgramRun):
         self._calls: list[Called] = []
         self._moments: list[tuple[int, float]] = []
 
-    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Execute a skill on this process's copy of the robot."""
         given = [
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
@@ -217,7 +217,7 @@ class TranscribedRun(ProgramRun):
             )
         return data
 
-    def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - what a skill returns
+    def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Let the engine's robot execute a skill, after it has repeated all earlier calls."""
         self._calls.append((name, given, "ask", None))
         data = self._written("null")
@@ -235,7 +235,7 @@ class TranscribedRun(ProgramRun):
         return value
 
 
-def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - of any type of skills
+def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - a skill may take any type
     if kind == "list":
         return tuple([Option(str(each), isinstance(each, str)) for each in value])
     return tuple(value) if type(value) is list else value

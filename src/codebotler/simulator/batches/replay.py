@@ -124,7 +124,7 @@ def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
 def parse_transcript(frame: bytes) -> Transcript | None:
     """Parse a transcript; return None if the run must be repeated in a process of its own."""
     try:
-        return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # of its type
+        return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         raise ProtocolError("a transcript is malformed") from None
 

@@ -72,7 +72,7 @@ def code_of(file: str, shown: str) -> bytes:
     """Return a module's code, whatever the interpreter's options; tracebacks show the file name `shown`."""
     code = None
     if not sys.flags.optimize:
-        with contextlib.suppress(EOFError, ImportError, ValueError):  # damaged bytecode
+        with contextlib.suppress(EOFError, ImportError, ValueError):  # the bytecode file is damaged
             code = SourceFileLoader(shown, file).get_code(shown)
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
         # An interpreter that omits column numbers wrote it, so it is shorter.

@@ -72,7 +72,7 @@ class ForkServer:
         except (LostProcessError, OSError):
             self.close()
             raise LostProcessError("the fork server did not start") from None
-        except BaseException:  # an interrupt
+        except BaseException:  # such as an interrupt
             self.close()
             raise
 

@@ -181,5 +181,5 @@ def _stat(pid: int) -> list[str]:
     return stat.rpartition(")")[2].split()
 
 
-# Faster than `json.loads`, which also skips spaces around a value.
+# This is faster than `json.loads`, which also skips whitespace around a value.
 decode: Callable[[str], tuple[object, int]] = json.JSONDecoder().raw_decode

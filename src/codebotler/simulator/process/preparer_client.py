@@ -102,7 +102,7 @@ class Preparer:
         if self._process is not None:
             self._process.hang_up()
 
-    def _prepare(self, source: str, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:  # noqa: FBT001 - private
+    def _prepare(self, source: str, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:  # noqa: FBT001 - a private method
         if len(source) > LONG_SOURCE or self._served >= MAX_PREPARED:
             self.close()
         served = self._served
@@ -116,7 +116,7 @@ class Preparer:
             if len(source) > LONG_SOURCE:
                 self.close()
 
-    def _ask(self, sources: Sequence[str], lowercase: bool, skills: SkillNames) -> list[Prepared | Outcome]:  # noqa: FBT001 - private
+    def _ask(self, sources: Sequence[str], lowercase: bool, skills: SkillNames) -> list[Prepared | Outcome]:  # noqa: FBT001 - a private method
         """Return the results for programs, up to the program at which the process ended."""
         asked = tuple(sources), lowercase, skills
         if self._asked is not None and self._asked != asked:  # discard the results of an unused request
@@ -125,7 +125,7 @@ class Preparer:
             self._send(*asked)
         return self._answers(len(sources))
 
-    def _send(self, sources: tuple[str, ...], lowercase: bool, skills: SkillNames) -> None:  # noqa: FBT001 - private
+    def _send(self, sources: tuple[str, ...], lowercase: bool, skills: SkillNames) -> None:  # noqa: FBT001 - a private method
         self.start().send((sources, lowercase, skills), at_once=True)
         self._asked = sources, lowercase, skills
         self._served += len(sources)

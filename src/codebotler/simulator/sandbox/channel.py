@@ -16,7 +16,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-# A copy of the builtins, which a program cannot change.
+# This module's own copy of the builtins, which a program cannot change.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python also accepts a dict
 
 TOO_LONG_REQUEST = '["too-long",[],0.0]'
@@ -38,7 +38,7 @@ def send_frames(frames: list[bytes]) -> None:
         written = write(CHANNEL, data)
 
 
-def receive() -> Any:  # noqa: ANN401 - any message of the engine
+def receive() -> Any:  # noqa: ANN401 - any message from the engine
     """Read one message piece by piece."""
     pieces = [read_piece()]
     missing = HEADER + int.from_bytes(pieces[0][:HEADER], "big") - len(pieces[0])
@@ -49,14 +49,14 @@ def receive() -> Any:  # noqa: ANN401 - any message of the engine
     return loads(b"".join(pieces)[HEADER:])  # noqa: S302 - written by the engine
 
 
-def receive_at_once() -> Any:  # noqa: ANN401 - the same
+def receive_at_once() -> Any:  # noqa: ANN401 - any message from the engine
     """Read one message in a single piece."""
     missing = int.from_bytes(read_piece(HEADER), "big")
     pieces = []
     while missing > 0:
         pieces.append(read_piece(missing))
         missing -= len(pieces[-1])
-    return loads(b"".join(pieces))  # noqa: S302 - the same
+    return loads(b"".join(pieces))  # noqa: S302 - written by the engine
 
 
 def read_piece(most: int = PIECE) -> bytes:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
     RunParameters: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, start of clocks, is live
 
-# A copy of the builtins, which a program cannot change.
+# This module's own copy of the builtins, which a program cannot change.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python also accepts a dict
 
 # Python 3.11 also counts calls into C, so one more call allows the same recursion as in Python 3.12.
@@ -70,7 +70,7 @@ class ProgramRun:
             exec(loads(code) if type(code) is bytes else code, names)  # noqa: S102, S302 - the purpose of the sandbox
             task = names.get("task_program")
             if not self.has_entered(task):
-                eval(call_task.__code__, names)  # noqa: S307 - the same
+                eval(call_task.__code__, names)  # noqa: S307 - the purpose of the sandbox
             if self.is_unawaited(task):
                 raise TypeError(UNAWAITED)  # noqa: TRY301 - another function would use up recursion depth
         except BaseException as error:  # noqa: BLE001 - any end of a program is an outcome
@@ -117,7 +117,7 @@ class ProgramRun:
         return {
             FUEL: use_fuel,
             CAUGHT: self.catcher(use_fuel),
-            # Goes one call deeper than a skill before it lifts the recursion limit, so it hits the limit first.
+            # Goes one call deeper than a skill before it lifts the recursion limit, so hits the limit first.
             ENTRY: lambda: use_fuel(),  # noqa: PLW0108 - see above
             ENTER: self.enter,
             BY_NAME: self.start_task,
@@ -187,7 +187,7 @@ class ProgramRun:
 
     def perform(
         self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
-    ) -> Any:  # noqa: ANN401 - what a skill returns
+    ) -> Any:  # noqa: ANN401 - a skill may return any type
         """Execute a skill; texts must be of type `str` and options of type `list`, not of subclasses."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
@@ -203,7 +203,7 @@ class ProgramRun:
                     return options[result]  # the same object that the program passed
         return result
 
-    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Ask the engine to execute a skill."""
         kinds = self.kinds[name]
         given = [
@@ -228,7 +228,7 @@ class ProgramRun:
         """End the run, since nothing else is running that could end the wait."""
         self.request('"wait",[]')
 
-    def request(self, request: str) -> Any:  # noqa: ANN401 - what a skill returns
+    def request(self, request: str) -> Any:  # noqa: ANN401 - a skill may return any type
         """Send one request, and wait for its reply."""
         if self.spent:
             raise LimitReachedError
@@ -258,7 +258,7 @@ def _options_text(options: list[Any]) -> str:
     return f"[{','.join(parts)}]"
 
 
-def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
+def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: type) -> None:  # noqa: ANN401 - any value of the program
     named, kind, choices, words = parameter
     base = kind[5:-1] if kind[:5] == "list[" else ""
     if base and given is list:
@@ -325,7 +325,7 @@ class LimitReachedError(BaseException):
 
 
 class SkillError(Exception):
-    """The robot failed to execute a skill."""
+    """The robot could not execute a skill."""
 
     number = -1  # identifies the error to the engine; a class has the number of its latest error
 

@@ -118,7 +118,7 @@ def _asked_for(door: socket) -> int:
     ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR_BYTES))[1]
     if not ancillary:
         return -1
-    try:  # noqa: SIM105 - contextlib is large
+    try:  # noqa: SIM105 - contextlib is too large to import
         os.waitpid(-1, 0)
     except ChildProcessError:
         pass

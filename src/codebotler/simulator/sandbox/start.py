@@ -80,7 +80,7 @@ def start_again(descriptors: list[int]) -> NoReturn:
     os.closerange(end, 65536)
     if sys.platform == "linux":
         ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
-    os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - this program
+    os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - runs this program again
 
 
 def forget_the_shell() -> None:

@@ -3,8 +3,8 @@
 Tame programs share a process, and run one after another. An allowlist for the syntax tree restricts them to
 functions that work on None, booleans, numbers, strings, lists, tuples and dictionaries:
 
-- Functions, skills, builtins and `time` may only be called, or passed to a builtin that calls them at once, and
-  are never rebound. So no variable can hold a function, and no program can print its address.
+- Functions, skills, builtins and `time` may only be called, or passed to a builtin that calls them at once,
+  and are never rebound. So no variable can hold a function, and no program can print its address.
 - Attributes are methods of data, and are called immediately. No name may begin with two underscores.
 - Iterators and dictionary views are consumed where they are created. Sets are not allowed, since their order
   depends on earlier runs in the process.
@@ -52,7 +52,7 @@ def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
 
 
 class ProgramVerifier(ExpressionVerifier):
-    """Raises WildError for a statement that is not allowed; `STATEMENTS` maps each allowed kind to a check."""
+    """Raises WildError for a statement that is not allowed; `STATEMENTS` has a check per allowed kind."""
 
     def check_statements(self, body: Sequence[ast.stmt]) -> None:
         """Check a block of statements."""

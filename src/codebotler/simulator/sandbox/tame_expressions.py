@@ -23,7 +23,7 @@ def _words(text: str) -> frozenset[str]:
 CONSUMERS = _words("all any dict len list max min next sorted sum tuple")
 FUNCTIONS = CONSUMERS | _words("abs bool chr divmod float int ord pow print range repr round str")
 ITERATORS = _words("enumerate filter map reversed zip")
-DATA_CLASSES = _words("bool dict float int list str tuple")  # for `isinstance` and annotations
+DATA_CLASSES = _words("bool dict float int list str tuple")  # allowed in `isinstance` and annotations
 ERRORS = _words(
     """
     ArithmeticError AssertionError AttributeError BaseException EOFError Exception IndexError KeyError
@@ -59,7 +59,7 @@ class WildError(Exception):
 
 
 def wild(*_: object) -> NoReturn:
-    """Raise WildError."""
+    """Reject a node: raise WildError."""
     raise WildError
 
 
@@ -70,7 +70,7 @@ def parameters_of(given: ast.arguments) -> list[str]:
 
 
 class ExpressionVerifier:
-    """Raises WildError for any expression that is not allowed; `VALUES` maps each allowed kind to a check."""
+    """Raises WildError for an expression that is not allowed; `VALUES` has a check per allowed kind."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
@@ -247,7 +247,7 @@ class ExpressionVerifier:
             self._check_argument(each)
 
     def _check_comprehension(self, node: ast.ListComp | ast.DictComp | ast.GeneratorExp) -> None:
-        """Allow a comprehension that binds no special name."""
+        """Allow a comprehension unless it binds a special name."""
         for each in node.generators:
             for inner in ast.walk(each.target):
                 if isinstance(inner, ast.Name) and inner.id in self.special:
