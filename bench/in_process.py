@@ -149,7 +149,7 @@ class Unwalled(Bare):
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - as in ProgramRun
         """End the run: its time is over, or it waits for ever."""
-        self.limit = self.limit or self.too_late() or "it waits for something that can never come"
+        self.limit = self.limit or self.too_late() or "it waits for something that can never happen"
         return super().request(request)
 
     def too_late(self) -> str | None:
@@ -171,7 +171,7 @@ class Unwalled(Bare):
         if any(len(text) > self.limits.text for text in texts):
             return f"a text of more than {self.limits.text:,} characters"
         if self.text > self.limits.trace:
-            return f"texts of more than {self.limits.trace:,} characters in all"
+            return f"texts of more than {self.limits.trace:,} characters in total"
         return None
 
     def prepare(self, source: str) -> Outcome | Execution:
@@ -192,7 +192,7 @@ class Unwalled(Bare):
         if status is Status.FINISHED:
             return Outcome(status, self.robot.trace)
         if status is Status.TIMEOUT:
-            error = RunError("TimeoutError", self.limit or f"{self.limits.ticks:,} turns of loops")
+            error = RunError("TimeoutError", self.limit or f"{self.limits.ticks:,} loop iterations")
         elif status is Status.ROBOT_ERROR:
             failure = self.errors[final["number"]]
             error = RunError(failure.kind, str(failure))

@@ -261,7 +261,7 @@ def test_a_single_text_is_no_list_of_rooms() -> None:
         ({"samples": 10**9}, "samples must be .* 10,000, not 1,000,000,000$"),
         (
             {"skills": SKILLS.with_skill(Skill("fly", (), NO_VALUE, "Fly."))},
-            '"fly" cannot be simulated: nothing says what it does',
+            '"fly" cannot be simulated because it has no code',
         ),
     ],
 )

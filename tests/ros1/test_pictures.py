@@ -197,8 +197,8 @@ def test_what_is_no_picture_is_said(eyes: Eyes, kind: str) -> None:
     camera(eyes.graph, "Image", {**RAW, "encoding": "16UC1"}, topic="/depth")
     camera(eyes.graph, "CompressedImage", {"format": "jpeg", "data": "00ff"}, topic="/noise")
     for topic, sentence in (
-        ("/words", "/words is not a message with a picture"),
-        ("/depth", '/depth .*"16UC1", not one of rgb8'),
+        ("/words", "/words is not an image message"),
+        ("/depth", '/depth .*"16UC1"; use one of rgb8'),
         ("/noise", "/noise .*not a JPEG, PNG or WebP file"),
     ):
         robot = eyes.robot(kind, topic)

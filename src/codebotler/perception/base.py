@@ -1,4 +1,4 @@
-"""The `Detector` protocol, its result and its error."""
+"""The `Detector` protocol, the result it returns and the error it raises."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 
 Box: TypeAlias = tuple[float, float, float, float]
-"""Left, top, right and bottom as fractions of the width and height, from the upper left corner."""
+"""Left, top, right and bottom, as fractions of the image's width and height from its top left corner."""
 
-MAX_LABEL_CHARACTERS = 200  # characters
+MAX_LABEL_CHARACTERS = 200
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """The result of looking for something in a picture.
+    """The result of looking for something in an image.
 
     Args:
-        found: whether it is in the picture.
-        box: around the clearest one; None if nothing was found.
-        score: the confidence, from 0 to 1; scores of different models are not comparable.
+        found: whether the image shows it.
+        box: the box around the clearest match, or None if nothing was found.
+        score: the confidence, from 0 to 1; scores from different models are not comparable.
 
     Raises:
-        ValueError: the score or the box is out of range.
+        ValueError: the score or box is out of range.
     """
 
     found: bool
@@ -46,18 +46,18 @@ class Sighting:
 
 
 class Detector(Protocol):
-    """Looks for things in pictures, one at a time."""
+    """Looks for objects and people in images, one at a time."""
 
     @property
     def name(self) -> str:
         """The model's name, such as `openai-chat:gpt-5.1` or `hf:PATH`."""
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Look for something in a picture.
+        """Look for one object or person in an image.
 
         Args:
-            image: the picture, read with `codebotler.perception`.
-            label: the thing in plain words, such as `red mug`.
+            image: the image, read with a function of `codebotler.perception`.
+            label: what to look for, in plain words, such as `red mug`.
 
         Raises:
             UserError: the label is invalid.
@@ -69,7 +69,7 @@ class Detector(Protocol):
 
 
 class PerceptionError(Exception):
-    """A detector failed; the sentence says why and contains no keys."""
+    """A detector failed; the sentence gives the reason and contains no API keys."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
@@ -77,12 +77,12 @@ class PerceptionError(Exception):
 
 
 def check_label(label: str) -> str:
-    """Return the label on one line; UserError if it is empty, too long, or not printable."""
+    """Return the label as one line; raise UserError if it is empty, too long or not printable."""
     words = " ".join(label.split())
     if not words:
         raise UserError("the label is empty; name an object to look for")
     if len(words) > MAX_LABEL_CHARACTERS:
         raise UserError(f"the label has {len(words):,} characters; use at most {MAX_LABEL_CHARACTERS}")
     if not words.isprintable():
-        raise UserError(f'the label "{visible(words)}" has characters that cannot be printed; leave them out')
+        raise UserError(f'the label "{visible(words)}" has unprintable characters; remove them')
     return words

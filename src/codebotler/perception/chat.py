@@ -1,4 +1,4 @@
-"""Chat models as detectors: they receive a picture and answer with a small JSON object."""
+"""Uses chat models as detectors: they receive an image and reply with a small JSON object."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Answer with one JSON object and nothing else:
   width and height, counted from its upper left corner; null if it was not found.
 """
 RETRY_PROMPT = "That cannot be used: {fault}. Answer again, with only the JSON object."
-MAX_REPLIES = 3  # until one is valid
-REQUEST_RETRIES = 2  # of each request, if the server is down or busy
-MAX_REPLY_CHARACTERS = 20_000  # characters
+MAX_REPLIES = 3  # attempts to get a valid reply
+REQUEST_RETRIES = 2  # retries of each request while the server is down or busy
+MAX_REPLY_CHARACTERS = 20_000
 FENCED_JSON = re.compile(r"```(?:json)?[^\S\n]*\n(.*)\n[^\S\n]*```", re.DOTALL)
 
 
 class ChatDetector:
-    """Asks a chat model; several threads may use it, one at a time."""
+    """Asks a chat model what it sees; several threads may use it, but only one at a time."""
 
     def __init__(self, model: Model) -> None:
         self._runner = asyncio.Runner()
@@ -48,11 +48,11 @@ class ChatDetector:
 
     @property
     def name(self) -> str:
-        """The name of the model."""
+        """The model's name."""
         return self._model.name
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Show the picture to the model, and ask again after an invalid reply."""
+        """Show the image to the model, and ask again if the reply is invalid."""
         question = PictureMessage("user", json.dumps(check_label(label)), jpeg_of(image))
         messages: tuple[PromptMessage, ...] = (PromptMessage("system", DETECTOR_PROMPT), question)
         fault = text = ""
@@ -69,7 +69,7 @@ class ChatDetector:
             answer = [PromptMessage("assistant", text)] if text else []
             messages = (*messages[:2], *answer, PromptMessage("user", RETRY_PROMPT.format(fault=fault)))
         last = f"; it replied: {error_text(text)}" if text else ""
-        raise PerceptionError(f"{self.name} gave no valid answer in {MAX_REPLIES} tries: {fault}{last}")
+        raise PerceptionError(f"{self.name} gave no valid answer in {MAX_REPLIES} attempts: {fault}{last}")
 
     def close(self) -> None:
         """Close the connections."""
@@ -86,7 +86,7 @@ class _DetectorAnswer(BaseModel):
 
 
 def parse_sighting(text: str) -> Sighting:
-    """Parse a reply, one JSON object that may be in a code fence; ValueError if it is invalid."""
+    """Parse a JSON reply, with or without a code fence; raise ValueError if it is invalid."""
     if len(text) > MAX_REPLY_CHARACTERS:
         raise ValueError(f"it has {len(text):,} characters")
     fenced = FENCED_JSON.fullmatch(text.strip())

@@ -1,4 +1,4 @@
-"""Read pictures from files and cameras with size limits; turn them upright and convert them to RGB."""
+"""Reads images from files and cameras within size limits, turns them upright and converts them to RGB."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ IMAGE_FORMATS = ("JPEG", "PNG", "WEBP")
 MAX_IMAGE_BYTES = 50_000_000
 MAX_PIXELS = 40_000_000
 MIN_SIDE = 16  # pixels
-LONGEST_SIDE = 1024  # pixels, after scaling down
-QUALITY = 85  # of a JPEG, in per cent
+LONGEST_SIDE = 1024  # pixels after scaling down
+QUALITY = 85  # JPEG quality, in per cent
 ENCODINGS: Mapping[str, tuple[str, str, int]] = {
     "rgb8": ("RGB", "RGB", 3),
     "bgr8": ("RGB", "BGR", 3),
@@ -30,11 +30,11 @@ ENCODINGS: Mapping[str, tuple[str, str, int]] = {
     "mono8": ("L", "L", 1),
     "mono16": ("I;16", "I;16", 2),
 }
-"""For each encoding of sensor_msgs/Image: the mode, the byte order, and the bytes per pixel."""
+"""Pillow's mode, the byte order and the bytes per pixel of each supported sensor_msgs/Image encoding."""
 
 
 def image_of(data: bytes, name: str = "the picture") -> Image.Image:
-    """Decode a JPEG, PNG or WebP file, upright and in RGB; UserError, with the name, if that fails."""
+    """Decode a JPEG, PNG or WebP image upright and in RGB; raise UserError, which names it, if that fails."""
     if not data:
         raise UserError(f"{name} is empty")
     if len(data) > MAX_IMAGE_BYTES:
@@ -42,9 +42,7 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
     try:
         with warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning):
             opened = Image.open(io.BytesIO(data), formats=IMAGE_FORMATS)
-        _check_size(
-            *opened.size, name
-        )  # reads only the header, so a huge picture is rejected before it is decompressed
+        _check_size(*opened.size, name)  # needs only the header, so a huge image is never decompressed
         opened.load()
         return _to_rgb(ImageOps.exif_transpose(opened))
     except UserError:
@@ -53,19 +51,19 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
         raise UserError(f"{name} is not a JPEG, PNG or WebP file") from None
     except Image.DecompressionBombError:
         raise UserError(f"{name} has more than {MAX_PIXELS:,} pixels; use a smaller one") from None
-    except Exception as error:  # noqa: BLE001 - decoders raise many types
-        raise UserError(f"{name} is broken or cut off ({error_text(error)})") from None
+    except Exception as error:  # noqa: BLE001 - a decoder may raise any error
+        raise UserError(f"{name} is damaged or incomplete ({error_text(error)})") from None
 
 
 def read_image(path: Path) -> Image.Image:
-    """Read a picture file; UserError if that fails."""
+    """Read an image file; raise UserError if that fails."""
     return image_of(read_bytes(path, MAX_IMAGE_BYTES + 1), str(path))
 
 
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
-    """Decode a sensor_msgs/CompressedImage, or a sensor_msgs/Image of a common encoding.
+    """Decode a sensor_msgs/CompressedImage, or a sensor_msgs/Image with a common encoding.
 
-    The message has `data` in base64; UserError, with the name, if it contains no picture or a huge one.
+    `data` must be in base64. Raise UserError, which names the image, if there is none or it is too large.
     """
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:
@@ -73,22 +71,22 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
             return _decode_raw(encoding, (width, height), step, data, is_big=is_big, name=name)
         case {"data": _}:
             return image_of(_decode_data(message, name), name)
-    raise UserError(f"{name} is not a message with a picture")
+    raise UserError(f"{name} is not an image message")
 
 
 def _decode_data(message: Mapping[str, object], name: str) -> bytes:
     data = message.get("data")
-    with suppress(ValueError):  # it is no base64
+    with suppress(ValueError):  # not base64
         if isinstance(data, str):
             return base64.b64decode(data, validate=True)
-    raise UserError(f"{name} is not a message with a picture")
+    raise UserError(f"{name} is not an image message")
 
 
 def _decode_raw(
     encoding: str, size: tuple[int, int], step: int, data: bytes, *, is_big: bool, name: str
 ) -> Image.Image:
     if encoding not in ENCODINGS:
-        raise UserError(f'{name} has the encoding "{encoding}", not one of {", ".join(ENCODINGS)}')
+        raise UserError(f'{name} has the unknown encoding "{encoding}"; use one of {", ".join(ENCODINGS)}')
     mode, order, width = ENCODINGS[encoding]
     _check_size(*size, name)
     if step < size[0] * width or len(data) < step * size[1]:
@@ -101,7 +99,7 @@ def _decode_raw(
 
 
 def jpeg_of(image: Image.Image) -> bytes:
-    """Encode a picture as JPEG without metadata, scaled down if it is large."""
+    """Encode an image as a JPEG without metadata, scaled down if it is large."""
     smaller = _to_rgb(image)
     smaller.thumbnail((LONGEST_SIDE, LONGEST_SIDE))
     file = io.BytesIO()
@@ -110,7 +108,7 @@ def jpeg_of(image: Image.Image) -> bytes:
 
 
 def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
-    """Return a copy of a picture with a frame around the sighting, if there is one."""
+    """Return a copy of an image, with a frame around the sighting if something was found."""
     drawn = image.copy()
     if sighting.box is None:
         return drawn
@@ -127,20 +125,20 @@ def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
 def _check_size(width: int, height: int, name: str) -> None:
     if width * height > MAX_PIXELS:
         raise UserError(
-            f"{name} has {width:,} x {height:,} pixels, more than {MAX_PIXELS:,} in all; use a smaller one"
+            f"{name} has {width:,} x {height:,} pixels, more than {MAX_PIXELS:,} in total; use a smaller one"
         )
     if min(width, height) < MIN_SIDE:
         raise UserError(
-            f"{name} has {width} x {height} pixels, too few to see anything; use {MIN_SIDE} x {MIN_SIDE}"
+            f"{name} has {width} x {height} pixels, which is too small; use at least {MIN_SIDE} x {MIN_SIDE}"
         )
 
 
 def _to_rgb(image: Image.Image) -> Image.Image:
-    """Convert to RGB; transparent parts become white."""
+    """Convert an image to RGB; transparent parts become white."""
     if image.mode.startswith("I"):
-        # Cameras rarely use all 16 bits, so make the brightest grey white.
+        # Cameras rarely use all 16 bits, so scale the brightest grey to white.
         image = image.convert("I")
-        brightest = max(1, int(image.getextrema()[1]))  # type: ignore[arg-type]  # one band, so two numbers
+        brightest = max(1, int(image.getextrema()[1]))  # type: ignore[arg-type]  # two numbers, since there is one band
         return image.point(lambda grey: grey * (255 / brightest) + 0.5).convert("L").convert("RGB")
     if image.has_transparency_data:
         image = image.convert("RGBA")

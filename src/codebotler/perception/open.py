@@ -1,4 +1,4 @@
-"""Open a detector by the name of its model."""
+"""Opens the detector for a model's name."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.perception.base import Detector
 
 DETECTOR_SETTINGS = SamplingSettings(temperature=0.0, top_p=None, timeout=30.0)
-"""The default settings of a chat model."""
+"""The default sampling settings of a chat model."""
 MIN_SCORE = 0.1
 
 
 def open_detector(
     name: str, settings: SamplingSettings = DETECTOR_SETTINGS, *, least_score: float = MIN_SCORE
 ) -> Detector:
-    """Open a detector by the name of its model.
+    """Open the detector for a model's name.
 
     Args:
-        name: `provider:name` of a chat model that accepts pictures, as in pydantic-ai, or `hf:PATH` for a
-            zero-shot object detector of transformers: a folder, or a name on the Hugging Face hub.
-        settings: the settings of a chat model.
-        least_score: the lowest score, above 0 and up to 1, that counts as found by a zero-shot detector.
+        name: `provider:name` of a chat model that accepts images, as in pydantic-ai, or `hf:PATH` of a
+            zero-shot object detector: a folder, or a name on the Hugging Face hub.
+        settings: sampling settings, used by chat models only.
+        least_score: the lowest score, above 0 and at most 1, that a zero-shot detector reports as found.
 
     Raises:
-        UserError: the model does not exist or accepts no pictures, or a key or a package is missing.
+        UserError: the model does not exist or does not accept images, or a key or package is missing.
     """
     kind = kind_of(name)
     if kind in {"recorded", "completions"}:
         raise UserError(f"{name} does not accept pictures; use a chat model that does, or hf:PATH")
-    # Each of these modules imports a large library, so import only the one that is needed.
+    # Each of these modules imports a large library, so import only the one needed.
     if kind != "hf":
         with installed():
             from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above

@@ -1,4 +1,4 @@
-"""Zero-shot object detectors of transformers, such as OWL-ViT."""
+"""Runs zero-shot object detectors from transformers, such as OWL-ViT."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ PIPELINE_TASK = "zero-shot-object-detection"
 
 
 class ZeroShotDetector:
-    """A zero-shot object detector in this process, on a GPU if available."""
+    """Runs a zero-shot object detector in this process, on a GPU if one is available."""
 
     def __init__(self, path: str, *, least_score: float) -> None:
         self.name = f"hf:{path}"
         if not 0 < least_score <= 1:
-            raise UserError(f"the least score is {least_score:g}; it must be above 0 and at most 1")
+            raise UserError(f"the minimum score is {least_score:g}; it must be above 0 and at most 1")
         self._least = least_score
         source = find_source(path)
         transformers.utils.logging.disable_progress_bar()
-        os.environ.setdefault("TOKENIZERS_PARALLELISM", "false")  # otherwise it warns at every label
+        os.environ.setdefault("TOKENIZERS_PARALLELISM", "false")  # avoids a warning for every label
         try:
             device = 0 if torch.cuda.is_available() else "cpu"
             self._pipeline: Any = transformers.pipeline(PIPELINE_TASK, model=source, device=device)
-        except Exception as error:  # noqa: BLE001 - a model's own code and files fail in many ways
+        except Exception as error:  # noqa: BLE001 - a model's own code and files may raise any error
             raise UserError(
                 f"{self.name} cannot be loaded as a zero-shot detector: {error_text(error)}"
             ) from None
@@ -41,13 +41,13 @@ class ZeroShotDetector:
             raise UserError(f"{self.name} has weights that are not finite; use another model")
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Return the best match for the label."""
+        """Return the best match for a label."""
         words = check_label(label)
         self._check_length(words)
         try:
-            # Pass a list, since the pipeline splits a string at commas.
+            # Pass a list because the pipeline splits a string at commas.
             places = self._pipeline(image, candidate_labels=[words], threshold=0.0, top_k=1)
-        except Exception as error:  # noqa: BLE001 - a model's own code raises many types
+        except Exception as error:  # noqa: BLE001 - a model's own code may raise any error
             raise PerceptionError(f"{self.name}: {error_text(error)}") from None
         if not places:
             return Sighting(found=False, box=None, score=0.0)
@@ -60,7 +60,7 @@ class ZeroShotDetector:
         return Sighting(found=True, box=(left, top, right, bottom), score=score)
 
     def close(self) -> None:
-        """Release the memory of the model."""
+        """Release the model's memory."""
         del self._pipeline
 
     def _check_length(self, words: str) -> None:
@@ -72,7 +72,7 @@ class ZeroShotDetector:
 
 
 def _to_shares(first: int, last: int, side: int) -> tuple[float, float]:
-    """Convert two edges in pixels to fractions of a side, clipped to the picture."""
+    """Convert two edges from pixels to fractions of a side, clipped to the image."""
     start = min(max(first, 0), side - 1)
     end = min(max(last, start + 1), side)
     return start / side, end / side

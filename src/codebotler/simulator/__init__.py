@@ -1,4 +1,4 @@
-"""Programs run in simulated worlds, in isolated processes; start reading at `worker.py`."""
+"""Runs programs in simulated worlds, in isolated processes; `worker.py` is a good place to start reading."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ if TYPE_CHECKING:
 
 
 def run(program: str, world: World, *, require_isolation: bool = False) -> Outcome:
-    """Run one program in one world with the paper's settings; `engine.run` is quicker for many.
+    """Run one program in one world with the paper's settings; `engine.run` is faster for many.
 
     Args:
-        program: its source, valid or not.
-        world: the initial state.
-        require_isolation: whether to fail where the kernel has no seccomp, rather than warn.
+        program: the source code, valid or not.
+        world: the world's initial state.
+        require_isolation: fail, instead of warn, if the kernel does not support seccomp.
 
     Returns:
-        how the run ended, with the trace of the robot's actions.
+        how the run ended, and the trace of the robot's actions.
 
     Raises:
-        EngineError: no isolated process could be started, or the required isolation is missing.
+        EngineError: no isolated process can be started, or the required isolation is unavailable.
     """
-    # Isolated processes import this package, and must stay small.
+    # Import late: isolated processes import this package and must stay small.
     from codebotler.simulator.engine import run as run_pairs  # noqa: PLC0415 - see above
 
     (outcome,) = run_pairs([(program, world)], workers=1, require_isolation=require_isolation)

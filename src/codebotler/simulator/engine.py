@@ -1,4 +1,4 @@
-"""Runs programs in worlds, in isolation; equal pairs run once, and outcomes keep the order of the pairs."""
+"""Runs pairs of a program and a world in isolation, duplicate pairs only once, and keeps their order."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def run(
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
-    """Run programs in worlds lazily, and yield their outcomes in the order of the pairs."""
+    """Run pairs of a program and a world lazily, and yield the outcomes in the same order."""
     with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:
@@ -45,7 +45,7 @@ def run(
 
 
 def digest(*texts: str) -> bytes:
-    """A hash of some texts, each with its length."""
+    """Return a hash of some texts, each prefixed with its length."""
     hashed = hashlib.sha256()
     for text in texts:
         data = text.encode(errors="surrogatepass")

@@ -1,8 +1,8 @@
-"""Draws random facts of sampled worlds: a pure function of seed, sample and the fact's name."""
+"""Draws random facts for sampled worlds; each depends only on the seed, the sample number and its name."""
 
 from __future__ import annotations
 
-from _blake2 import blake2b  # of `hashlib`, which would bring OpenSSL into every child
+from _blake2 import blake2b  # `hashlib` would load OpenSSL into every child
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -11,22 +11,22 @@ EIGHTS = 8
 
 @dataclass(frozen=True)
 class FactSampler:
-    """Draws the facts of one sampled world, in any order."""
+    """Draws the facts of one sampled world; the order of the draws does not matter."""
 
     seed: int = 0
-    sample: int = 0  # the number of this world among those of the same seed
-    strict: bool = False  # also draw facts that the program never looked for; else they are as it assumes
-    lucky: bool = False  # things and people are there, and people agree, in seven of eight cases
-    forced: tuple[Draw, ...] = ()  # facts with a given result instead of a random one
+    sample: int = 0  # number of this world among the worlds with the same seed
+    strict: bool = False  # also draw facts that the program takes for granted; otherwise they hold
+    lucky: bool = False  # in seven of eight draws, things and people are present, and people agree
+    forced: tuple[Draw, ...] = ()  # facts whose results are given instead of random
 
     def draw(self, count: int, *fact: str) -> int:
-        """One of the numbers from 0 to `count - 1` for a fact."""
+        """Draw a number from 0 to `count - 1` for a fact."""
         texts = [str(self.seed), str(self.sample), *fact]
         named = "".join(f"{len(text)}:{text}" for text in texts).encode(errors="surrogatepass")
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
 
     def answer(self, count: int, agreeing: int, *question: str) -> int:
-        """The option, of `count`, that somebody chooses; `agreeing` is the one that agrees most."""
+        """Draw which of `count` options a person chooses; `agreeing` is the most affirmative one."""
         known = self._forced("answer", count, agreeing, *question)
         if known is not None:
             return known
@@ -35,7 +35,7 @@ class FactSampler:
         return self.draw(count, "answer", *question)
 
     def outcome(self, count: int, statement: str) -> int:
-        """The outcome, of `count`, of a statement; the first one is the hoped-for one."""
+        """Draw one of `count` outcomes for a statement; outcome 0 is the desired one."""
         known = self._forced("outcome", count, statement)
         if known is not None:
             return known
@@ -44,7 +44,7 @@ class FactSampler:
         return self.draw(count, "outcome", statement)
 
     def is_there(self, room: str, name: str) -> bool:
-        """Whether somebody or something is in a room."""
+        """Draw whether a person or thing is in a room."""
         known = self._forced("is_there", room, name)
         if known is not None:
             return bool(known)
@@ -57,7 +57,7 @@ class FactSampler:
 
 @dataclass(frozen=True)
 class Draw:
-    """A random fact: the sampler's method, its arguments, and its result."""
+    """A random fact: the sampler's method that drew it, the arguments and the result."""
 
     method: Literal["answer", "outcome", "is_there"]
     arguments: tuple[Any, ...]
@@ -65,10 +65,10 @@ class Draw:
 
     @property
     def alternatives(self) -> list[Draw]:
-        """The same fact with each other result."""
+        """The same draw with each of its other possible results."""
         results = (True, False) if self.method == "is_there" else range(self.arguments[0])
         return [replace(self, result=result) for result in results if result != self.result]
 
     def holds_in(self, sampler: FactSampler) -> bool:
-        """Whether another world has the same result."""
+        """Return whether a sampler draws the same result."""
         return bool(getattr(sampler, self.method)(*self.arguments) == self.result)

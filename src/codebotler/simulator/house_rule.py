@@ -1,4 +1,4 @@
-"""`Rule`: a requirement on every program; and the error of an event that a rule does not allow."""
+"""`Rule`, a requirement that every program must meet, and the error raised when a rule is violated."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from codebotler.rtl.semantics import is_match
 
 Objection: TypeAlias = Literal["forbids", "cannot judge", "is broken by", "could not judge"]
 
-# Why a rule cannot be judged, as the end of a sentence.
-NON_TEXT_OPTION = "which offers an option that is no text"
+# Reasons why a rule cannot be judged, each the end of a sentence.
+NON_TEXT_OPTION = "which offers an option that is not text"
 UNKNOWN_ROOM = "since the robot does not say which room it is in"
-AMBIGUOUS_GOAL = "since it may mean several rooms, and the robot does not say which"
+AMBIGUOUS_GOAL = "since it could mean several rooms, and the robot does not say which"
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A requirement on every program, whatever the instruction is.
+    """A requirement that every program must meet, whatever its instruction.
 
     Args:
-        name: how messages name it.
-        says: the rule for people and models, in a sentence.
+        name: the rule's name in messages.
+        says: the rule as a sentence for people and models.
         formula: the rule as a formula.
-        when: `always`, of every prefix of a trace, or `finally`, when the mission ends.
-        refuse: whether the program goes on without the refused action; else the mission ends.
-        any_room: whether it may name rooms that a house lacks.
+        when: `always` if the formula must hold after every event, `finally` if only when the mission ends.
+        refuse: whether the program continues without the forbidden action; otherwise the mission ends.
+        any_room: whether the rule may name rooms that the house does not have.
     """
 
     name: str
@@ -45,20 +45,20 @@ class Rule:
 
     @cached_property
     def elements(self) -> tuple[EventPattern, ...]:
-        """All patterns of events in its formula."""
+        """All event patterns in the formula."""
         return tuple(elements(self.formula))
 
     @cached_property
     def inside(self) -> tuple[EventPattern, ...]:
-        """Its patterns of the rooms that the robot's pose enters."""
+        """The event patterns for rooms that the robot's pose enters."""
         return tuple(element for element in self.elements if element.kind == INSIDE)
 
     def depends_on_room(self, event: Event) -> bool:
-        """Whether it compares the room in which such an event happens."""
+        """Return whether the rule depends on the room in which events of this kind happen."""
         return any(one.place is not None for one in self.elements if one.kind == event.kind)
 
     def results(self, attempt: Event) -> Sequence[Event]:
-        """Return an event with each result that it may have, if this rule compares results."""
+        """Return the event with each of its possible results if the rule depends on them, else unchanged."""
         compared = [one for one in self.elements if one.kind == attempt.kind]
         if any(one.found is not None for one in compared):
             return [replace(attempt, found=True), replace(attempt, found=False)]
@@ -67,19 +67,19 @@ class Rule:
         return (attempt,)
 
     def tells_apart(self, events: Iterable[Event]) -> bool:
-        """Whether it matters to this rule which of some events happened."""
+        """Return whether the rule distinguishes between some of the events."""
         events = tuple(events)
         return any(len({is_match(one, event, 0) for event in events}) > 1 for one in self.elements)
 
 
 class RuleViolationError(RobotError):
-    """A rule would be broken, or has been, or cannot be judged.
+    """A rule would be broken, has been broken or cannot be judged.
 
     Args:
-        rule: the rule.
-        event: the event that would break it, or has broken it; None at the end of a mission.
-        objection: what the rule has to do with the event.
-        why: why it cannot be judged, as the end of a sentence.
+        rule: the rule in question.
+        event: the event that breaks the rule, or None at the end of a mission.
+        objection: how the event conflicts with the rule.
+        why: the reason why the rule cannot be judged, as the end of a sentence.
     """
 
     def __init__(
@@ -95,10 +95,10 @@ class RuleViolationError(RobotError):
 
     @property
     def is_late(self) -> bool:
-        """Whether the event has happened already."""
+        """Whether the event has already happened."""
         return self.objection in {"is broken by", "could not judge"}
 
     @property
     def ends_run(self) -> bool:
-        """Whether the program cannot go on, whatever it catches."""
+        """Whether the run ends, even if the program catches this error."""
         return self.is_late or self.why == UNKNOWN_ROOM or not self.rule.refuse

@@ -1,8 +1,8 @@
-"""Calls our own functions on text of others, in closed processes with limits.
+"""Calls our own functions on untrusted text, in closed processes with limits.
 
-CPython's compiler needs minutes and gigabytes for some short texts, in one call that nothing interrupts and
-that blocks all threads, even the one that stops a robot. Only these processes compile text of others, or read
-it with code of more than linear time. They never execute it.
+CPython's compiler needs minutes and gigabytes for some short texts. Such a call cannot be interrupted and
+blocks all threads, even the one that stops a robot. So untrusted text is compiled, or parsed by code that is
+slower than linear, in these processes only. They never execute it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 
 MAX_RESULT = 64_000_000  # bytes of JSON
-RESULT, FAILURE = b"+", b"-"  # first byte of an answer
+RESULT, FAILURE = b"+", b"-"  # the first byte of an answer
 SERVE_CODE = f"import sys; sys.path[:] = sys.argv[3:]; from {__name__} import serve; serve(*sys.argv[1:3])"
 
 _Arguments = ParamSpec("_Arguments")
@@ -38,11 +38,11 @@ _Result = TypeVar("_Result")
 
 
 class IsolatedCallError(Exception):
-    """A function failed on a text, or needed more time or memory than a call may use.
+    """A function failed on a text, or exceeded the time or memory limit of a call.
 
     Args:
-        kind: of the failure, such as `TimeoutError` or `MemoryError`.
-        message: one sentence.
+        kind: the kind of failure, such as `TimeoutError` or `MemoryError`.
+        message: what went wrong, in one sentence.
     """
 
     def __init__(self, kind: str, message: str) -> None:
@@ -54,7 +54,7 @@ class IsolatedCallError(Exception):
 
 
 class IsolatedFunction(Generic[_Arguments, _Result]):
-    """A function that is called in a closed process; `isolated` makes one."""
+    """A function that runs in a closed process; the decorator `isolated` makes one."""
 
     def __init__(self, function: Callable[_Arguments, _Result], rehearsal: tuple[Any, ...]) -> None:
         self.function, self.rehearsal = function, rehearsal
@@ -62,11 +62,11 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
         self.__module__, self.__name__ = function.__module__, function.__name__
 
     def __call__(self, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
-        """Call the function in a closed process, and in a new one if a used one fails.
+        """Call the function in a closed process; if that was used before and fails, retry in a new one.
 
         Raises:
-            IsolatedCallError: the function failed, or used up its time or memory.
-            EngineError: no process can be started.
+            IsolatedCallError: the function failed, or exceeded its time or memory limit.
+            EngineError: no isolated process can be started.
         """
         call = (self.__name__, pickle.dumps((args, kwargs)))
         idle = IDLE_PROCESSES.setdefault(self.__module__, [])
@@ -84,7 +84,7 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
     def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> _Result:
         try:
             result = process.call(*call)
-        except BaseException:  # such as an interrupt: this answer must not reach the next call
+        except BaseException:  # such as an interrupt: the next call must not get this answer
             process.end()
             raise
         IDLE_PROCESSES[self.__module__].append(process)
@@ -94,18 +94,18 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
 def isolated(
     *rehearsal: object,
 ) -> Callable[[Callable[_Arguments, _Result]], IsolatedFunction[_Arguments, _Result]]:
-    """Have a module's function called in a closed process.
+    """Make a module's function run in a closed process.
 
-    The process gets pickled arguments, and returns JSON data: tuples become lists.
+    Its arguments are pickled, and its result is returned as JSON, in which tuples become lists.
 
     Args:
-        rehearsal: arguments with which each new process calls the function before it is closed.
+        rehearsal: arguments for a first call of the function, in each new process before it is closed.
     """
     return lambda function: IsolatedFunction(function, rehearsal)
 
 
 class ClosedProcess:
-    """A process that calls the isolated functions of one module."""
+    """A closed process in which the isolated functions of one module are called."""
 
     def __init__(self, module: str) -> None:
         flags = ["-S", "-s", "-P", "-W", "ignore", *(["-B"] if sys.dont_write_bytecode else [])]
@@ -127,15 +127,15 @@ class ClosedProcess:
         )
         if self._channel.receive_bytes(len(RESULT)) != RESULT:
             self.end()
-            raise LostProcessError("a closed process does not start")
+            raise LostProcessError("a closed process did not start")
 
-    def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - any result
-        """Call a function, and return its result."""
+    def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - a function may return any type
+        """Call a function in the process, and return its result."""
         self._channel.send((name, arguments), at_once=True)
         try:
             answer = self._channel.receive_bytes(len(RESULT) + MAX_RESULT)
         except (TimeoutError, ProtocolError) as silence:
-            raise IsolatedCallError(type(silence).__name__, "the process does not answer") from None
+            raise IsolatedCallError(type(silence).__name__, "the process did not answer") from None
         self._channel.reset_patience()
         if not answer:
             status = self._channel.end_gently()
@@ -149,28 +149,28 @@ class ClosedProcess:
         return data
 
     def end(self) -> None:
-        """End the process, even during a call."""
+        """Kill the process, even during a call."""
         self._channel.end()
 
     def forget(self) -> None:
-        """Close the channel in a forked process, which is not its parent."""
+        """Close the channel after a fork, in the copy that is not the process's parent."""
         self._process.returncode = 0
         self._channel.hang_up()
 
 
 IDLE_PROCESSES: dict[str, list[ClosedProcess]] = {}
-"""The processes that wait for a call, by the module of their functions."""
+"""Idle processes by the module whose functions they call."""
 
 
 def end_all() -> None:
-    """End all waiting processes; no call may be in progress."""
+    """Kill all idle processes; call this only while no call is in progress."""
     for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().end()
 
 
 def forget_all() -> None:
-    """Release the processes of the parent, in a forked process."""
+    """Release the parent's processes after a fork, in the child."""
     for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().forget()
@@ -184,20 +184,20 @@ os.register_at_fork(after_in_child=forget_all)
 
 
 def serve(module: str, descriptor: str) -> NoReturn:
-    """Call functions of a module until the engine hangs up."""
-    import unicodedata as _  # noqa: F401, PLC0415 - for "\N{...}": the parser would import it too late
+    """Call the functions that the engine asks for until it hangs up."""
+    import unicodedata as _  # noqa: F401, PLC0415 - needed to parse "\N{...}", and cannot be imported later
 
     functions = {
         name: one for name, one in vars(import_module(module)).items() if isinstance(one, IsolatedFunction)
     }
-    for function in functions.values():  # so that their imports are complete
+    for function in functions.values():  # completes their imports
         function.function(*function.rehearsal)
     give_up_rights()
     seccomp = usable_filter()
     os.dup2(int(descriptor), CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     enclose(seccomp, round(time.process_time()) + CPU_SECONDS)
-    send_frames([RESULT])  # ready
+    send_frames([RESULT])  # tells the engine that this process is ready
     while True:
         name, call = receive_at_once()
         send_frames([_answer(functions[name], call)])
@@ -205,7 +205,7 @@ def serve(module: str, descriptor: str) -> NoReturn:
 
 def _answer(function: IsolatedFunction[..., object], call: bytes) -> bytes:
     try:
-        args, kwargs = pickle.loads(call)  # noqa: S301 - from our own process
+        args, kwargs = pickle.loads(call)  # noqa: S301 - sent by our own process
         return RESULT + json.dumps(function.function(*args, **kwargs)).encode()
     except Exception as error:  # noqa: BLE001 - a function may raise any error
         return FAILURE + json.dumps([type(error).__name__, str(error)[:1000]]).encode()

@@ -1,4 +1,4 @@
-"""The limits of one run: counts its requests to the robot, and ends it at a limit."""
+"""Counts the requests of one run to its robot, and ends the run when it reaches a limit."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.settings import Limits, SimulationSettings
 
-UNREMEMBERED_CALLS = 50  # calls of a run before any answer is remembered
-OPTION_OVERHEAD = 10  # characters added for each option, since empty ones take memory, too
-WAITS = "it waits for something that can never come"
+UNREMEMBERED_CALLS = 50  # calls of a run before answers are cached
+OPTION_OVERHEAD = 10  # characters counted for each option, since even an empty one takes memory
+WAITS = "it waits for something that can never happen"
 MAX_LINE = 1_000_000
-MAX_MESSAGE = 1_000  # characters; a robot's error may quote a whole request
+MAX_MESSAGE = 1_000  # characters, since a robot's error may quote a whole request
 SkillAnswer: TypeAlias = tuple[str, Any]
-"""`ok` and a result; `error` and its number, kind and message; or `stop` and whether a rule is the reason."""
+"""`ok` with the result, `error` with number, kind and message, or `stop` with True if a rule is the cause."""
 STOP: SkillAnswer = ("stop", None)
 STOPPED_BY_RULE: SkillAnswer = ("stop", True)
 
 
 class SkillPerformer(Protocol):
-    """A robot that a run can use; a skill may take any time."""
+    """A robot that can perform the skills of a run; a skill may take any amount of time."""
 
     settings: SimulationSettings
     skills: SkillTable
-    is_live: bool  # time is real, and each skill refuels the program
-    line: int | None  # of a live program, at its current request
+    is_live: bool  # whether time is real and each skill refuels the program
+    line: int | None  # the line of a live program's current request
 
     @property
     def now(self) -> float:
@@ -38,7 +38,7 @@ class SkillPerformer(Protocol):
 
     @property
     def trace(self) -> Trace:
-        """Its trace so far."""
+        """The robot's trace so far."""
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill, or raise RobotError."""
@@ -48,17 +48,17 @@ class SkillPerformer(Protocol):
 
 
 class Ledger:
-    """The requests of one run to its robot, and the limit that they reach."""
+    """Counts the requests of one run to its robot, up to a limit."""
 
     def __init__(self, robot: SkillPerformer) -> None:
         self.robot, self.limits = robot, robot.settings.limits
-        self.calls = self.text = 0  # characters of all texts
-        self.limit: str | None = None  # the reached one, in words
+        self.calls = self.text = 0  # number of calls, and characters of all texts
+        self.limit: str | None = None  # the limit that was reached, in words
         self.errors: list[RobotError] = []
-        self.broken: RobotError | None = None  # the broken rule that ended the run
+        self.broken: RobotError | None = None  # the error of the rule that ended the run
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
-        """Let the robot execute one skill, up to the limits."""
+        """Let the robot execute one skill, unless the run has reached a limit."""
         self._spend(arguments)
         if self.limit is not None:
             return STOP
@@ -73,15 +73,15 @@ class Ledger:
         return ("ok", result)
 
     def let_time_pass(self, now: float) -> None:
-        """Let simulated time pass until `now` seconds since the start, or until its limit."""
+        """Advance simulated time to `now` seconds since the start, but not beyond its limit."""
         if now > self.limits.seconds:
             now = self.limits.seconds
             self.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
-        if now > self.robot.now:  # an earlier time is the lie of a program that has found the channel
+        if now > self.robot.now:  # only a program that found the channel can send an earlier time
             self.robot.sleep_until(float(now))
 
     def outcome_at_end(self, final: Mapping[str, object]) -> Outcome:
-        """The outcome of a run, by the last message of its process."""
+        """Return the outcome of a run from the last message of its process."""
         line = final.get("line")
         if self.limit is not None:
             status = Status.TIMEOUT if self.broken is None else Status.ROBOT_ERROR
@@ -91,20 +91,20 @@ class Ledger:
                 return Outcome(Status.FINISHED, self.robot.trace)
             case {"end": "timeout"}:
                 return self.outcome(
-                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
+                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} loop iterations", line
                 )
             case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.errors):
                 error = self.errors[number]
                 return self.outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
             case {"end": "python-error", "kind": str(kind), "message": str(message)}:
-                is_own = kind.isidentifier() and kind != VIOLATION  # an error of rules only
+                is_own = kind.isidentifier() and kind != VIOLATION  # reserved for rules
                 name = kind if is_own else "Exception"
                 return self.outcome(Status.PYTHON_ERROR, name[:100], message, line)
             case _:
                 return self.outcome(Status.KILLED, "Crash", "the program wrote to the sandbox channel")
 
     def outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
-        """The outcome of a run that ended in an error."""
+        """Return the outcome of a run that ended with an error."""
         where = line if type(line) is int and 0 < line <= MAX_LINE else None
         return Outcome(status, self.robot.trace, RunError(kind, message[:MAX_MESSAGE]), where)
 
@@ -124,11 +124,11 @@ class Ledger:
         elif size + OPTION_OVERHEAD * len(arguments) > limits.text and longest(arguments) > limits.text:
             self.limit = too_long(limits)
         elif self.text > limits.trace:
-            self.limit = f"texts of more than {limits.trace:,} characters in all"
+            self.limit = f"texts of more than {limits.trace:,} characters in total"
 
 
 def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
-    """The outcome of a simulated run, which is an error if a rule is not kept at its end."""
+    """Return the final outcome of a simulated run: an error if a rule does not hold at its end."""
     unkept = robot.guard.at_end() if robot.guard is not None and outcome.error is None else None
     if unkept is None:
         return outcome
@@ -136,26 +136,26 @@ def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
 
 
 def too_long(limits: Limits) -> str:
-    """The limit of a text, in words."""
+    """Describe the limit on the length of a text."""
     return f"a text of more than {limits.text:,} characters"
 
 
 def longest(arguments: Sequence[Argument]) -> int:
-    """The number of characters of the longest text among the arguments of a skill."""
+    """Return the length of the longest text among a skill's arguments, in characters."""
     texts = [texts_in(given) if isinstance(given, tuple) else [str(given)] for given in arguments]
     return max((len(text) for each in texts for text in each), default=0)
 
 
 def texts_in(given: tuple[Option, ...] | tuple[Scalar, ...]) -> list[str]:
-    """The texts of options, or of other arguments."""
+    """Return the texts of options or of other values."""
     return [each.text if isinstance(each, Option) else str(each) for each in given]
 
 
 class RememberingLedger(Ledger):
-    """The ledger of a simulated run, which remembers the answers to calls that change nothing.
+    """The ledger of a simulated run; it caches the answers to calls that change nothing.
 
-    A program that waits for something may look a thousand times. Most programs call few skills, whose answers
-    are not worth remembering.
+    A program that waits for something may look a thousand times. Most programs make too few calls for caching
+    to pay off.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:
@@ -165,12 +165,12 @@ class RememberingLedger(Ledger):
 
     @cached_property
     def _idle(self) -> frozenset[str]:
-        if self._simulated.guard is not None:  # it must see each event
+        if self._simulated.guard is not None:  # the guard must see each event
             return frozenset()
         return self._simulated.idle_skills.difference(self._simulated.own_skills)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
-        """Let the robot execute one skill, or repeat the answer to an equal call."""
+        """Let the robot execute one skill, or return the cached answer to an identical call."""
         robot = self._simulated
         if self.calls < UNREMEMBERED_CALLS or skill not in self._idle:
             self._same.clear()

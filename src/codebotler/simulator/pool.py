@@ -1,4 +1,4 @@
-"""A pool of workers in threads of this process, and the shared pool of the process."""
+"""A pool of worker threads, and the pool that the whole process shares."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from typing import Any, Generic, ParamSpec, Self, TypeVar
 from codebotler.simulator.worker import EngineError, Worker
 
 _log = logging.getLogger("codebotler.engine")
-NO_SECCOMP = "programs are less isolated here: the kernel refuses filters of system calls (seccomp)"
-NOT_LINUX = "programs are less isolated here: only Linux has filters of system calls (seccomp)"
+NO_SECCOMP = "programs are less isolated here: the kernel does not allow system call filters (seccomp)"
+NOT_LINUX = "programs are less isolated here: only Linux has system call filters (seccomp)"
 WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
-RESULTS_IN_MEMORY = 8_000_000  # bytes of results
-UNREADABLE_KEY = b""  # in place of the name of a key that raised an error
-MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # of a call: the first and last ones are smaller
-SIGNAL_POLL_SECONDS = 0.5  # of waiting, since polars keeps signals from ending a wait
-CALLS_PER_THREAD = 2  # so that no thread waits
-MAX_KEYS_AHEAD = 4_000  # keys whose results are not yet taken; one thread may be slow for seconds
+RESULTS_IN_MEMORY = 8_000_000  # bytes of results, before they move to a file
+UNREADABLE_KEY = b""  # the name for a key that raised an error
+MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # keys per call; the first and last calls get fewer
+SIGNAL_POLL_SECONDS = 0.5  # with polars loaded, a signal does not interrupt a wait
+CALLS_PER_THREAD = 2  # submitted calls per thread, so that no thread idles
+MAX_KEYS_AHEAD = 4_000  # keys read before their results are used; one thread may be slow for seconds
 
 _Key = TypeVar("_Key")
 _Called = TypeVar("_Called")
@@ -39,10 +39,10 @@ _Arguments = ParamSpec("_Arguments")
 
 
 class WorkerPool:
-    """Threads that each own one worker; use as a context manager, which waits for the first worker.
+    """Runs functions in threads that each own one worker.
 
-    The first worker starts in parallel with the caller; with `contextlib.closing`, only the first call waits
-    for it. Where the kernel has no seccomp, this warns, or fails if isolation is required.
+    The first worker starts in the background. As a context manager, the pool waits for it on entry; with
+    `contextlib.closing`, the first call waits. Without seccomp, it warns, or fails if isolation is required.
     """
 
     def __init__(
@@ -55,12 +55,12 @@ class WorkerPool:
         self._threads = ThreadPoolExecutor(
             workers, thread_name_prefix="worker", initializer=lambda: setattr(self._local, "is_ours", True)
         )
-        self._takes_turns = one_process_per_run  # thread and child run alternately
+        self._takes_turns = one_process_per_run  # thread and child never run at the same time
         self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
         self._workers: list[Worker] = []
         self._idle: list[Worker] = []
         self._stopping = False
-        # In a thread of the pool, since processes end with the thread that started them.
+        # Start it in a pool thread, since processes end with the thread that started them.
         self._first = self._threads.submit(self._start_first, require_isolation=require_isolation)
 
     def _start_first(self, *, require_isolation: bool) -> None:
@@ -96,7 +96,7 @@ class WorkerPool:
             worker.close()
 
     def here(self) -> Worker:
-        """The worker of the calling thread."""
+        """Return the calling thread's worker, started on first use."""
         worker: Worker | None = getattr(self._local, "worker", None)
         if worker is None:
             self._first.result()
@@ -113,16 +113,16 @@ class WorkerPool:
         return worker
 
     def _keep_together(self, worker: Worker) -> None:
-        """Keep this thread and the processes of its worker on one core.
+        """Pin this thread and its worker's processes to one core.
 
-        Waking a process on another core costs more than a skill call. As a batch thread, this one does not
-        preempt the child at each message.
+        Waking a process on another core takes longer than a skill call. The batch scheduling policy stops
+        this thread from preempting the child at each message.
         """
         if sys.platform != "linux":
             return
         cores = sorted(os.sched_getaffinity(0))
         core = cores[(os.getpid() + self._workers.index(worker)) % len(cores)]
-        with contextlib.suppress(OSError):  # only slower
+        with contextlib.suppress(OSError):  # runs are slower without it
             os.sched_setaffinity(0, {core})
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
             worker.stay_on(core)
@@ -130,20 +130,20 @@ class WorkerPool:
     def submit(
         self, function: Callable[_Arguments, _Value], *args: _Arguments.args, **kwargs: _Arguments.kwargs
     ) -> Future[_Value]:
-        """Call a function in one of the threads, from any thread; `here` is its worker there."""
+        """Call a function in a pool thread, where `here` returns the thread's worker."""
         return self._threads.submit(function, *args, **kwargs)
 
     @property
     def is_here(self) -> bool:
-        """Whether this is a thread of the pool, which must not wait for another one."""
+        """Whether this is a pool thread, which must not wait for another pool thread."""
         return getattr(self._local, "is_ours", False)
 
     def call(self, function: Callable[[], _Value]) -> _Value:
-        """Call a function in a thread of the pool, perhaps this one, and wait for its result."""
+        """Call a function in a pool thread, which may be the current one, and return its result."""
         return function() if self.is_here else self.submit(function).result()
 
     def forget(self) -> None:
-        """Close the descriptors in a forked process, which has neither the workers nor the threads."""
+        """Close the descriptors after a fork, in the child, which has neither the workers nor the threads."""
         for worker in self._workers:
             worker.forget()
 
@@ -155,7 +155,7 @@ class WorkerPool:
         name: Callable[[_Key], bytes],
         then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """Call the function in threads, and yield results in the order of the keys; see `map_batches`."""
+        """Call a function on batches of keys in pool threads; see `map_batches` for the arguments."""
         return map_batches(
             lambda some: self._threads.submit(function, some),
             keys,
@@ -173,17 +173,17 @@ def map_batches(
     name: Callable[[_Key], bytes],
     then: Callable[[_Called], Any] = lambda result: result,
 ) -> Iterator[Any]:
-    """Run several calls at the same time, and yield their results in the order of the keys.
+    """Call a function on batches of keys concurrently, and yield the results in the order of the keys.
 
-    Equal keys are called once. While one result is slow, more keys are read, so that the other workers have
-    work. An error of the keys or of a call is raised in the place of the result.
+    Duplicate keys share one result. While one result is slow, more keys are read, so that the other workers
+    stay busy. An error from the keys or from a call is raised when its result is due.
 
     Args:
-        submit: starts a call for a few keys, which returns a result for each.
-        keys: read a little ahead.
-        workers: the number of simultaneous calls.
-        name: returns a short unique name for each key.
-        then: called with each result in the thread of the caller; its own result is pickled.
+        submit: starts a call for a few keys; the call returns one result per key.
+        keys: the keys, of which a few are read in advance.
+        workers: the number of calls that run at the same time.
+        name: returns a short, unique name for a key.
+        then: converts each result in the caller's thread; what it returns is pickled.
     """
     distinct = DistinctKeys(keys, name)
     waiting, failed = distinct.waiting, distinct.failed
@@ -195,7 +195,7 @@ def map_batches(
             while len(running) < calls and (batch := distinct.batch(workers)):
                 try:
                     future = submit(list(batch.values()))
-                except Exception as error:  # noqa: BLE001 - raised after earlier results
+                except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
                     failed.update(dict.fromkeys(batch, error))
                     continue
                 running[future] = list(batch)
@@ -229,26 +229,26 @@ def _next(queue: SimpleQueue[_Value]) -> _Value:
 
 
 def without_filter() -> str:
-    """The warning for systems without seccomp."""
+    """Return the warning for systems without seccomp."""
     return NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 
 
 class DistinctKeys(Generic[_Key]):
-    """Keys with names, read a little ahead and returned in batches, equal keys once."""
+    """Reads named keys in advance, and returns them in batches without duplicates."""
 
     def __init__(self, keys: Iterable[_Key], name: Callable[[_Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
         self._seen: set[bytes] = set()
-        self._new: dict[bytes, _Key] = {}  # not yet in a batch
+        self._new: dict[bytes, _Key] = {}  # keys not yet in a batch
         self._sent = 0
-        self.waiting: deque[bytes] = deque()  # names of keys whose results are not yet taken
+        self.waiting: deque[bytes] = deque()  # names of keys whose results are not yet used
         self.failed: dict[bytes, BaseException] = {}
 
     def batch(self, width: int) -> dict[bytes, _Key]:
-        """New keys by name, for one of `width` simultaneous calls; empty at the end, or if too many wait.
+        """Return the next keys by name for one of `width` calls; empty at the end or if too many are waiting.
 
-        Batches grow, so that the first results come soon; the last ones shrink, so that all calls end at the
-        same time. An error of the keys is that of the next name.
+        Batches start small so that the first results come soon, and end small so that all calls end together.
+        An error while reading the keys counts as the result of the next key.
         """
         size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
@@ -271,14 +271,14 @@ class DistinctKeys(Generic[_Key]):
                     self._new[name] = key
         except StopIteration:
             pass
-        except Exception as error:  # noqa: BLE001 - raised after earlier results
+        except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
             self._keys = iter(())
             self.waiting.append(UNREADABLE_KEY)
             self.failed[UNREADABLE_KEY] = error
 
 
 class ResultFile:
-    """Results by name, in a temporary file, since there may be a million of them."""
+    """Stores results by name in a temporary file, since there may be a million of them."""
 
     def __init__(self) -> None:
         self._file = tempfile.SpooledTemporaryFile(RESULTS_IN_MEMORY)  # noqa: SIM115 - closed by __exit__
@@ -308,34 +308,34 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """The pool of this process with a worker for each core, started on first use; a fork has its own."""
+    """Return this process's pool, started on first use with a worker per core; a fork gets its own pool."""
     with SHARED_POOL.lock:
         if SHARED_POOL.pool is None:
-            SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # raises if it cannot start
+            SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # raises EngineError if it cannot start
         return SHARED_POOL.pool
 
 
 class SharedPool:
-    """Holds the pool of this process once it is started; a fork starts anew."""
+    """Holds this process's pool once it is started; after a fork, the child starts a new one."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()  # held during a fork, so that no child has half a pool
+        self.lock = threading.Lock()  # held during a fork, so that no child inherits half a pool
         self.pool: WorkerPool | None = None
-        self._inherited: list[WorkerPool] = []  # never freed, since their threads are missing here
+        self._inherited: list[WorkerPool] = []  # never freed, since their threads do not exist here
         atexit.register(self.end)
         os.register_at_fork(
             before=self.lock.acquire, after_in_parent=self.lock.release, after_in_child=self.begin_anew
         )
 
     def end(self) -> None:
-        """End the pool."""
+        """Close the pool."""
         with self.lock:
             if self.pool is not None:
                 self.pool.close()
                 self.pool = None
 
     def begin_anew(self) -> None:
-        """Release the pool of the parent, in a forked process."""
+        """Release the parent's pool after a fork, in the child."""
         if self.pool is not None:
             self.pool.forget()
             self._inherited.append(self.pool)
@@ -344,7 +344,7 @@ class SharedPool:
 
 
 def cores() -> int:
-    """The number of cores for this process."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -1,9 +1,9 @@
-"""The simulated robot: the effect of each skill on a world, and its errors."""
+"""The simulated robot: executes skills in a copy of a world, and raises their errors."""
 
 from __future__ import annotations
 
 import json
-from _blake2 import blake2b  # of `hashlib`, which would bring OpenSSL into every child
+from _blake2 import blake2b  # `hashlib` would load OpenSSL into every child
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NoReturn, Protocol, TypeAlias
@@ -30,22 +30,22 @@ from codebotler.simulator.settings import (
 
 Argument: TypeAlias = Scalar | tuple[Option, ...] | tuple[Scalar, ...]
 Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
-Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # of a copy: `simulated` or `sampled`, and the arguments
+Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # `simulated` or `sampled`, and the arguments to make a copy
 
 
 class SkillGuard(Protocol):
-    """A judge of each skill before a robot executes it."""
+    """Judges each skill call before a robot executes it."""
 
     may_refuse: bool
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Let a robot execute one skill, or raise RobotError."""
+        """Let a robot execute one skill, or raise RobotError if it is forbidden."""
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """Judge an action inside a skill of the user's own, or raise RobotError."""
+        """Raise RobotError if an action inside one of the user's own skills is forbidden."""
 
     def at_end(self) -> RobotError | None:
-        """Return the error if the run ends now, if any."""
+        """Return the error that arises if the run ends now, or None if there is none."""
 
 
 @dataclass
@@ -53,17 +53,17 @@ class Thing:
     """An object in a room."""
 
     label: str
-    is_pattern: bool = True  # else literal text, for a thing that was put down
+    is_pattern: bool = True  # whether the label is a regex, and not the literal name of a thing put down
 
     def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
-        """Whether a request finds it."""
+        """Return whether a request refers to this thing."""
         if self.is_pattern:
             return finds(request, self.label, matching)
-        return self.label.lower() in request.lower()  # a regex may take minutes for long names
+        return self.label.lower() in request.lower()  # a regex of a long name may take minutes
 
 
 class Somebody:
-    """A person in a room, with their remaining answers."""
+    """A person in a room, and the answers they have left."""
 
     def __init__(self, person: Person) -> None:
         self.person = person
@@ -73,18 +73,18 @@ class Somebody:
 
     @property
     def is_here(self) -> bool:
-        """Whether they are in the room now."""
+        """Whether the person is in the room now."""
         return self.looks_before == 0 and not self.is_gone
 
     def answer(self, question: str, settings: SimulationSettings) -> Answer | None:
-        """Their answer to a question, if any."""
+        """Return the person's answer to a question, or None if they have none."""
         for topic, answer in self.person.topics:
             if finds(question, topic, settings.matching):
                 return answer
         if not self.answers:
             return None
         answer = self.answers[0]
-        if len(self.answers) > 1:  # the last answer repeats
+        if len(self.answers) > 1:  # the last answer is repeated
             del self.answers[0]
         else:
             self.is_gone = self.person.leaves
@@ -92,9 +92,9 @@ class Somebody:
 
 
 class SimulatedRobot:
-    """A robot in its own copy of a world, with its trace."""
+    """A robot that acts in its own copy of a world and records a trace."""
 
-    is_copied = True  # in the child of a batch; subclasses are not, unless they say so
+    is_copied = True  # whether a batch's child can copy it; each subclass must set this itself
 
     def __init__(
         self,
@@ -109,14 +109,14 @@ class SimulatedRobot:
         self.setup: Setup = ("simulated", (world, settings))
         missing = () if skills is SKILLS else [name for name, row in skills.items() if row.does is None]
         if missing:
-            raise UserError(f'the skill "{missing[0]}" cannot be simulated: nothing says what it does')
+            raise UserError(f'the skill "{missing[0]}" cannot be simulated because it has no code')
         self.rooms = tuple(room.name for room in world.rooms)
         self.room = world.robot
         self.held: str | None = None
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
         self.line: int | None = None
-        self._own_skill: Skill | None = None  # of the user, during its call
+        self._own_skill: Skill | None = None  # the user's own skill that is being executed
         self.events: list[Event] = []
 
     @cached_property
@@ -126,17 +126,17 @@ class SimulatedRobot:
 
     @cached_property
     def people(self) -> dict[str, list[Somebody]]:
-        """The people in each room, including those who will come later."""
+        """The people in each room, including people who arrive later."""
         return {room.name: [Somebody(person) for person in room.people] for room in self.world.rooms}
 
     @property
     def trace(self) -> Trace:
-        """What the robot has done so far."""
+        """The events so far."""
         return tuple(self.events)
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The skills declared elsewhere, which a copy made from `setup` would lack."""
+        """The skills that a copy made from `setup` would lack, since they are declared elsewhere."""
         if "is_copied" not in vars(type(self)):
             return tuple(self.skills)
         if self.skills is SKILLS:
@@ -150,13 +150,13 @@ class SimulatedRobot:
         return self.skills.idle - {"is_in_room"} if someone_may_come else self.skills.idle
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill if the guard allows it; a question returns the position of an option."""
+        """Execute one skill if the guard allows it; a question returns the position of the chosen option."""
         if self.guard is not None:
             return self.guard.perform(self, skill, arguments)
         return self.execute(skill, arguments)
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """All rooms that a request may mean; for an exact name, only those where it leads."""
+        """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
         wanted = request.strip().lower()
         named = [room for room in self.rooms if room.lower() == wanted]
         if named:
@@ -167,7 +167,7 @@ class SimulatedRobot:
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill without asking the guard."""
         row = self.skills[skill]
-        assert row.does is not None, "the robot was made with it"
+        assert row.does is not None, "the constructor checks this"
         if row.adds_event or row.fails:
             return self._own(row, arguments)
         result: Result = row.does(self, *arguments)
@@ -180,7 +180,7 @@ class SimulatedRobot:
     # --- effects of skills
 
     def drive(self, location: str) -> None:
-        """Drive to the first room whose name is in the request."""
+        """Drive to the first room whose name occurs in the request."""
         room = self.room_for(location)
         if self.settings.events == "as-requested":
             self.record(GOTO, location, destination=room)
@@ -191,11 +191,11 @@ class SimulatedRobot:
         self.room = room
 
     def room_for(self, request: str) -> str | None:
-        """The first room whose name is in a request; None if there is none."""
+        """Return the first room whose name occurs in a request, or None if there is none."""
         return resolve_room(self.rooms, request, self.settings.matching)
 
     def look(self, entity: str) -> bool:
-        """Look for an object, else for a person; an absent person may come after some looks in vain."""
+        """Look for an object or a person; an absent person may arrive after some unsuccessful looks."""
         settings, people = self.settings, self.people[self.room]
         seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things[self.room])
         seen = seen or any(one.is_here and is_called(one.person, entity, settings) for one in people)
@@ -206,7 +206,7 @@ class SimulatedRobot:
         return seen
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask the first matching person here, and return the position of the option that they choose."""
+        """Ask the first matching person in this room, and return the position of the option they choose."""
         person, options = as_text(person), to_options(options)
         self.record(ASK, question, options, to=person)
         if not options:
@@ -226,7 +226,7 @@ class SimulatedRobot:
         return chosen
 
     def take(self, obj: str) -> None:
-        """Take the first matching object here."""
+        """Pick up the first matching object in this room."""
         if self.held is not None:
             raise RobotError(
                 "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
@@ -240,7 +240,7 @@ class SimulatedRobot:
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the held object, named as in the pick; as-happened events allow any matching name."""
+        """Put down the held object, using the name it was picked up under or, if as-happened, any match."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
@@ -250,33 +250,32 @@ class SimulatedRobot:
         self.things[self.room].append(taken or Thing(obj, is_pattern=False))
         self.held = self.taken = None
 
-    # --- skills of the user
+    # --- the user's own skills
 
     @cached_property
     def state(self) -> dict[str, Any]:
-        """The memory of skills between their calls."""
+        """The values that skills store between calls."""
         return {}
 
     def truth(self, statement: str) -> bool:
-        """Whether a statement is true in this world."""
+        """Return whether a statement is true in this world."""
         known = dict(self.world.truths).get(statement)
         if known is None:
             return self.draw_outcome(f'"{statement}"', ("is true", "is not true")) == 0
         if not isinstance(known, bool):
-            raise UserError(f'the world says that "{statement}" is {known!r}; write true or false')
+            raise UserError(f'the world sets "{statement}" to {known!r}; use true or false')
         return known
 
-    def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - of the skill's type
-        """The result of a skill without code for simulation: a random one of its type, or its error."""
+    def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
+        """Return the result of a skill without simulation code: given by the world, else random."""
         row, call = self.skills[skill], written_call(skill, plain(arguments))
         known, kinds = dict(self.world.truths).get(call), [kind for kind, _ in row.fails]
         if known in kinds:
             self.fail(str(known))
         if known is not None:
             if not row.returns.fits(known):
-                raise UserError(
-                    f"the world says that {call} gives {known!r}; {skill} returns {row.returns.words}"
-                )
+                must = f"{skill} must return {row.returns.words}"
+                raise UserError(f"the world sets {call} to {known!r}, but {must}")
             return plain(known)
         asks = [one for one, parameter in zip(arguments, row.parameters, strict=True) if parameter.is_options]
         results = tuple(asks[0]) if asks and asks[0] else sample_values(row.returns)
@@ -289,22 +288,22 @@ class SimulatedRobot:
         return results[number]
 
     def fail(self, kind: str) -> NoReturn:
-        """End a skill with an error that it declares."""
+        """End the current skill with an error that it declares in `fails`."""
         row = self._own_skill
         declared = {} if row is None else dict(row.fails)
         if row is not None and kind in declared:
             raise RobotError(kind, f"{row.name}: {declared[kind]}")
-        from difflib import get_close_matches  # noqa: PLC0415 - children have no use for it
+        from difflib import get_close_matches  # noqa: PLC0415 - children do not need it
 
         alike = get_close_matches(kind, declared, 1)
-        hint = f"did you mean {alike[0]}?" if alike else "name it in `fails`, with the clause that says when"
+        hint = f"did you mean {alike[0]}?" if alike else "declare it in `fails`, and say when it happens"
         sentence = f'{row.name if row else "the skill"} declares no error "{kind}"; {hint}'
         if row is None:
             raise UserError(sentence)
         row.wrong(sentence)
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Draw one of the outcomes of a statement: in one world, the same one each time."""
+        """Draw an outcome for a statement; the same world always gives the same outcome."""
         return self._sampler.draw(len(outcomes), statement)
 
     @cached_property
@@ -313,7 +312,7 @@ class SimulatedRobot:
         return FactSampler(int.from_bytes(blake2b(world.encode(), digest_size=8).digest(), "big"))
 
     def _own(self, row: Skill, arguments: Sequence[Argument]) -> Result:
-        """Execute a skill of the user, and add its event."""
+        """Execute one of the user's own skills, and record its event."""
         event, at = None, len(self.events)
         if row.adds_event:
             event = attempted_event(row, arguments, place=self.room, time=self.now, holding=self.held or "")
@@ -341,7 +340,7 @@ class SimulatedRobot:
     # --- the trace
 
     def sleep_until(self, now: float) -> None:
-        """Let simulated time pass, until `now` seconds since the start."""
+        """Advance simulated time to `now` seconds since the start."""
         self.now = now
 
     def record(
@@ -354,7 +353,7 @@ class SimulatedRobot:
         to: str | None = None,
         destination: str | None = None,
     ) -> None:
-        """Add an event here and now; its text is stripped."""
+        """Record an event at the current place and time; its text is stripped."""
         given = text.strip(), to_options(options), None, found
         event = Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
         if self.guard is not None:
@@ -362,11 +361,11 @@ class SimulatedRobot:
         self.events.append(event)
 
     def repeat(self, events: Sequence[Event]) -> None:
-        """Add copies of earlier events in this room."""
+        """Record copies of earlier events in this room, at the current time."""
         self.events += [replace(event, time=self.now) for event in events]
 
     def amend(self, answer: str) -> None:
-        """Add an answer to the last event."""
+        """Add the answer to the last event, which is a question."""
         self.events[-1] = replace(self.events[-1], answer=answer)
 
 
@@ -374,5 +373,5 @@ _USUAL = {name: row.does for name, row in SKILLS.items()}
 
 
 def unknown_room(location: str) -> RobotError:
-    """The error of a drive to no known room."""
+    """Return the error for a drive to an unknown room."""
     return RobotError("GoToInvalidLocation", f'there is no room "{location}"')

@@ -1,4 +1,4 @@
-"""`RuleGuard`: keeps a robot from breaking house rules, whatever its program asks for."""
+"""`RuleGuard`: prevents a robot from breaking house rules, whatever its program does."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return the name by which rules compare a room or thing: its own, or the request if that is a regex."""
+    """Return the name that rules compare for a room or thing: its label, or for a regex the request."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
 
 @dataclass
 class _History:
-    """The events so far, by the names that rules compare."""
+    """What happened so far, under the names that rules compare."""
 
     monitors: Sequence[tuple[Rule, Monitor]]
-    names: dict[str, str] = field(default_factory=dict)  # of rooms where the robot has been
-    unjudged: set[str] = field(default_factory=set)  # names of rules
-    inside: Sequence[str] = ()  # rooms that hold the robot's pose
+    names: dict[str, str] = field(default_factory=dict)  # names of the visited rooms
+    unjudged: set[str] = field(default_factory=set)  # names of rules that can no longer be judged
+    inside: Sequence[str] = ()  # the rooms that contain the robot's pose
     holding: str = ""
 
     def copy(self) -> _History:
-        """Return a history that goes on by itself."""
+        """Return an independent copy of this history."""
         monitors = [(rule, copy(monitor)) for rule, monitor in self.monitors]
         return replace(self, monitors=monitors, names=dict(self.names), unjudged=set(self.unjudged))
 
 
 class RuleGuard:
-    """Judges each action of one robot by house rules before it happens, by the history of earlier events.
+    """Judges each action of one robot by house rules before it happens, given all earlier events.
 
     Args:
         rules: the rules in force.
-        rooms: the known rooms with their footprints.
+        rooms: the known rooms and their footprints.
     """
 
     def __init__(self, rules: Sequence[Rule], rooms: Sequence[Room] = ()) -> None:
@@ -56,14 +56,14 @@ class RuleGuard:
         self.judges_poses = any(rule.inside for rule in rules)
         self._history = _History([(rule, Monitor(rule.formula)) for rule in rules])
 
-        # The current call of a skill.
-        self._is_own = False  # a user's own skill, whose events count on trial until it ends
-        self._start = self._seen = 0  # number of events before the call, and of those already on trial
-        self._held: Thing | None = None  # before the call
-        self._prevented: RuleViolationError | None = None  # which the skill may have caught
+        # The current skill call.
+        self._is_own = False  # whether it is the user's own skill, whose events are provisional until it ends
+        self._start = self._seen = 0  # number of events before the call, and of events judged so far
+        self._held: Thing | None = None  # what the robot held before the call
+        self._prevented: RuleViolationError | None = None  # the skill may have caught it
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Let a robot execute one skill; RuleViolationError if a rule forbids it, or was broken by it."""
+        """Let a robot execute one skill; raise RuleViolationError if it would break or broke a rule."""
         row, start = robot.skills[skill], len(robot.events)
         holding = "" if robot.held is None else self._history.holding or robot.held
         place = self._history.names.get(robot.room, robot.room)
@@ -97,10 +97,10 @@ class RuleGuard:
             self._history = history
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """RuleViolationError if a rule would be broken by what a user's own skill is about to do inside.
+        """Raise RuleViolationError if the next event inside one of the user's own skills would break a rule.
 
-        Events inside count on trial: the result of the skill itself, whose event may come first, is not
-        known before the call ends.
+        Events inside a skill are provisional: the skill's own event may come before them, but its result is
+        not known until the call ends.
         """
         if not self._is_own:
             return
@@ -114,7 +114,7 @@ class RuleGuard:
             raise
 
     def judge(self, *attempts: Event) -> None:
-        """RuleViolationError if a rule would be broken by the next event, which may be any of several."""
+        """Raise RuleViolationError if any of the possible next events would break a rule."""
         caught: RuleViolationError | None = None
         attempts = tuple(map(_trimmed, attempts))
         for rule, monitor in self._history.monitors:
@@ -122,12 +122,12 @@ class RuleGuard:
                 broken = _violation(rule, monitor, attempt)
                 if broken is not None and broken.ends_run:
                     raise broken
-                caught = caught or broken  # another rule may end the run
+                caught = caught or broken  # continue, since another rule may end the run
         if caught is not None:
             raise caught
 
     def happened(self, event: Event) -> None:
-        """Add an event to the history; RuleViolationError if its result, unknown before, broke a rule."""
+        """Add an event to the history; raise RuleViolationError if its result broke a rule."""
         if event.destination is not None:
             self._history.names[event.destination] = event.text
         elif event.kind in KINDS_OF_MOVES:
@@ -135,7 +135,7 @@ class RuleGuard:
         late: RuleViolationError | None = None
         event = _trimmed(event)
         for rule, monitor in self._history.monitors:
-            if event.kind == INSIDE and not rule.inside:  # other rules must not see it as the last event
+            if event.kind == INSIDE and not rule.inside:  # must not count as the last event for other rules
                 continue
             try:
                 holds = monitor.feed(event)
@@ -148,26 +148,26 @@ class RuleGuard:
             raise late
 
     def moved(self, start: Point, end: Point, holding: str) -> None:
-        """Add a straight drive between two poses to the history; RuleViolationError if it broke a rule."""
+        """Add a straight drive between two poses; raise RuleViolationError if it broke a rule."""
         if self.judges_poses:
             self._enter(rooms_along(self._rooms, start, end), holding)
 
     def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
-        """Stop judging some rules; RuleViolationError if one of them must always hold."""
+        """Stop judging some rules; raise RuleViolationError if one of them must always hold."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":
                 raise RuleViolationError(rule, event, objection, why)
 
     def at_end(self) -> RuleViolationError | None:
-        """Return the first rule that is not kept if the mission ends now."""
+        """Return an error for the first rule that is broken if the mission ends now, or None."""
         for rule, monitor in self._history.monitors:
             if rule.when == "finally" and (rule.name in self._history.unjudged or not monitor.holds):
                 return RuleViolationError(rule, None)
         return None
 
     def _take(self, robot: SimulatedRobot, events: Sequence[Event], request: str | None = None) -> None:
-        """Add events of the current call to the history; `request` is where a drive of the package goes."""
+        """Add the current call's events to the history; `request` is the goal of a built-in drive."""
         kinds = [event.kind for event in robot.events[self._start :]]
         is_one_move = sum(kind in KINDS_OF_MOVES for kind in kinds) == 1
         thing = self._held or robot.taken if is_one_move else None
@@ -179,7 +179,7 @@ class RuleGuard:
             self.happened(named)
 
     def _named(self, event: Event, request: str, thing: Thing | None = None) -> Event:
-        """Return an event of the robot with the names that rules compare."""
+        """Return a robot's event with the names that rules compare."""
         text, place = event.text, self._history.names.get(event.place, event.place)
         holding = (self._history.holding or event.holding) if event.holding else ""
         if event.destination is not None:
@@ -196,13 +196,13 @@ class RuleGuard:
                     self.happened(Event(INSIDE, room, place=room, holding=holding))
 
     def _way(self, start: str, end: str) -> Iterable[Sequence[str]]:
-        """Return the rooms that hold each part of a simulated drive; only its ends without a map."""
+        """Return the rooms that contain each part of a simulated drive; without a map, only its two ends."""
         one, other = self._stops.get(start), self._stops.get(end)
         return [(start,), (end,)] if one is None or other is None else rooms_along(self._rooms, one, other)
 
 
 def _trimmed(event: Event) -> Event:
-    """Return an event whose options, answer and person have no blanks at their ends."""
+    """Strip surrounding whitespace from an event's options, answer and person."""
     if event.to is None and not event.options:
         return event
     options = tuple([option._replace(text=option.text.strip()) for option in event.options])
@@ -211,7 +211,7 @@ def _trimmed(event: Event) -> Event:
 
 
 def _violation(rule: Rule, monitor: Monitor, attempt: Event) -> RuleViolationError | None:
-    """Return the error if a rule does not allow an event with any result."""
+    """Return an error if a rule forbids an event whatever its result, else None."""
     is_unclear = False
     for event in rule.results(attempt):
         try:
@@ -227,7 +227,7 @@ def _violation(rule: Rule, monitor: Monitor, attempt: Event) -> RuleViolationErr
 def _attempts(
     robot: SimulatedRobot, attempt: Event, arguments: Sequence[Argument], *, is_drive: bool
 ) -> Iterator[Event]:
-    """Yield an attempt, and the same with the names of the rooms or things that it may mean."""
+    """Yield an attempt, and a copy for each name of a room or thing that it may refer to."""
     yield attempt
     names: list[str] = []
     for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
@@ -241,7 +241,7 @@ def _attempts(
 
 
 def _names_of_thing(robot: SimulatedRobot, kind: str, request: str) -> Sequence[str]:
-    """Return the name by which the thing is recorded that would be picked up or put down, if any."""
+    """Return the recorded name of the thing that would be picked up or put down, or nothing."""
     things = [robot.taken] if kind == PLACE and robot.taken is not None else []
     if kind == PICK:
         here = robot.things[robot.room]

@@ -1,4 +1,4 @@
-"""A robot in a sampled world: rooms are known, and other facts are drawn when the program first asks."""
+"""A robot in a sampled world: its rooms are known, and other facts are drawn when a program first asks."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing
 from codebotler.simulator.settings import SimulationSettings, finds
 
-AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves literals unchanged, as on a robot
+AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves literals unchanged, as on a real robot
 
 SOMEBODY = "somebody"
-PERSON_WORDS = frozenset(  # words for any person
+PERSON_WORDS = frozenset(  # words that mean any person
     {
         *("", SOMEBODY, "someone", "anybody", "anyone", "everybody", "everyone", "all"),
         *("person", "persons", "people", "human", "humans", "human being"),
@@ -38,32 +38,32 @@ _ARTICLE = re.compile(r"^(?:the|an?|any|some)\s+")
 
 @dataclass(frozen=True)
 class RoomMap:
-    """The facts of a world that are known before any are drawn."""
+    """The part of a world that is known before any facts are drawn."""
 
-    rooms: tuple[str, ...]  # in the order in which the robot knows them
+    rooms: tuple[str, ...]  # in the order in which the robot lists them
     start: str
-    guessed: bool = False  # the rooms are a guess: any other place that a program drives to exists, too
-    plain: bool = False  # names are plain texts and no regexes; so are those of robots and guesses
-    plan: tuple[Room, ...] = ()  # footprints; and stops, if the robot drives straight between rooms
+    guessed: bool = False  # the rooms are a guess: any other place a program drives to exists as well
+    plain: bool = False  # names are plain text, not regexes; names of real robots and guesses always are
+    plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
 
     def __post_init__(self) -> None:
         compose_fields(self)
 
     @classmethod
     def of(cls, world: World) -> RoomMap:
-        """The map of a world of a suite or file."""
+        """Make the map of a world from a suite or file."""
         plan = [Room(room.name, (), (), room.footprint, room.stand_at) for room in laid_out(world).rooms]
         return cls(tuple(room.name for room in world.rooms), world.robot, plan=tuple(plan))
 
     @classmethod
     def of_places(cls, world: World) -> RoomMap:
-        """The map of the places of a robot that plans its own ways, starting at the first place."""
+        """Make the map of a robot that plans its own routes; it starts at the first place."""
         names = tuple(room.name for room in world.rooms)
         plan = tuple(Room(room.name, (), (), room.footprint) for room in world.rooms)
         return cls(names, names[0], plain=True, plan=plan)
 
     def room(self, request: str) -> str | None:
-        """The room that a request finds; None if there is no such room."""
+        """Return the room that a request refers to, or None if there is no such room."""
         if not (self.guessed or self.plain):
             return next((r for r in self.rooms if finds(request, r, "label-in-request")), None)
         wanted = request.strip()
@@ -72,7 +72,7 @@ class RoomMap:
         return same[0] if same else next(within, (wanted or None) if self.guessed else None)
 
     def possible_rooms(self, request: str) -> list[str]:
-        """All known rooms that a request may mean; for an exact name, only those where it leads."""
+        """Return all known rooms that a request may refer to; for an exact name, only where it would lead."""
         wanted, leads_to = request.strip().casefold(), self.room(request)
         named = [room for room in self.rooms if room.strip().casefold() == wanted]
         if named:
@@ -87,12 +87,12 @@ class RoomMap:
 
 @dataclass(frozen=True)
 class Whereabouts:
-    """The fact that somebody or something is in a room or not."""
+    """The fact that a person or thing is, or is not, in a room."""
 
-    name: str  # as `normalized` names it
+    name: str  # the canonical name, as returned by `normalized`
     room: str
     is_there: bool
-    is_random: bool = True  # else the world is as the program assumed
+    is_random: bool = True  # False if it holds because the program assumed it
 
     @property
     def sentence(self) -> str:
@@ -106,7 +106,7 @@ class Whereabouts:
 
 @dataclass(frozen=True)
 class GivenAnswer:
-    """The fact that somebody gives an answer to a question."""
+    """The fact that a person answers a question in a particular way."""
 
     room: str
     question: str
@@ -122,7 +122,7 @@ class GivenAnswer:
 
 @dataclass(frozen=True)
 class RandomOutcome:
-    """The fact that a statement is true or not, or that a skill has a result."""
+    """The fact that a statement is true or false, or that a skill has a particular result."""
 
     statement: str
     outcome: str
@@ -137,43 +137,43 @@ class RandomOutcome:
 SampledFact: TypeAlias = Whereabouts | GivenAnswer | RandomOutcome
 
 
-# --- knowledge of the program; names are normalized
+# --- the program's knowledge, by canonical names
 
 
 @dataclass
 class ExploredRoom:
-    """The knowledge of a program about one room."""
+    """What a program knows about one room."""
 
-    missed: set[str] = field(default_factory=set)  # searched for in vain
-    gone: set[str] = field(default_factory=set)  # taken away
+    missed: set[str] = field(default_factory=set)  # looked for and not found
+    gone: set[str] = field(default_factory=set)  # picked up here
     people: set[str] = field(default_factory=set)
 
     def lacks(self, name: str) -> bool:
-        """Whether something is known to be absent; a missed longer name covers its parts."""
+        """Return whether a name is known to be absent; a missed longer name covers its parts."""
         return name in self.missed or any(name in missed for missed in self.missed if name != SOMEBODY)
 
 
 @dataclass
 class RoomSearch:
-    """The rooms in which a program looked for somebody or something."""
+    """The rooms in which a program looked for a person or thing."""
 
     vain: set[str] = field(default_factory=set)
     found: set[str] = field(default_factory=set)
 
     @property
     def is_lost(self) -> bool:
-        """Whether it searched several rooms in vain."""
+        """Whether the program searched several rooms without success."""
         return len(self.vain) > 1 and not self.found
 
 
 class SampledRobot(SimulatedRobot):
-    """A robot in a world that is drawn while the program runs; a fact once drawn stays true.
+    """A robot in a world whose facts are drawn while the program runs; a fact, once drawn, never changes.
 
-    Things and people that the program looks for are there or not at random. All others are as it assumes:
-    somebody answers, and a thing that it picks up is there. Answers are random options of the question.
+    Whether a person or thing that the program looks for is present is random. Without a look, the program's
+    assumptions hold: a person answers, and a thing can be picked up. Answers are random options.
 
-    A program that searches several rooms assumes that one of them has the thing. If none has, `excuses` holds
-    the resulting errors, which are not the program's fault.
+    A program that searches several rooms assumes that the thing is in one of them. If that is not so,
+    `excuses` holds the resulting errors, which are not the program's fault.
     """
 
     is_copied = True
@@ -192,31 +192,31 @@ class SampledRobot(SimulatedRobot):
         self.setup = "sampled", (room_map, sampler, settings)
         self.room_map, self.sampler = room_map, sampler
         self.things = defaultdict(list)
-        self.people = defaultdict(list)  # always empty: no world file names anybody
+        self.people = defaultdict(list)  # always empty, since no world file names people
         self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
-        self.answers: dict[tuple[str, ...], str] = {}  # by room, person and question
-        self.outcomes: dict[str, int] = {}  # outcomes of statements
+        self.answers: dict[tuple[str, ...], str] = {}  # answers by room, person and question
+        self.outcomes: dict[str, int] = {}  # outcomes by statement
         self.facts: list[SampledFact] = []
         self.draws: list[Draw] = []
         self.searches: defaultdict[str, RoomSearch] = defaultdict(RoomSearch)
-        self.excuses: set[str] = set()  # messages of errors
+        self.excuses: set[str] = set()  # messages of excused errors
 
     @property
     def idle_skills(self) -> frozenset[str]:
-        """The skills that change neither the robot nor its world, once their facts are drawn."""
+        """The skills that change neither the robot nor its world once their facts are drawn."""
         return self.skills.idle
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """All rooms that a request may mean."""
+        """Return all rooms that a request may refer to."""
         return self.room_map.possible_rooms(request)
 
     @property
     def here(self) -> ExploredRoom:
-        """The knowledge of the program about the robot's room."""
+        """What the program knows about the robot's current room."""
         return self.explored[self.room]
 
     def search(self, name: str) -> RoomSearch:
-        """The rooms where the program looked for somebody or something, also by a longer or shorter name."""
+        """Return the rooms where the program looked for a name, including longer and shorter forms of it."""
         combined = RoomSearch()
         for sought, search in self.searches.items():
             if sought == name or (SOMEBODY not in {sought, name} and (sought in name or name in sought)):
@@ -226,7 +226,7 @@ class SampledRobot(SimulatedRobot):
 
     @contextmanager
     def excused(self, *, when: bool) -> Iterator[None]:
-        """Excuse an error that random facts caused and not the program."""
+        """Excuse any error raised in this context if random facts caused it and not the program."""
         try:
             yield
         except RobotError as error:
@@ -235,14 +235,14 @@ class SampledRobot(SimulatedRobot):
             raise
 
     def is_here(self, name: str) -> bool | None:
-        """Whether somebody or something is in this room; None if that is still open."""
+        """Return whether a person or thing is in this room, or None if that is undecided."""
         things = self.things[self.room] if name != SOMEBODY else []
         if name in self.here.people or any(thing.is_meant_by(name) for thing in things):
             return True
         return False if self.here.lacks(name) else None
 
     def settle(self, name: str, *, is_random: bool) -> bool:
-        """Decide whether somebody or something is here: at random, or as the program assumes."""
+        """Decide whether a person or thing is in this room: at random, or as the program assumes."""
         is_there = True
         if is_random:
             is_there = self.sampler.is_there(self.room, name)
@@ -253,14 +253,14 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def answer(self, options: Sequence[str], *question: str) -> str:
-        """Draw the answer to a question."""
+        """Draw the answer to a question from its options."""
         agreeing = next((i for i, text in enumerate(options) if AGREEING_TEXT.match(text)), 0)
         drawn = self.sampler.answer(len(options), agreeing, *question)
         self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))
         return options[drawn]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
-        """Draw one of the outcomes of a statement, once."""
+        """Draw an outcome for a statement, or return the outcome drawn earlier."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
             drawn = self.sampler.outcome(len(possible), statement)
@@ -269,14 +269,14 @@ class SampledRobot(SimulatedRobot):
             self.outcomes[statement] = drawn
         return self.outcomes[statement]
 
-    # --- what skills do
+    # --- effects of skills
 
     def room_for(self, request: str) -> str | None:
-        """The room that a request means; on a guessed map, any place."""
+        """Return the room that a request refers to; on a guessed map, every place exists."""
         return self.room_map.room(request)
 
     def look(self, entity: str) -> bool:
-        """Look for an object or a person; the first look draws whether they are there."""
+        """Look for an object or a person; the first look draws whether they are present."""
         name, room = normalized(entity), self.here
         found = self.is_here(name)
         if found is None and (name in room.gone or (is_name(entity) and room.lacks(SOMEBODY))):
@@ -294,7 +294,7 @@ class SampledRobot(SimulatedRobot):
         return found
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask somebody, who is there unless the program missed them before; the answer is random."""
+        """Ask a person, who is present unless an earlier look failed to find them; the answer is random."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):
@@ -322,7 +322,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def take(self, obj: str) -> None:
-        """Take an object, which is there unless the program missed it before."""
+        """Pick up an object, which is present unless an earlier look failed to find it."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self.things[self.room].append(Thing(name, is_pattern=False))
@@ -334,23 +334,23 @@ class SampledRobot(SimulatedRobot):
         self.here.people.discard(name)
 
     def _lies_there(self, name: str) -> bool:
-        if name in self.here.gone:  # there may have been several of it
+        if name in self.here.gone:  # there may have been several of the same kind
             return not self.sampler.strict
         return self.settle(name, is_random=self.sampler.strict)
 
     def put(self, obj: str) -> None:
-        """Put down the held object, by exactly the name with which it was picked up."""
+        """Put down the held object, using exactly the name it was picked up under."""
         with self.excused(when=self.held is None and self.search(normalized(obj)).is_lost):
             super().put(obj)
 
 
 def normalized(request: str) -> str:
-    """The name that a request means: without an article, and one name for all words for people."""
+    """Return the canonical form of a requested name: drop articles, and map all words for people to one."""
     name = " ".join(request.casefold().split())
     name = _ARTICLE.sub("", name, count=1)
     return SOMEBODY if name in PERSON_WORDS else name
 
 
 def is_name(request: str) -> bool:
-    """Whether a request looks like the name of a person, since it is capitalized."""
+    """Return whether a request looks like the name of a person because it is capitalized."""
     return request.strip()[:1].isupper()

@@ -1,4 +1,4 @@
-"""How programs are simulated, which a suite chooses, and how requests are understood."""
+"""The settings by which a suite simulates programs, and the rules for matching requests with labels."""
 
 from __future__ import annotations
 
@@ -23,58 +23,58 @@ Matching: TypeAlias = Literal["label-in-request", "whole-words"]
 
 @dataclass(frozen=True)
 class Limits:
-    """The resources of one run; beyond them it ends with status `timeout`."""
+    """The resources that one run may use; beyond any limit it ends with status `timeout`."""
 
-    seconds: float = 3600.0  # simulated
-    calls: int = 1_000  # of skills; sleeping does not count
-    ticks: int = 200_000  # fuel: turns of loops and entries of functions
-    text: int = 10_000  # characters of one text that a skill is given
-    trace: int = 1_000_000  # characters of all texts of a trace
+    seconds: float = 3600.0  # simulated seconds
+    calls: int = 1_000  # skill calls; sleeping does not count
+    ticks: int = 200_000  # fuel: loop iterations and function calls
+    text: int = 10_000  # characters of one text passed to a skill
+    trace: int = 1_000_000  # characters of all texts in a trace
 
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """How a suite wants its worlds simulated; the defaults are those of the paper's suite."""
+    """How a suite simulates its worlds; the defaults are the settings of the paper's suite."""
 
-    # The string literals of a program are lowered before the run, as the authors of the paper did.
+    # `lowercase` converts a program's string literals before the run, as the authors of the paper did.
     literals: Literal["lowercase", "as-written"] = "lowercase"
-    # A label of the world is looked for anywhere in a request, or as whole words in the singular or plural.
+    # Whether a world's label may match anywhere in a request, or only whole words, in the singular or plural.
     matching: Matching = "label-in-request"
-    # Everybody answers to any name, or each to their own, to a word for people, and to no name at all.
+    # Whether people answer to any name, or only to their own, to a word for people and to no name at all.
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
-    words_for_people: tuple[str, ...] = ()  # regexes
-    # Regexes for further words for yes and no in options. An option with a word for no is never a yes. People
-    # who answer yes choose an option that says neither if there is just one.
+    words_for_people: tuple[str, ...] = ()  # regexes for words that mean any person
+    # Regexes for other words for yes and no in options. An option with a word for no never means yes. People
+    # who say yes choose an option that has neither, if there is only one.
     words_for_yes: tuple[str, ...] = ()
     words_for_no: tuple[str, ...] = ()
-    # Drives, picks and places are recorded in the words of the request, or by the names of the room and the
-    # thing; a drive to no room is then no event.
+    # Whether events record the words of the request, or the name of the actual room or thing; `as-happened`
+    # records no event for a drive to an unknown room.
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)
-    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # time on the clocks when the run starts
+    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # clock time when a run starts
 
 
 PAPER_SETTINGS = SimulationSettings()
-ENDLESS = Limits(calls=10**12, trace=10**12)  # on a robot, where each skill refuels the program
+ENDLESS = Limits(calls=10**12, trace=10**12)  # for live robots, where each skill refuels the program
 
 
-# --- how requests are understood
+# --- matching requests with labels
 
 
 def is_in_request(label: str, request: str) -> bool:
-    """Whether a label of the world, a regex, is found in a request of the program."""
+    """Return whether a world's label, which is a regex, matches in a program's request."""
     return _pattern(label).search(request) is not None
 
 
 def finds(request: str, label: str, matching: Matching) -> bool:
-    """Whether a request of the program finds a label of the world, a regex, or is that label."""
+    """Return whether a world's label, which is a regex, matches in a program's request or equals it."""
     pattern = label if matching == "label-in-request" else whole_words(label)
     return is_in_request(pattern, request) or request.lower() == label.lower()
 
 
 @lru_cache(maxsize=4096)
 def whole_words(label: str) -> str:
-    """A regex for the matches of another one as whole words, in the singular or the plural."""
+    """Return a regex that matches a label as whole words only, in the singular or the plural."""
     return rf"(?<!\w)(?:{_anchored(scope_flags(label))})(?:e?s)?(?!\w)"
 
 
@@ -87,22 +87,22 @@ _ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
 
 
 def _anchored(label: str) -> str:
-    """A label that tries alternatives with a leading `.*` at the start only, which takes linear time.
+    """Anchor alternatives with a leading `.*` to the start, so that a label matches in linear time.
 
-    It matches the same requests, since such an alternative that matches anywhere matches from the start.
+    The label matches the same requests, since `.*` can match everything before the rest of the alternative.
     """
     return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
 
 
 def is_called(person: Person, request: str, settings: SimulationSettings) -> bool:
-    """Whether a request means a person: by no name, their own, or a word for people."""
+    """Return whether a request refers to a person: by no name, by their own or by a word for people."""
     if settings.people == "answer-to-any-name" or not request.strip():
         return True
     return any(finds(request, name, settings.matching) for name in (person.name, *settings.words_for_people))
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """The first room whose name is in a request; with whole words, preferably one of exactly that name."""
+    """Return the first room whose name matches a request, or None; whole words prefer an exact match."""
     return _resolve_room(tuple(rooms), request, matching)
 
 
@@ -116,11 +116,11 @@ def _resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> s
 def choose(
     answer: Answer, question: str, options: tuple[Option, ...], settings: SimulationSettings = PAPER_SETTINGS
 ) -> int | None:
-    """The position of the option that an answer means.
+    """Return the position of the option that an answer refers to, or None if there is none.
 
-    The answer is looked for in the options. Failing that, a yes or a no is looked for in the further words of
-    the settings; any other answer is a yes or a no to the question. A number means the nearest option,
-    counted from 1, or from the end if it is negative.
+    First, look for the answer in the options. If no option has it, look for yes or no in the settings' other
+    words; any other answer means yes if it matches the question, and no otherwise. A number selects the
+    nearest option, counted from 1, or from the end if it is negative.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
@@ -135,7 +135,7 @@ def choose(
 
 
 def _in_other_words(answer: str, options: tuple[Option, ...], settings: SimulationSettings) -> int | None:
-    """The option that means yes or no; a single option that does not mean no means yes."""
+    """Return the option that means yes or no; a single option that does not mean no counts as yes."""
     if answer == "no":
         return _first_saying(settings.words_for_no, options, settings.matching)
     no = ("no", *settings.words_for_no)

@@ -1,4 +1,4 @@
-"""Serves the skill calls of one program's child, and determines how the run ended."""
+"""Answers the skill calls of the child that runs one program, and determines how the run ended."""
 
 from __future__ import annotations
 
@@ -17,15 +17,13 @@ from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
-ParameterDescription: TypeAlias = tuple[
-    str, str, tuple[Scalar, ...], str
-]  # name, kind, choices if any, and words
+ParameterDescription: TypeAlias = tuple[str, str, tuple[Scalar, ...], str]  # name, kind, choices, words
 SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
-OVERRUN = 100  # requests beyond a limit, such as from `finally`, before the child is killed
+OVERRUN = 100  # requests after a limit, such as from `finally`, until the child is killed
 
 
 class SkillProtocol:
-    """One run: answers the requests of a fresh child until it ends."""
+    """Answers the requests of one new child until its run ends."""
 
     def __init__(self, child: IsolatedProcess, code: bytes, robot: SkillPerformer) -> None:
         self.child, self.robot, self.limits = child, robot, robot.settings.limits
@@ -35,7 +33,7 @@ class SkillProtocol:
         child.send((code, describe_skills(robot), run_parameters(robot)))
 
     def outcome(self) -> Outcome:
-        """Answer all requests, and return the outcome."""
+        """Answer all requests, and return the outcome of the run."""
         try:
             final = self.talk()
         except TimeoutError:
@@ -47,7 +45,7 @@ class SkillProtocol:
                 Status.KILLED, "Crash", f"the program wrote to the sandbox channel: {error}"
             )
         except BaseException:
-            with suppress(LostProcessError):  # which would hide the first error
+            with suppress(LostProcessError):  # it would hide the first error
                 self.child.end()
             raise
         if final is None and self.ledger.limit is None:
@@ -57,7 +55,7 @@ class SkillProtocol:
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer requests, and return the child's last message, which says how it ended, if any."""
+        """Answer requests, and return the child's last message, which says how it ended, or None."""
         overrun = 0
         while (message := self.child.receive()) is not None:
             self._heard = True
@@ -67,7 +65,7 @@ class SkillProtocol:
                 case [str() as name, list() as values, int() | float() as now]:
                     line = 0
                 case [str() as name, list() as values, int() | float() as now, int() as line]:
-                    pass  # from a live program; it may be a lie, and is only shown
+                    pass  # from a live program; only for display, since it may be false
                 case _:
                     raise ProtocolError("a request is malformed")
             if self.robot.is_live:
@@ -97,7 +95,7 @@ class SkillProtocol:
             case "too-long", _:
                 self.ledger.limit = too_long(self.limits)
             case _:
-                raise ProtocolError("there is no such skill")
+                raise ProtocolError("there is no skill with this name")
         return STOP
 
     def _died(self, status: int) -> Outcome:
@@ -108,7 +106,7 @@ class SkillProtocol:
 
 
 def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
-    """The skills of a robot for a child: names and parameters."""
+    """Describe a robot's skills for a child, by name and parameters."""
     return tuple(
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
         for skill in robot.skills.rows
@@ -116,23 +114,23 @@ def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
-    """The parameters of a run: fuel, simulated seconds, start of the clocks, whether it is live."""
+    """Return a run's parameters: fuel, simulated seconds, start of the clocks, and whether it is live."""
     settings = robot.settings
     return settings.limits.ticks, settings.limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
-    """The arguments of a skill in the robot's form; ProtocolError if they do not fit its parameters."""
+    """Convert a skill's arguments for the robot; raise ProtocolError if they do not fit its parameters."""
     if len(values) != len(skill.parameters):
-        raise ProtocolError("a skill has other parameters")
+        raise ProtocolError("a skill call has the wrong number of arguments")
     arguments: list[Argument] = []
     for parameter, value in zip(skill.parameters, values, strict=True):
         if parameter.is_options and isinstance(value, list):
             arguments.append(tuple(_option(option) for option in value))
         elif not parameter.is_options and parameter.type.fits(value):
-            arguments.append(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]  # fits
+            arguments.append(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]  # `fits` has checked its type
         else:
-            raise ProtocolError("an argument is of another type")
+            raise ProtocolError("an argument has the wrong type")
     return arguments
 
 

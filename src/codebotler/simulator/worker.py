@@ -1,4 +1,4 @@
-"""A worker: a preparer and fork servers, which run programs one at a time."""
+"""Runs programs one at a time, with a preparer and fork servers."""
 
 from __future__ import annotations
 
@@ -22,53 +22,53 @@ from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import SkillProtocol
 
-run_log = logging.getLogger("codebotler.engine.events")  # start and end of each run, at DEBUG
+run_log = logging.getLogger("codebotler.engine.events")  # logs the start and end of each run, at DEBUG
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
-"""A program, and the factories of the robots of its runs."""
+"""A program, and one function per run that creates its robot."""
 Meanwhile: TypeAlias = Callable[[], object]
-"""Called while a child runs programs; its result is ignored."""
+"""A function to call while a child runs programs; its result is ignored."""
 DO_NOTHING: Meanwhile = bool
 
 
 class Worker:
-    """The processes that run programs one at a time.
+    """Owns the processes that run programs, one at a time.
 
-    Nearly all programs are tame: several of them share a child, which has copies of their robots. Each run of
-    another program, or one that the shared child could not decide, has a child of its own, and the engine
-    performs its skills. Their fork server has the standard library, and starts when it is first needed.
+    Nearly all programs are tame: many of them share a child, which has copies of their robots. Any other run,
+    and each one that the shared child cannot decide, gets its own child, and the engine performs its skills.
+    The fork server for these runs holds the standard library, and starts when it is first needed.
     """
 
     def __init__(self, *, one_process_per_run: bool = False) -> None:
         self._stopped = False
-        self._child: IsolatedProcess | None = None  # runs batches
+        self._child: IsolatedProcess | None = None  # the child that runs batches
         self._keeps_child = False
         self._one_process_per_run = one_process_per_run
         self._preparer = Preparer()
         self._fork_servers: dict[str, ForkServer] = {}
         try:
-            self._preparer.start()  # in parallel with the fork server
+            self._preparer.start()  # gets ready while the fork server starts
             first = self._fork_server(FORK_SERVER if one_process_per_run else BATCH_SERVER)
             self.has_seccomp = first.has_seccomp
         except LostProcessError as error:
             self._preparer.close()
             raise EngineError(f"the engine cannot start: {error}") from None
-        except BaseException:  # an interrupt
+        except BaseException:  # such as an interrupt
             self._preparer.close()
             raise
 
     def run(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program with a robot, and again with a new one if a process was lost."""
+        """Run a program with a robot; if a process is lost, repeat the run with a new robot."""
         return self.run_all([(source, [new_robot])])[0][0]
 
     def run_all(self, jobs: Sequence[Job]) -> list[list[Outcome]]:
-        """Run programs; each outcome depends on the program and its robot only.
+        """Run programs; each outcome depends only on the program and its robot.
 
         Args:
-            jobs: the programs; all robots have equal skills and settings of literals.
+            jobs: the programs; all robots must have the same skills and the same `literals` setting.
 
         Returns:
-            for each program, the outcome with each of its robots; a repeated run has a new robot.
+            each program's outcomes, one per robot; a repeated run gets a new robot.
         """
         known = self.run_tame(jobs)
         return [
@@ -80,9 +80,9 @@ class Worker:
         ]
 
     def run_live(self, source: str, robot: SkillPerformer) -> Outcome:
-        """Run a program on a robot, once only, since actions cannot be undone.
+        """Run a program on a live robot, without retries, since actions cannot be undone.
 
-        Errors of the robot other than `RobotError` end the run and are raised here.
+        Any error of the robot other than `RobotError` ends the run, and is raised here.
         """
         try:
             prepared = self._prepare(source, robot)
@@ -93,33 +93,33 @@ class Worker:
             raise EngineError(stopped) from None
 
     def compiles(self, source: str, robot: SkillPerformer) -> bool:
-        """Whether a program compiles."""
+        """Return whether a program compiles."""
         try:
             return isinstance(self._prepare(source, robot), Prepared)
         except LostProcessError as error:
             raise EngineError(f"an isolated process was lost: {error}") from None
 
     def stop(self) -> None:
-        """End all processes and any current run, from any thread."""
+        """Kill all processes and any current run; call this from any thread."""
         self._stopped = True
         self._preparer.kill()
         for fork_server in list(self._fork_servers.values()):
             fork_server.kill()
 
     def stay_on(self, core: int) -> None:
-        """Pin the processes to one core."""
+        """Pin the worker's fork servers and their children to one core."""
         for fork_server in self._fork_servers.values():
             os.sched_setaffinity(fork_server.pid, {core})
 
     def close(self) -> None:
-        """End all processes; nothing may be running."""
+        """End all processes; call this only while nothing is running."""
         self._end_child()
         self._preparer.close()
         while self._fork_servers:
             self._fork_servers.popitem()[1].close()
 
     def forget(self) -> None:
-        """Close the descriptors in a forked process, which does not own these children."""
+        """Close the descriptors after a fork, in the copy that is not the children's parent."""
         self._preparer.forget()
         if self._child is not None:
             self._child.hang_up()
@@ -131,18 +131,18 @@ class Worker:
         return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
 
     def begin_to_prepare(self, source: str, skills: SkillTable, settings: SimulationSettings) -> None:
-        """Begin to compile a program while the caller prepares its robots."""
+        """Start to compile a program while the caller prepares its robots."""
         try:
             self._preparer.ask_ahead(source, lowercase=settings.literals == "lowercase", skills=tuple(skills))
-        except (LostProcessError, OSError):  # its run tries again, with a new preparer
+        except (LostProcessError, OSError):  # the run will retry with a new preparer
             self._preparer.close()
 
-    # --- several tame programs in a child
+    # --- several tame programs in one child
 
     def run_tame(
         self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
     ) -> dict[tuple[int, int], Outcome]:
-        """The certain outcomes of tame programs by job and robot; `meanwhile` is called while they run."""
+        """Return outcomes of tame programs by job and robot number; undecided runs are missing."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -159,7 +159,7 @@ class Worker:
     def _tame(self, jobs: Sequence[Job]) -> Iterator[tuple[int, bytes, list[SimulatedRobot]]]:
         robot = jobs[0][1][0]()
         if robot.guard is not None and robot.guard.may_refuse:
-            return  # the child's copies cannot refuse actions
+            return  # the child's copies of robots cannot refuse actions
         lowercase = robot.settings.literals == "lowercase"
         sources, skills = [source for source, _ in jobs], tuple(robot.skills)
         answers = self._preparer.prepare_all(sources, lowercase=lowercase, skills=skills)
@@ -174,7 +174,7 @@ class Worker:
         known: dict[tuple[int, int], Outcome],
         meanwhile: Meanwhile,
     ) -> list[tuple[int, bytes, list[SimulatedRobot]]]:
-        """Run programs in one child; return those that it had not begun if it broke off."""
+        """Run programs in one child, and return the programs that it did not begin before it failed."""
         child = self._child = self._child or self._fork_server(BATCH_SERVER).fork()
         for number, _, robots in batch:
             for _ in robots:
@@ -200,7 +200,7 @@ class Worker:
 
     @contextmanager
     def one_child(self) -> Iterator[None]:
-        """Let one child run all batches in this context, which are of one program."""
+        """Run all batches in this context in the same child; they must belong to one program."""
         self._keeps_child = True
         try:
             yield
@@ -209,28 +209,28 @@ class Worker:
             self._end_child()
 
     def _end_child(self) -> None:
-        """End the child of the last batch, and fork the next one ahead of need."""
+        """Kill the last batch's child, and fork the next one in advance."""
         child, self._child = self._child, None
         if child is None:
             return
         server = self._fork_servers.get(BATCH_SERVER)
-        if not isinstance(server, BatchServer) or server.has_ended:  # its child has ended, too
+        if not isinstance(server, BatchServer) or server.has_ended:  # its child has ended with it
             child.hang_up()
             return
-        with suppress(LostProcessError):  # it may end at any moment
+        with suppress(LostProcessError):  # the server may end at any moment
             child.kill()
         child.hang_up()
         server.fork_ahead()
 
-    # --- a child for each run
+    # --- one child per run
 
     def run_alone(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program, and again with a new robot if a process was lost through no fault of the program."""
+        """Run a program; if a process is lost through no fault of the program, repeat with a new robot."""
         _log(source, "started")
         try:
             outcome = self._try(source, new_robot)
         except LostProcessError as first:
-            _log(source, f"a process was lost, and it is run again: {first}")
+            _log(source, f"a process was lost, so the run is repeated: {first}")
             try:
                 outcome = self._try(source, new_robot)
             except LostProcessError as error:
@@ -273,4 +273,4 @@ def _log_end(source: str, outcome: Outcome) -> None:
 
 
 class EngineError(RuntimeError):
-    """The engine itself failed, which says nothing about a program."""
+    """The engine itself failed, through no fault of a program."""

@@ -185,7 +185,7 @@ def test_model_that_never_answers_as_asked_is_an_error_in_a_sentence(
     with pytest.raises(PerceptionError) as error:
         detector.look(PICTURE, "mug")
     assert len(server.requests) == MAX_REPLIES
-    assert re.match("openai-chat:eyes .* 3 tries", error.value.sentence)
+    assert re.match("openai-chat:eyes .* 3 attempts", error.value.sentence)
     assert "[bold]I can't" in error.value.sentence
     assert KEY not in error.value.sentence
     server.answer = lambda _: FOUND

@@ -553,9 +553,9 @@ def test_suite_sets_the_limits() -> None:
     bodies = {
         "time.sleep(11)": "10 seconds of simulated time",
         "for i in range(4): say('a')": "3 skill calls",
-        "for i in range(60): pass": "50 turns of loops",
+        "for i in range(60): pass": "50 loop iterations",
         "say('abcdef')": "a text of more than 5 characters",
-        "for i in range(3): say('abcde')": "texts of more than 12 characters in all",
+        "for i in range(3): say('abcde')": "texts of more than 12 characters in total",
     }
     pairs = ((f"def task_program():\n    {body}\n", WORLD) for body in bodies)
     outcomes = run(pairs, workers=1, settings=SimulationSettings(limits=limits))

@@ -408,7 +408,7 @@ def test_no_program_forges_a_violation(worker: Worker) -> None:
 def test_an_option_that_is_no_text_is_refused() -> None:
     one = robot(rule('not tr.Exists(ask("tea", "^no$"))'))
     error = refused(one, "ask", "ann", "tea?", (Option("1", is_text=False),))
-    told = 'the rule "vault" cannot judge asking "tea?", which offers an option that is no text: '
+    told = 'the rule "vault" cannot judge asking "tea?", which offers an option that is not text: '
     assert str(error).startswith(told.replace("vault", error.rule.name))
 
 

@@ -330,7 +330,7 @@ WORKS: dict[str, tuple[str, object]] = {
 T = Status.TIMEOUT
 P = Status.PYTHON_ERROR
 ON_THE_LINE = "the program wrote to the sandbox channel"
-SPENT = "200,000 turns of loops"
+SPENT = "200,000 loop iterations"
 TOO_DEEP = "the program is too large, or nested too deeply"
 SUPPRESSED = "from contextlib import suppress\nwith suppress(BaseException):\n    while 1: pass\n"
 FAILS: dict[str, tuple[str, object]] = {
@@ -496,7 +496,7 @@ FAILS: dict[str, tuple[str, object]] = {
     ),
     "deadlock": (
         task("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()"),
-        (T, "TimeoutError", "it waits for something that can never come"),
+        (T, "TimeoutError", "it waits for something that can never happen"),
     ),
     "allocates without end": (
         task("parts = []\nwhile True: parts.append(bytearray(10**7))"),
@@ -593,7 +593,7 @@ LIMITS = {
     "trace": (
         "for i in range(100): say('x' * 10_000)",
         "say('x')",
-        "texts of more than 1,000,000 characters in all",
+        "texts of more than 1,000,000 characters in total",
     ),
 }
 WITHIN: dict[str, tuple[str, object]] = {

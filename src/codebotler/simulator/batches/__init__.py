@@ -1,1 +1,1 @@
-"""Batches: `process` runs tame programs in a closed child, `replay` repeats their skill calls."""
+"""Runs tame programs in batches: `process` in a closed child, `replay` to check its transcripts."""

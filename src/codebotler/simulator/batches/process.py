@@ -1,7 +1,7 @@
-"""Runs tame programs in a closed child, each in all of its worlds, and writes a transcript of each run.
+"""Runs tame programs in a closed child, each in all its worlds, and sends a transcript of each run.
 
-The child has a copy of each robot and its ledger, so that programs never wait for the engine. The engine does
-not trust the transcripts: it replays each on its own robot, which must give the same answers.
+The child has its own copy of each robot and ledger, so programs never wait for the engine. The engine does
+not trust the transcripts: it replays each one on its own robot, which must give the same answers.
 """
 
 from __future__ import annotations
@@ -35,23 +35,23 @@ if TYPE_CHECKING:
     from codebotler.simulator.sandbox.execution import SkillDescriptions
     from codebotler.simulator.sandbox.isolation import Filter
 
-    Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # a skill, its arguments, and the answer
+    Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # skill, arguments, kind and value of answer
     Batch: TypeAlias = tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]
 
 __all__ = ["get_ready", "serve"]
 
-# Alone in a process, a program may call itself far deeper: a run that is too deep here is repeated there.
+# A program alone in a process may recurse far deeper, so a run that is too deep here is repeated there.
 BATCH_RECURSION_LIMIT = 400
-MAX_PLAIN_CALLS = 50  # calls that are written one by one, even if some are equal
-MAX_CALL_BYTES = 50_000  # bytes of the arguments of a skill, so that they fit into a frame
-SURROGATE_ESCAPE = b"\\ud"  # in JSON
-UNDECIDED_RUN = b"null"  # in place of a transcript: the run must be repeated alone
+MAX_PLAIN_CALLS = 50  # in a longer transcript, equal calls are written only once
+MAX_CALL_BYTES = 50_000  # bytes of a skill's arguments, which must fit into a frame
+SURROGATE_ESCAPE = b"\\ud"  # start of a surrogate in JSON
+UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in its own process
 
 
 def get_ready(
     _role: str,
 ) -> tuple[socket, TranscribedRun, Callable[[TranscribedRun], None], Filter | None, int]:
-    """Prepare everything that batches share, and return the arguments of `serve`."""
+    """Prepare everything that batches share, and return the arguments for `serve`."""
     door = socket(fileno=RUN_DOOR)
     run = TranscribedRun()
     simulate_environment(run)
@@ -73,10 +73,10 @@ def _receive_setup(door: socket) -> bytes:
 
 
 def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
-    """Run batches of programs that the engine sends, and send their transcripts, until the engine hangs up.
+    """Run the batches that the engine sends, and send back transcripts, until the engine hangs up.
 
-    A child is forked ahead of its work, and rehearses first: the kernel copies each page at the first write,
-    which takes longer than most batches.
+    A child is forked before it is needed, and rehearses first: the kernel copies each page on the first
+    write, which takes longer than most batches.
     """
     transcripts(run, rehearsal)
     while True:
@@ -88,7 +88,7 @@ def transcripts(
     batch: Batch,
     send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # a rehearsal sends nothing
 ) -> None:
-    """Run programs, each in all of its worlds, and send the transcripts of each program."""
+    """Run each program of a batch in all its worlds, and send the transcripts of each program."""
     skills, elsewhere, pickled, programs = batch
     if skills != run.skills:
         run.provide(skills)
@@ -96,13 +96,13 @@ def transcripts(
     robots = unpickled(pickled)  # noqa: S301 - from the engine
     for code, numbers in programs:
         compiled = loads(code)  # noqa: S302 - from the engine
-        # A run that may ask the engine needs all transcripts before it to be sent.
+        # Before a run asks the engine for a skill, all earlier transcripts must have been sent.
         for group in [[number] for number in numbers] if elsewhere else [numbers]:
             send([run.transcript(compiled, *robots[number]) for number in group])
 
 
 class TranscribedRun(ProgramRun):
-    """Runs one tame program after the other, and records the skill calls of each."""
+    """Runs tame programs one after another, and records the skill calls of each."""
 
     recursion_limit = BATCH_RECURSION_LIMIT
 
@@ -114,13 +114,13 @@ class TranscribedRun(ProgramRun):
         self.builtins = {**given, **self.counters(), "__import__": lambda *_: sys.modules["time"]}
 
     def provide(self, skills: SkillDescriptions) -> None:
-        """Give programs the skills, `time`, and the builtins of tame programs."""
+        """Provide programs with the skills, `time` and the builtins for tame programs."""
         self.skills = skills
         self.provided = {name: self.skill(name, parameters) for name, parameters in skills}
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
 
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
-        """Run a program with a robot, and return the transcript."""
+        """Run a program on a new robot, and return the transcript."""
         self._reset(ROBOTS[kind](*arguments))
         settings = self.ledger.robot.settings
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
@@ -149,8 +149,8 @@ class TranscribedRun(ProgramRun):
         self._calls: list[Called] = []
         self._moments: list[tuple[int, float]] = []
 
-    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
-        """Let the copy of the robot execute a skill."""
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
+        """Execute a skill on this process's copy of the robot."""
         given = [
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
         ]
@@ -158,7 +158,7 @@ class TranscribedRun(ProgramRun):
             if self.now != self._reported_time:
                 self._let_time_pass()
             answer = None if name in self.elsewhere else self.ledger.perform(name, given)
-        except BaseException:  # no fault of the program, unless it has reached a limit
+        except BaseException:  # the program is not at fault unless it reached a limit
             self.is_undecided = self.is_undecided or not self.spent
             raise
         if answer is None:
@@ -174,7 +174,7 @@ class TranscribedRun(ProgramRun):
         return value.copy() if type(value) is list else value
 
     def _let_time_pass(self) -> None:
-        """Report the program's clock to the ledger, and end the run when its time is up."""
+        """Report the program's clock to the ledger, and end the run if its time is up."""
         self._reported_time = self.now
         self._moments.append((len(self._calls), float(self.now)))
         self.ledger.let_time_pass(self.now)
@@ -184,12 +184,12 @@ class TranscribedRun(ProgramRun):
             raise LimitReachedError
 
     def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
-        """End the run, since its time is up."""
+        """End the run because its time is up."""
         self._let_time_pass()
         raise LimitReachedError
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Notice if a program has caught an error that depends on its process."""
+        """Return a function that detects whether a program caught an error that depends on its process."""
 
         def caught() -> None:
             error = sys.exc_info()[0]
@@ -200,7 +200,7 @@ class TranscribedRun(ProgramRun):
         return caught
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe what ended the program."""
+        """Describe the error that ended the program."""
         try:
             str(error)
         except (RecursionError, MemoryError):
@@ -217,8 +217,8 @@ class TranscribedRun(ProgramRun):
             )
         return data
 
-    def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - what a skill returns
-        """Let the engine's robot execute a skill, after all calls before it."""
+    def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - a skill may return any type
+        """Let the engine's robot execute a skill, after it has repeated all earlier calls."""
         self._calls.append((name, given, "ask", None))
         data = self._written("null")
         if self.is_undecided:
@@ -227,9 +227,7 @@ class TranscribedRun(ProgramRun):
         self._forget_calls()
         kind, value, self.now = receive_at_once()
         if kind == "error":
-            self.ledger.errors.append(
-                RobotError(*value[1:])
-            )  # so that later errors have the engine's numbers
+            self.ledger.errors.append(RobotError(*value[1:]))  # keeps the numbering in step with the engine's
             raise robot_error(*value)
         if kind == "stop":
             self.spent = True
@@ -237,14 +235,14 @@ class TranscribedRun(ProgramRun):
         return value
 
 
-def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - of any type of skills
+def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - a skill may take any type
     if kind == "list":
         return tuple([Option(str(each), isinstance(each, str)) for each in value])
     return tuple(value) if type(value) is list else value
 
 
 def _is_plain(given: Argument) -> bool:
-    """Whether texts are short, and have no lone surrogates, which JSON could join."""
+    """Return whether the argument's text is short and has no lone surrogates, which JSON could join."""
     if isinstance(given, tuple):
         text = "".join([str(each[0] if isinstance(each, Option) else each) for each in given])
     else:
@@ -256,7 +254,7 @@ def _is_plain(given: Argument) -> bool:
 
 
 def _distinct(calls: list[Called]) -> tuple[list[Called], list[int]]:
-    """The different calls, and the position of each call among them."""
+    """Return the distinct calls, and for each call its position among them."""
     positions: dict[object, int] = {}
     different: list[Called] = []
     order = []

@@ -1,4 +1,4 @@
-"""Replays the transcripts of a batch on the engine's own robots, and refuses false ones."""
+"""Replays the transcripts of a batch on the engine's own robots, and rejects false transcripts."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from codebotler.simulator.sandbox import MAX_FRAME
 from codebotler.simulator.skill_protocol import SkillDescriptions, describe_skills
 
 Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
-"""The code of each program, and a robot for each of its runs."""
+"""Each program's code, with one robot for each run."""
 
 
 class Call(NamedTuple):
-    """A call of a skill, and its answer."""
+    """A skill call and its answer."""
 
     skill: str
     arguments: tuple[Scalar | tuple[Option | Scalar, ...], ...]
-    kind: str  # of the answer; `ask` if only the engine knows it, `time` if only time passes
+    kind: str  # kind of answer; `ask` if only the engine can give it, `time` if the program only waits
     value: Any
 
 
 class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A child's report of a run: the skill calls of the program, and how it ended."""
+    """A child's report on a run: the program's skill calls, and how it ended."""
 
     calls: list[Call]
-    order: list[int] | None  # positions in `calls`; None for each once
-    moments: list[tuple[int, float]]  # number of a call, and the clock from then on
-    end: dict[str, Any] | None  # None if the child waits for the last answer
+    order: list[int] | None  # positions in `calls`; None if each call occurs once, in order
+    moments: list[tuple[int, float]]  # number of a call, and the clock's time from that call on
+    end: dict[str, Any] | None  # None if the child is waiting for the answer to the last call
 
 
-ReplayKey: TypeAlias = tuple[Any, ...]  # a sent transcript, and the ids of the parts of its robot
-MAX_REPLAYS, MAX_REPLAY_BYTES = 2_048, 4_096  # transcripts, and bytes of one
-# Outcomes of transcripts; with the objects of their keys, so that no other object gets the same id.
+ReplayKey: TypeAlias = tuple[Any, ...]  # a received transcript, and the ids of the parts of its robot
+MAX_REPLAYS, MAX_REPLAY_BYTES = 2_048, 4_096  # cached transcripts, and bytes of each
+# Cached outcomes; each entry keeps the objects of its key alive so that their ids are not reused.
 REPLAYED: dict[ReplayKey | None, tuple[Outcome, SkillTable, Setup]] = {}
-LAST_MOMENT = (-1, 0.0)  # follows the moments of a transcript
+LAST_MOMENT = (-1, 0.0)  # marks the end of a transcript's moments
 ONLY_TIME: SkillAnswer = ("time", None)
 TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 
@@ -53,7 +53,7 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """The message to a child with programs, whose robots all have the same skills."""
+    """Return the message that sends programs to a child; all their robots must have the same skills."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []
@@ -69,10 +69,10 @@ def message(
 def outcomes(
     child: IsolatedProcess, programs: Programs, meanwhile: Callable[[], object] = bool
 ) -> Iterator[Outcome | None]:
-    """Let a child run programs, and yield each outcome in order; None if the run must be repeated alone.
+    """Run programs in a child; yield the outcomes in order, or None for a run that must be repeated alone.
 
-    `meanwhile` is called while the child is busy. Raises LostProcessError, ProtocolError or TimeoutError if
-    the child becomes useless.
+    `meanwhile` is called while the child is busy. Raise LostProcessError, ProtocolError or TimeoutError if
+    the child can no longer be used.
     """
     child.send(message(programs), at_once=True)
     meanwhile()
@@ -84,19 +84,19 @@ def outcomes(
 def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
     frame = _frame(child)
     key = key_of(frame, robot)
-    if (known := REPLAYED.get(key)) is not None:  # another thread may clear it
+    if (known := REPLAYED.get(key)) is not None:  # another thread may clear the cache
         return known[0]
     replay = Replay(robot)
     while (transcript := parse_transcript(frame)) is not None:
         answer = replay.follow(transcript)
         if replay.ledger.broken is not None:
             if transcript.end is None:
-                raise ProtocolError("a rule ends the run, and the child waits")
-            return None  # alone, the run also has the line at which the rule ends it
+                raise ProtocolError("a rule ends the run, but the child is waiting")
+            return None  # repeat the run alone, to learn the line at which the rule ended it
         if transcript.end is not None:
             outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
-                raise ProtocolError("an end is malformed")
+                raise ProtocolError("the end of a run is malformed")
             if key is not None:
                 if len(REPLAYED) >= MAX_REPLAYS:
                     REPLAYED.clear()
@@ -110,46 +110,46 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
 def _frame(child: IsolatedProcess) -> bytes:
     frame = child.receive_bytes(MAX_FRAME)
     if frame is None:
-        raise LostProcessError("a child ended in the middle of a batch")
+        raise LostProcessError("a child ended during a batch")
     return frame
 
 
 def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
-    """The cache key of a transcript; None for a long one, or a robot that is not a plain copy."""
+    """Return the cache key of a transcript, or None if it is too long or its robot is not a plain copy."""
     if len(frame) > MAX_REPLAY_BYTES or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
 
 
 def parse_transcript(frame: bytes) -> Transcript | None:
-    """Parse a transcript; None if the run must be repeated alone."""
+    """Parse a transcript; return None if the run must be repeated in a process of its own."""
     try:
-        return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # of its type
+        return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         raise ProtocolError("a transcript is malformed") from None
 
 
 class Replay:
-    """Repeats the skill calls of a transcript on the engine's own robot."""
+    """Repeats a transcript's skill calls on the engine's own robot."""
 
     def __init__(self, robot: SimulatedRobot) -> None:
         self.robot, self.ledger = robot, RememberingLedger(robot)
         self._signatures, self._own = signatures(robot.skills), robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
-        """Repeat all calls, and return the last answer; ProtocolError if one differs."""
+        """Repeat all calls, and return the last answer; raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][2] is not None):
-            raise ProtocolError("a child waits for nothing")
+            raise ProtocolError("the child is waiting for nothing")
         order = range(len(calls)) if transcript.order is None else transcript.order
         if transcript.order and not 0 <= min(order) <= max(order) < len(calls):
-            raise ProtocolError("there is no such call")
+            raise ProtocolError("a call does not exist")
         ledger, moments = self.ledger, iter((*transcript.moments, LAST_MOMENT))
         changes, later = next(moments)
         answer: SkillAnswer = ("ok", None)
         for number, place in enumerate(order):
             if ledger.limit is not None:
-                raise ProtocolError("the program goes on beyond a limit")
+                raise ProtocolError("the program continues beyond a limit")
             skill, arguments, expected = calls[place]
             if number == changes:
                 self._let_time_pass(later, is_last=expected == ONLY_TIME)
@@ -162,29 +162,29 @@ class Replay:
             if expected is not None and expected != (
                 answer if answer[0] != "error" else ("error", answer[1][1:])
             ):
-                raise ProtocolError("the robot answers otherwise")
+                raise ProtocolError("the robot gives a different answer")
         if next(moments, None) is not None:
             raise ProtocolError("moments are out of order")
         return answer
 
     def _let_time_pass(self, now: float, *, is_last: bool) -> None:
         if now < self.robot.now:
-            raise ProtocolError("time goes back")
+            raise ProtocolError("time runs backwards")
         self.ledger.let_time_pass(now)
         if self.ledger.limit is not None and not is_last:
-            raise ProtocolError("the program goes on when its time is up")
+            raise ProtocolError("the program continues after its time is up")
 
     def _expected(self, call: Call) -> tuple[str, Sequence[Argument], SkillAnswer | None]:
-        """A call with its expected answer, if that is known."""
+        """Return a call with its expected answer, or with None if only the engine knows the answer."""
         if call.kind == "time":
             return "", (), ONLY_TIME
         signature = self._signatures.get(call.skill)
         if signature is None or (tuple(map(type, call.arguments)) != signature and not self._fits(call)):
-            raise ProtocolError("there is no such skill, or it has other parameters")
+            raise ProtocolError("there is no skill with this name and these parameters")
         if call.kind == "ask" and call.skill not in self._own:
-            raise ProtocolError("the child could have answered")
+            raise ProtocolError("the child could have answered this call itself")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
-        arguments: Any = call.arguments  # which fit
+        arguments: Any = call.arguments  # checked above
         return call.skill, arguments, None if call.kind == "ask" else (call.kind, value)
 
     def _fits(self, call: Call) -> bool:
@@ -200,7 +200,7 @@ def _fits(parameter: Parameter, given: object) -> bool:
 
 @lru_cache(maxsize=16)
 def signatures(skills: SkillTable) -> dict[str, tuple[type, ...]]:
-    """The types of the arguments of each skill; `object` for those that need another check."""
+    """Return the argument types of each skill; `object` marks an argument that needs a further check."""
     return {
         skill.name: tuple(str if p.type == TEXT_TYPE else object for p in skill.parameters)
         for skill in skills.rows

@@ -1,1 +1,1 @@
-"""The engine's side of isolated processes: their code, start, messages and end."""
+"""The engine's side of isolated processes: compiles their code, starts them, talks to them and ends them."""

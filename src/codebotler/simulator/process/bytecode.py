@@ -1,4 +1,4 @@
-"""The compiled code of isolated processes: our modules and the standard library."""
+"""Compiles the code that isolated processes run: our modules and the standard library."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIMULATOR = __package__.rpartition(".")[0]
 SANDBOX = Path(__file__).parents[1] / "sandbox"
 SKILLS_FOLDER = SANDBOX.parents[1] / "core" / "skills"
 CORE, BATCHES = "codebotler.core", f"{SIMULATOR}.batches"
-# Further modules of a child that has robots.
+# Additional modules for children that hold robots.
 SIMULATION_MODULES = (
     f"{BATCHES}.process",
     *(
@@ -38,7 +38,7 @@ SIMULATION_MODULES = (
 
 
 def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
-    """The code of all modules of a role, by name, as one message."""
+    """Return the code of all modules for a role, by name, as one marshalled message."""
     further = SIMULATION_MODULES if role == BATCH_SERVER else ()
     package = f"{SIMULATOR}.sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
@@ -55,7 +55,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
 
 
 def stdlib_files() -> dict[str, Path]:
-    """Most modules of the standard library that programs can import, and their submodules."""
+    """Find the files of the standard library modules that programs can import, and of their submodules."""
     folder, files = Path(os.__file__).parent, {}
     for name in IMPORTED:
         path = folder.joinpath(*name.split("."))
@@ -69,13 +69,13 @@ def stdlib_files() -> dict[str, Path]:
 
 
 def code_of(file: str, shown: str) -> bytes:
-    """The code of one module, the same for all options of the interpreter; tracebacks name `shown`."""
+    """Return a module's code, whatever the interpreter's options; tracebacks show the file name `shown`."""
     code = None
     if not sys.flags.optimize:
-        with contextlib.suppress(EOFError, ImportError, ValueError):  # damaged bytecode
+        with contextlib.suppress(EOFError, ImportError, ValueError):  # the bytecode file is damaged
             code = SourceFileLoader(shown, file).get_code(shown)
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
-        # An interpreter without columns wrote it, so that it is shorter.
+        # An interpreter that omits column numbers wrote it, so it is shorter.
         return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
     return dumped(code, shown)
 
@@ -84,12 +84,12 @@ compiled = cache(code_of)
 
 
 def compiled_source(source: str, shown: str) -> bytes:
-    """The code of a source text."""
+    """Compile a source text."""
     return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), shown)
 
 
 def dumped(code: CodeType, shown: str) -> bytes:
-    """Code without paths, whose length would change addresses in memory."""
+    """Serialize code without paths, since their length would change memory addresses."""
 
     def nameless(code: CodeType) -> CodeType:
         parts = (nameless(part) if isinstance(part, CodeType) else part for part in code.co_consts)

@@ -1,9 +1,9 @@
-"""Errors of isolated processes."""
+"""Errors of the communication with isolated processes."""
 
 
 class LostProcessError(Exception):
-    """A process ended before it was isolated, through no fault of the program."""
+    """A process ended through no fault of the program, such as before it was isolated."""
 
 
 class ProtocolError(Exception):
-    """The program has written to the channel: our own code never sends such messages."""
+    """The program wrote to the channel: our own code never sends a message like this."""

@@ -1,4 +1,4 @@
-"""The cause of death of a process, by its exit status."""
+"""Explains why a process died, from its exit status."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import signal
 from codebotler.core.trace import RunError, Status
 from codebotler.simulator.sandbox import CPU_SECONDS
 
-PROCESSOR_TIME = "seconds of processor time"  # end of the message about a program that computed for too long
+PROCESSOR_TIME = "seconds of processor time"  # ends the message about a program that used too much of it
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """The cause of death of a process without a last message, by its exit status or minus the signal."""
+    """Explain why a process died without a last message; `status` is its exit status, or minus the signal."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

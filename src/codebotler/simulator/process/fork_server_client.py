@@ -1,4 +1,4 @@
-"""The engine's handle on a fork server, which forks an isolated process for a run or a batch."""
+"""The engine's client of a fork server, which forks an isolated process for each run or batch."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCE
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
 
-REPORT_BYTES = 8  # bytes of a reported number
+REPORT_BYTES = 8  # size of a reported number
 EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
 REHEARSALS = 8
 
-# Typical code of programs. A fork server runs it before it serves, so that all children share the specialized
-# bytecode.
+# Code typical of programs. A fork server runs it first, so that all children share the specialized bytecode.
 WARM_UP = """
 def find(thing, rooms):
     for number, room in enumerate(sorted(rooms)):
@@ -55,11 +54,11 @@ def task_program():
 """
 WARM_UP_CODE = marshal.dumps(prepared(WARM_UP, lowercase=False)[0], WITHOUT_REFERENCES)
 WARM_UP_WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
-WARM_UP_RUNS = 20  # the interpreter specializes code that ran a few times
+WARM_UP_RUNS = 20  # the interpreter specializes code that has run a few times
 
 
 class ForkServer:
-    """One fork server in a role, which forks children one at a time."""
+    """Starts a fork server, and has it fork children one at a time."""
 
     def __init__(self, role: str) -> None:
         self._report, report = os.pipe()
@@ -72,13 +71,13 @@ class ForkServer:
             self._set_up()
         except (LostProcessError, OSError):
             self.close()
-            raise LostProcessError("the fork server does not start") from None
-        except BaseException:  # an interrupt
+            raise LostProcessError("the fork server did not start") from None
+        except BaseException:  # such as an interrupt
             self.close()
             raise
 
     def fork(self) -> IsolatedProcess:
-        """A new child."""
+        """Return a newly forked child."""
         try:
             channel = self._ask_for_channel()
         except OSError:
@@ -87,33 +86,33 @@ class ForkServer:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """The fork server's process id."""
         return self._process.pid
 
     @property
     def has_ended(self) -> bool:
-        """Whether its process has ended."""
+        """Whether the fork server has ended."""
         return self._process.poll() is not None
 
     def kill(self) -> None:
-        """End it and its current run."""
+        """Kill the fork server and its current run."""
         self._process.kill()
 
     def close(self) -> None:
-        """End it and close its descriptors; nothing may be running."""
+        """Kill the fork server and close its descriptors; call this only while nothing is running."""
         self._process.kill()
         self._process.wait()
         os.close(self._report)
         self._door.close()
 
     def forget(self) -> None:
-        """Close its descriptors in a forked process, which is not its parent."""
-        self._process.returncode = 0  # so that `Popen` does not wait for it here
+        """Close the descriptors after a fork, in the copy that is not the fork server's parent."""
+        self._process.returncode = 0  # stops `Popen` from waiting for it here
         os.close(self._report)
         self._door.close()
 
     def _set_up(self) -> None:
-        """Prepare it, and learn whether its children will have a filter of system calls."""
+        """Prepare the fork server, and learn whether its children will have a system call filter."""
         setup = (describe_skills(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
         self._door.sendall(marshal.dumps(setup, WITHOUT_REFERENCES))
         for _ in range(self._read_report()):
@@ -129,7 +128,7 @@ class ForkServer:
         itself.hang_up()
 
     def _rehearse(self) -> None:
-        """Run an empty program, so that the heap of the fork server, which programs can see, is stable."""
+        """Run an empty program until the fork server's heap, which programs can observe, is stable."""
         SkillProtocol(self.fork(), EMPTY_PROGRAM, SimulatedRobot(WARM_UP_WORLD)).outcome()
 
     def _ask_for_channel(self) -> socket.socket:
@@ -144,11 +143,11 @@ class ForkServer:
 
     def _pid_of_child(self) -> int:
         if self._end_is_unread:
-            self._end_of_child()  # of the last child
+            self._end_of_child()  # discards the exit status of the last child
         self._end_is_unread = True
         pid = self._read_report()
-        if pid <= 1:  # a signal to it would hit a whole group of processes
-            raise LostProcessError("the fork server does not say which process it forked")
+        if pid <= 1:  # a signal to such an id would reach a whole group of processes
+            raise LostProcessError("the fork server did not report which process it forked")
         return pid
 
     def _end_of_child(self) -> int:
@@ -163,39 +162,39 @@ class ForkServer:
 
 
 class BatchServer(ForkServer):
-    """A fork server for batches of tame programs, which forks children ahead of time."""
+    """Starts a fork server for batches of tame programs, and has it fork children in advance."""
 
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
         super().__init__(BATCH_SERVER)
 
     def fork(self) -> IsolatedProcess:
-        """A new child, perhaps forked ahead."""
+        """Return a new child, which may have been forked in advance."""
         child, self._next = self._next, None
-        if child is not None and self.has_ended:  # the child's id may be another process's now
+        if child is not None and self.has_ended:  # another process may have the child's id now
             child.hang_up()
             child = None
         return child or super().fork()
 
     def fork_ahead(self) -> None:
-        """Fork the next child now; the last one must have been killed."""
-        with contextlib.suppress(LostProcessError):  # the next fork raises it
+        """Fork the next child in advance; the previous child must have been killed."""
+        with contextlib.suppress(LostProcessError):  # the next fork raises the error
             self._next = super().fork()
 
     def close(self) -> None:
-        """End it and the next child."""
+        """Kill the fork server and the child that it forked in advance."""
         super().close()
         if self._next is not None:
             self._next.hang_up()
 
     def forget(self) -> None:
-        """Close its descriptors in a forked process."""
+        """Close the descriptors after a fork, in the copy that is not the fork server's parent."""
         super().forget()
         if self._next is not None:
             self._next.hang_up()
 
     def _set_up(self) -> None:
-        """Let it run our own programs, which specialize bytecode; tame programs see no addresses."""
+        """Send our own programs to specialize its bytecode; tame programs cannot observe addresses."""
         rehearsal = message([(WARM_UP_CODE, [SimulatedRobot(WARM_UP_WORLD)])])
         setup = marshal.dumps((rehearsal, WARM_UP_RUNS), WITHOUT_REFERENCES)
         self._door.sendall(len(setup).to_bytes(HEADER, "big") + setup)

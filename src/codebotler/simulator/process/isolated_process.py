@@ -1,4 +1,4 @@
-"""Exchanges messages with an isolated process, detects that it is stuck, and ends it."""
+"""Exchanges messages with an isolated process, detects when it is stuck, and ends it."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.sandbox import HEADER, MAX_FRAME, MORE, PIECE, WITHOUT_REFERENCES
 
-PROCESS_WAIT_SECONDS = 60.0  # of waiting for a process in total; no computation takes so long
-SILENCE_SECONDS = 1  # after which a silent process is examined
-SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
+PROCESS_WAIT_SECONDS = 60.0  # total time to wait for a process; no computation takes this long
+SILENCE_SECONDS = 1  # time until a silent process is examined
+SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # a filter is active, or has killed the process
 
 
 class IsolatedProcess:
-    """One isolated process, from outside."""
+    """The engine's handle on one isolated process."""
 
     def __init__(
         self,
-        find_pid: Callable[[], int],  # its id, unique until the next run
+        find_pid: Callable[[], int],  # returns the process id, which is unique until the next run
         channel: socket.socket,
-        wait: Callable[[], int],  # returns its exit status, or minus the signal
+        wait: Callable[[], int],  # waits, and returns the exit status, or minus the signal
         *,
-        has_seccomp: bool,  # so that /proc shows whether it is isolated
+        has_seccomp: bool,  # whether it uses seccomp, so that /proc shows whether it is isolated
     ) -> None:
         self._find_pid, self._channel, self._wait = find_pid, channel, wait
         silence = struct.pack("ll", SILENCE_SECONDS, 0)
@@ -43,7 +43,7 @@ class IsolatedProcess:
 
     @cached_property
     def pid(self) -> int:
-        """Its process id; LostProcessError if it has none."""
+        """The process id; raises LostProcessError if there is none."""
         try:
             return self._find_pid()
         except LostProcessError:
@@ -51,19 +51,19 @@ class IsolatedProcess:
             raise
 
     def send(self, message: object, *, at_once: bool = False) -> None:
-        """Send a message; `receive` notices if the process has ended.
+        """Send a message; if the process has ended, `receive` notices it.
 
-        The sizes of pieces that a process reads change its heap, which wild programs can see. So it requests
-        each piece but the first, and their sizes do not depend on its speed.
+        The sizes of the pieces that a process reads change its heap, which wild programs can observe. So it
+        requests each piece after the first, and the sizes do not depend on its speed.
         """
-        data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # made of texts, numbers and the like
+        data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # strings, numbers and containers of them
         whole = len(data).to_bytes(HEADER, "big") + data
         size = len(whole) if at_once else PIECE
         for start in range(0, len(whole), size):
             if start and (reply := self.receive()) != MORE:
                 if reply is None:
                     return
-                raise ProtocolError("it speaks in the middle of a message")
+                raise ProtocolError("it sent something in the middle of a message")
             self._send_piece(memoryview(whole)[start : start + size])
 
     def _send_piece(self, rest: memoryview) -> None:
@@ -79,9 +79,9 @@ class IsolatedProcess:
             self._be_patient(began)
 
     def receive(self) -> object:
-        """Its next message, which is JSON; None when it has hung up.
+        """Return the next JSON message, or None if the process has hung up.
 
-        Raises ProtocolError for anything else, and TimeoutError if the process is stuck.
+        Raise ProtocolError for anything else, and TimeoutError if the process is stuck.
         """
         frame = self.receive_bytes(MAX_FRAME)
         if frame is None:
@@ -91,11 +91,11 @@ class IsolatedProcess:
         except (ValueError, RecursionError):
             message, end = None, 0
         if message is None or end < len(frame):
-            raise ProtocolError("a frame says nothing")
+            raise ProtocolError("a frame does not contain a message")
         return message
 
     def receive_bytes(self, most: int) -> bytes | None:
-        """Its next frame of at most so many bytes; None when it has hung up."""
+        """Return the next frame, of at most `most` bytes, or None if the process has hung up."""
         used: int | None = None
         while True:
             if len(self._buffer) >= HEADER:
@@ -120,12 +120,12 @@ class IsolatedProcess:
             self._be_patient(began)
 
     def _be_patient(self, since: float) -> None:
-        self.patience -= min(time.monotonic() - since, SILENCE_SECONDS)  # more is a delay of this process
+        self.patience -= min(time.monotonic() - since, SILENCE_SECONDS)  # any more is a delay of our own
         if self.patience < 0:
             raise TimeoutError
 
     def _check_progress(self, before: int | None) -> int | None:
-        """Return the processor time of a sleeping process; TimeoutError if it is still `before`."""
+        """Return a sleeping process's processor time; raise TimeoutError if it has not changed."""
         fields = _stat(self.pid)
         used = int(fields[11]) + int(fields[12]) if fields[:1] == ["S"] else None
         if used is not None and used == before:
@@ -133,12 +133,12 @@ class IsolatedProcess:
         return used
 
     def kill(self) -> None:
-        """End it without waiting for its end."""
+        """Kill the process without waiting for it to end."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
 
     def end(self) -> int:
-        """End it, and return its exit status, or minus the signal."""
+        """Kill the process, and return its exit status, or minus the signal."""
         self.kill()
         try:
             return self._wait()
@@ -146,7 +146,7 @@ class IsolatedProcess:
             self.hang_up()
 
     def end_gently(self) -> int:
-        """Wait a moment for its own end, then end it; return its exit status, or minus the signal."""
+        """Give the process a moment to exit, then kill it; return its exit status, or minus the signal."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break
@@ -154,7 +154,7 @@ class IsolatedProcess:
         return self.end()
 
     def reset_patience(self) -> None:
-        """Start to wait anew, after an answer."""
+        """Restart the wait limit, after an answer."""
         self.patience = PROCESS_WAIT_SECONDS
 
     def hang_up(self) -> None:
@@ -162,7 +162,7 @@ class IsolatedProcess:
         self._channel.close()
 
     def was_isolated(self) -> bool:
-        """Whether its filter was installed, if visible; also of a dead process until the next run."""
+        """Return whether the filter was installed, or True if that is unknown; works until the next run."""
         if not self._has_seccomp:
             return True
         try:
@@ -173,7 +173,7 @@ class IsolatedProcess:
 
 
 def _stat(pid: int) -> list[str]:
-    """The fields of /proc/PID/stat from the state on; empty once the process is gone."""
+    """Return the fields of /proc/PID/stat from the state on, or an empty list if the process is gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:
@@ -181,5 +181,5 @@ def _stat(pid: int) -> list[str]:
     return stat.rpartition(")")[2].split()
 
 
-# Faster than `json.loads`, which also skips spaces around a value.
+# This is faster than `json.loads`, which also skips whitespace around a value.
 decode: Callable[[str], tuple[object, int]] = json.JSONDecoder().raw_decode

@@ -1,4 +1,4 @@
-"""The engine's handle on the preparer, which compiles programs and decides which are tame."""
+"""The engine's client of the preparer, which compiles programs and decides which are tame."""
 
 from __future__ import annotations
 
@@ -17,33 +17,31 @@ from codebotler.simulator.process.spawn import start
 from codebotler.simulator.sandbox import MAX_CODE, PLAIN, PREPARER, REFUSED, TAME
 
 MAX_SOURCE = 5_000_000
-LONG_SOURCE = (
-    100_000  # characters: a longer program is prepared in a process of its own, more of them one by one
-)
-MAX_PREPARED = 2_000  # programs for each process
-SkillNames: TypeAlias = tuple[str, ...]  # names
+LONG_SOURCE = 100_000  # characters; a longer program is prepared in its own process, a longer list one by one
+MAX_PREPARED = 2_000  # programs per process
+SkillNames: TypeAlias = tuple[str, ...]
 EXHAUSTED = ("MemoryError", "TimeoutError", "Crash")
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A program that parses."""
+    """A program that was compiled successfully."""
 
-    code: bytes  # marshalled; only a child may open it
-    is_tame: bool  # it leaves nothing behind for later runs in its process
+    code: bytes  # marshalled; only a child may unmarshal it
+    is_tame: bool  # whether it leaves nothing behind for later runs in its process
 
 
 class Preparer:
-    """A closed process that parses and compiles programs, replaced from time to time."""
+    """Compiles programs in a closed process, which is replaced from time to time."""
 
     def __init__(self) -> None:
         self._process: IsolatedProcess | None = None
         self._served = 0
-        self._asked: tuple[tuple[str, ...], bool, SkillNames] | None = None  # the open request
+        self._asked: tuple[tuple[str, ...], bool, SkillNames] | None = None  # the pending request
         self._last: tuple[tuple[str, bool, SkillNames], Prepared | Outcome] | None = None
 
     def prepare(self, source: str, *, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:
-        """A program's code, or the outcome of all its runs if it has none; the last answer is cached."""
+        """Compile a program, or return the outcome of all its runs if that fails; cache the last result."""
         if len(source) > MAX_SOURCE:
             return refused("MemoryError", f"the program is longer than {MAX_SOURCE:,} characters")
         asked = source, lowercase, skills
@@ -54,7 +52,7 @@ class Preparer:
     def prepare_all(
         self, sources: Sequence[str], *, lowercase: bool, skills: SkillNames
     ) -> list[Prepared | Outcome]:
-        """The code or outcome of several programs, prepared together if they are short."""
+        """Prepare several programs as `prepare` does, together if they are short."""
         if len(sources) > 1 and sum(map(len, sources)) <= LONG_SOURCE:
             if self._served + len(sources) > MAX_PREPARED:
                 self.close()
@@ -64,7 +62,7 @@ class Preparer:
         return [self.prepare(source, lowercase=lowercase, skills=skills) for source in sources]
 
     def ask_ahead(self, source: str, *, lowercase: bool, skills: SkillNames) -> None:
-        """Begin with the program of the next `prepare`."""
+        """Start to compile the program of the next `prepare` in the background."""
         is_known = self._last is not None and self._last[0] == (source, lowercase, skills)
         if (
             not is_known
@@ -75,7 +73,7 @@ class Preparer:
             self._send((source,), lowercase, skills)
 
     def start(self) -> IsolatedProcess:
-        """The process, started now if there is none; it answers once it is ready."""
+        """Return the process, started if there is none; it answers once it is ready."""
         if self._process is None:
             ours, theirs = socket.socketpair()
             with theirs:
@@ -88,46 +86,46 @@ class Preparer:
         return self._process
 
     def kill(self) -> None:
-        """End the process, also in the middle of a program."""
-        process = self._process  # another thread may close it
+        """Kill the process, even while it compiles a program."""
+        process = self._process  # another thread may set it to None
         if process is not None:
             process.kill()
 
     def close(self) -> None:
-        """End the process; nothing may be running."""
+        """End the process; call this only while nothing is running."""
         process, self._process, self._served, self._asked = self._process, None, 0, None
         if process is not None:
             process.end()
 
     def forget(self) -> None:
-        """Close its channel in a forked process, whose child it is not."""
+        """Close the channel after a fork, in the copy that is not the preparer's parent."""
         if self._process is not None:
             self._process.hang_up()
 
-    def _prepare(self, source: str, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:  # noqa: FBT001 - private
+    def _prepare(self, source: str, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:  # noqa: FBT001 - a private method
         if len(source) > LONG_SOURCE or self._served >= MAX_PREPARED:
             self.close()
         served = self._served
         try:
             (result,) = self._ask((source,), lowercase, skills)
             if served and is_exhausted(result):
-                self.close()  # earlier programs may have exhausted it: only a fresh one can judge
+                self.close()  # earlier programs may have exhausted it, so try a fresh one
                 (result,) = self._ask((source,), lowercase, skills)
             return result
         finally:
             if len(source) > LONG_SOURCE:
                 self.close()
 
-    def _ask(self, sources: Sequence[str], lowercase: bool, skills: SkillNames) -> list[Prepared | Outcome]:  # noqa: FBT001 - private
-        """The results for programs, up to the one at which the process ended."""
+    def _ask(self, sources: Sequence[str], lowercase: bool, skills: SkillNames) -> list[Prepared | Outcome]:  # noqa: FBT001 - a private method
+        """Return the results for programs, up to the program at which the process ended."""
         asked = tuple(sources), lowercase, skills
-        if self._asked is not None and self._asked != asked:  # for a program that was not run
+        if self._asked is not None and self._asked != asked:  # discard the results of an unused request
             self._answers(len(self._asked[0]))
         if self._asked is None:
             self._send(*asked)
         return self._answers(len(sources))
 
-    def _send(self, sources: tuple[str, ...], lowercase: bool, skills: SkillNames) -> None:  # noqa: FBT001 - private
+    def _send(self, sources: tuple[str, ...], lowercase: bool, skills: SkillNames) -> None:  # noqa: FBT001 - a private method
         self.start().send((sources, lowercase, skills), at_once=True)
         self._asked = sources, lowercase, skills
         self._served += len(sources)
@@ -154,17 +152,17 @@ class Preparer:
 
 
 def result_of(answer: bytes) -> Prepared | Outcome:
-    """The result in an answer of the process."""
+    """Parse an answer of the process."""
     if answer[:1] == REFUSED:
         return refused(*json.loads(answer[1:]))
     return Prepared(answer[1:], is_tame=answer[:1] == TAME)
 
 
 def is_exhausted(result: Prepared | Outcome) -> bool:
-    """Whether this program, or earlier ones, exhausted the process."""
+    """Return whether this program or an earlier one exhausted the process."""
     return isinstance(result, Outcome) and result.error is not None and result.error.kind in EXHAUSTED
 
 
 def refused(kind: str, message: str, line: int | None = None) -> Outcome:
-    """The outcome of a program that cannot run."""
+    """Return the outcome of a program that cannot be compiled."""
     return Outcome(Status.PYTHON_ERROR, (), RunError(kind, message), line)

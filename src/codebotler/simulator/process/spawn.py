@@ -1,4 +1,4 @@
-"""Starts isolated processes, each with the compiled code of its role."""
+"""Starts isolated processes, each with the compiled code for its role."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROLE_MODULES = {PREPARER: f"{SIMULATOR}.sandbox.preparer", BATCH_SERVER: f"{BATC
 
 
 def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
-    """Start a process in one of the roles, and hand it descriptors."""
+    """Start a process in a role, and pass it descriptors."""
     handed = (compiled_file(role).fileno(), *descriptors)
     module = ROLE_MODULES.get(role, f"{SIMULATOR}.sandbox.fork_server")
     with START_LOCK:
@@ -42,8 +42,7 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
 
 
 START_LOCK = threading.Lock()
-# A fork during a start would inherit half of it: a locked lock, and the end of a pipe whose closing the start
-# waits for.
+# A fork during a start would inherit a locked lock, and a pipe whose closing the start waits for.
 os.register_at_fork(
     before=START_LOCK.acquire,
     after_in_parent=START_LOCK.release,
@@ -52,7 +51,7 @@ os.register_at_fork(
 
 
 def compiled_file(role: str) -> IO[bytes]:
-    """A file with the code of all modules of a role."""
+    """Return a file with the code of all modules for a role."""
     with START_LOCK:
         return _written_file(FORK_SERVER if role == LIVE_SERVER else role)
 
@@ -60,13 +59,13 @@ def compiled_file(role: str) -> IO[bytes]:
 @cache
 def _written_file(role: str) -> IO[bytes]:
     codes = compiled_modules(compiled, role)
-    file: IO[bytes] = (  # in memory if possible, since a disk may be full
+    file: IO[bytes] = (  # in memory if possible, since the disk may be full
         os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
     )
     atexit.register(file.close)
     try:
         file.write(codes)
         file.flush()
-    except OSError as error:  # a limit on the size of files counts in memory, too
+    except OSError as error:  # the file size limit applies to files in memory as well
         raise LostProcessError(f"{error.strerror}; allow larger files with `ulimit -f unlimited`") from None
     return file

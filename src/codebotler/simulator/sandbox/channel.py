@@ -1,7 +1,7 @@
-"""The socket between an isolated process and the engine: JSON goes out, Python's `marshal` comes in.
+"""Talks to the engine over a socket: sends JSON, and receives Python's `marshal` format.
 
-Only messages of the engine are ever unmarshalled. A program that changes `json`, `os` or the builtins changes
-nothing here, since this module holds its own references.
+Only messages from the engine are ever unmarshalled. Changes that a program makes to `json`, `os` or the
+builtins have no effect here, since this module holds its own references.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-# A copy of the builtins, which a program cannot change.
-__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python accepts a dict, too
+# This module's own copy of the builtins, which a program cannot change.
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python also accepts a dict
 
 TOO_LONG_REQUEST = '["too-long",[],0.0]'
 
 
 def send(text: str) -> None:
-    """Write one frame of JSON, which is ASCII."""
+    """Write one frame of JSON text, which must be ASCII."""
     if len(text) > MAX_FRAME:
         text = TOO_LONG_REQUEST
     send_frames([text.encode("ascii")])
 
 
 def send_frames(frames: list[bytes]) -> None:
-    """Write frames together."""
+    """Write several frames at once."""
     data = b"".join([len(frame).to_bytes(HEADER, "big") + frame for frame in frames])
     written = write(CHANNEL, data)
     while written < len(data):
@@ -38,8 +38,8 @@ def send_frames(frames: list[bytes]) -> None:
         written = write(CHANNEL, data)
 
 
-def receive() -> Any:  # noqa: ANN401 - any message of the engine
-    """Read one message, piece by piece."""
+def receive() -> Any:  # noqa: ANN401 - any message from the engine
+    """Read one message piece by piece."""
     pieces = [read_piece()]
     missing = HEADER + int.from_bytes(pieces[0][:HEADER], "big") - len(pieces[0])
     while missing > 0:
@@ -49,18 +49,18 @@ def receive() -> Any:  # noqa: ANN401 - any message of the engine
     return loads(b"".join(pieces)[HEADER:])  # noqa: S302 - written by the engine
 
 
-def receive_at_once() -> Any:  # noqa: ANN401 - the same
+def receive_at_once() -> Any:  # noqa: ANN401 - any message from the engine
     """Read one message in a single piece."""
     missing = int.from_bytes(read_piece(HEADER), "big")
     pieces = []
     while missing > 0:
         pieces.append(read_piece(missing))
         missing -= len(pieces[-1])
-    return loads(b"".join(pieces))  # noqa: S302 - the same
+    return loads(b"".join(pieces))  # noqa: S302 - written by the engine
 
 
 def read_piece(most: int = PIECE) -> bytes:
-    """Read a piece of the engine's message; exit if the engine has ended."""
+    """Read a piece of the engine's message; exit the process if the engine has ended."""
     piece = read(CHANNEL, most)
     if not piece:
         _exit(1)

@@ -1,4 +1,4 @@
-"""Simulated dates: replacements for the classes of `datetime` that read the time from `time`."""
+"""Simulates dates: replaces the `datetime` classes that tell the time with versions that ask `time`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 
 
 class StandIn(type):
-    """Metaclass of a replacement, which accepts instances and subclasses of the original class."""
+    """Metaclass for replacements, which accept instances and subclasses of the original class."""
 
     def __instancecheck__(cls, thing: object) -> bool:
         if cls in (date, datetime):
@@ -25,7 +25,7 @@ class date(real.date, metaclass=StandIn):  # noqa: N801 - the name of the origin
 
     @classmethod
     def today(cls) -> date:
-        """The date on the simulated clock."""
+        """Return the date on the simulated clock."""
         return cls.fromtimestamp(time.time())
 
     def __repr__(self) -> str:
@@ -37,18 +37,18 @@ class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the name of th
 
     @classmethod
     def now(cls, tz: real.tzinfo | None = None) -> datetime:
-        """The time on the simulated clock, which has no time zone."""
+        """Return the time on the simulated clock, by default without a time zone."""
         return cls.fromtimestamp(time.time(), tz)
 
     @classmethod
     def today(cls) -> datetime:
-        """The time on the simulated clock."""
+        """Return the time on the simulated clock, without a time zone."""
         return cls.fromtimestamp(time.time())
 
     utcnow = today
 
     def date(self) -> real.date:
-        """The date without the time."""
+        """Return the date without the time of day."""
         return date(self.year, self.month, self.day)
 
     def __repr__(self) -> str:
@@ -56,7 +56,7 @@ class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the name of th
 
 
 def simulate_dates() -> None:
-    """Put the replacements into `datetime`."""
+    """Install the replacements in `datetime`."""
     for fake in (date, datetime):
         fake.__module__, fake.__qualname__ = "datetime", fake.__name__
         setattr(real, fake.__name__, fake)

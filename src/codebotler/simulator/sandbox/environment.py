@@ -1,4 +1,4 @@
-"""The simulated environment of programs: clock, standard streams, process ids and forbidden hooks."""
+"""Simulates the environment of programs: clock, standard streams and process ids; forbids tracing hooks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def simulate_environment(run: ProgramRun) -> None:
-    """Give programs a simulated clock and locks, empty input, discarded output, and no environment."""
+    """Give programs a simulated clock and locks, empty input, discarded output and an empty environment."""
     simulate_time(run)
     simulate_locks(run)
     sys.stdin = io.StringIO("")
@@ -43,17 +43,17 @@ def simulate_environment(run: ProgramRun) -> None:
 
 
 def forbid_watching() -> None:
-    """Forbid hooks on execution, since a hook would run within our code when the program ends."""
+    """Forbid tracing hooks, since a hook would run inside our code when the program ends."""
 
     def forbidden(*_: object) -> None:
-        raise PermissionError(1, "a program cannot watch its own execution")
+        raise PermissionError(1, "a program cannot trace its own execution")
 
     vars(sys).update(settrace=forbidden, setprofile=forbidden, addaudithook=forbidden)
-    vars(sys).pop("monitoring", None)  # new in Python 3.12
+    vars(sys).pop("monitoring", None)  # exists since Python 3.12
 
 
 class _Nowhere(io.BufferedIOBase):
-    """An output that discards everything."""
+    """An output stream that discards everything."""
 
     def writable(self) -> bool:
         return True
@@ -63,7 +63,7 @@ class _Nowhere(io.BufferedIOBase):
 
 
 def simulate_time(run: ProgramRun) -> None:
-    """Let `time` follow the run's clock."""
+    """Make the module `time` follow the run's clock."""
     for name in ("time", "monotonic", "perf_counter", "process_time", "thread_time"):
         clock = (lambda: run.start + run.now) if name == "time" else (lambda: run.now)
         setattr(time, name, clock)

@@ -1,4 +1,4 @@
-"""One run of a program inside its process: fuel, a simulated clock, and skills as functions."""
+"""Runs a program inside its process, with fuel, a simulated clock and skills as functions."""
 
 from __future__ import annotations
 
@@ -19,34 +19,32 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, TypeAlias
 
-    ParameterDescription: TypeAlias = tuple[
-        str, str, tuple[Any, ...], str
-    ]  # name, kind, choices if any, and words
+    ParameterDescription: TypeAlias = tuple[str, str, tuple[Any, ...], str]  # name, kind, choices, words
     SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
-    RunParameters: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
+    RunParameters: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, start of clocks, is live
 
-# A copy of the builtins, which a program cannot change.
-__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python accepts a dict, too
+# This module's own copy of the builtins, which a program cannot change.
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python also accepts a dict
 
-# Python 3.11 counts calls into C as well: one more allows the same recursion as Python 3.12.
+# Python 3.11 also counts calls into C, so one more call allows the same recursion as in Python 3.12.
 PROGRAM_RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
-HEADROOM = 50  # for the functions that a skill calls, so that only the program meets the limit
+HEADROOM = 50  # calls that a skill may add, so that only the program can hit the limit
 
-COROUTINE = 0x80  # among the flags of code
+COROUTINE = 0x80  # the flag of coroutines in `co_flags`
 UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not async def"
 
 
 class ProgramRun:
-    """One run of a program, prepared as far as possible in the fork server, before the fork."""
+    """Runs one program; the fork server prepares as much as possible before the fork."""
 
     recursion_limit = PROGRAM_RECURSION_LIMIT
 
     def __init__(self) -> None:
         self.skills: SkillDescriptions = ()
-        self.kinds: dict[str, list[str]] = {}  # of the parameters of each skill; `list` means options
+        self.kinds: dict[str, list[str]] = {}  # parameter kinds of each skill; `list` means options
         self.now = 0.0
         self.spent = self.entered = False
-        self.refused_at: int | None = None  # the line at which a rule ended the run
+        self.refused_at: int | None = None  # the line where a rule ended the run
         self.codes: set[types.CodeType] = set()
         self.fuel = 0
         self.start = self.seconds = 0.0
@@ -55,7 +53,7 @@ class ProgramRun:
         vars(builtins).update(self.counters())
 
     def provide(self, skills: SkillDescriptions) -> None:
-        """Give the program its names without an import: the skills, `sys` and `time`."""
+        """Provide the names that a program has without an import: the skills, `sys` and `time`."""
         names = vars(self.namespace)
         for name, _ in self.skills:
             del names[name]
@@ -64,7 +62,7 @@ class ProgramRun:
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
     def execute(self, code: bytes | types.CodeType, parameters: RunParameters) -> str:
-        """Run the program, marshalled or not, and return how it ended, as JSON."""
+        """Run the program, whose code may be marshalled, and return how it ended, as JSON."""
         self.fuel, self.seconds, self.start, self.is_live = parameters
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
@@ -72,16 +70,16 @@ class ProgramRun:
             exec(loads(code) if type(code) is bytes else code, names)  # noqa: S102, S302 - the purpose of the sandbox
             task = names.get("task_program")
             if not self.has_entered(task):
-                eval(call_task.__code__, names)  # noqa: S307 - the same
+                eval(call_task.__code__, names)  # noqa: S307 - the purpose of the sandbox
             if self.is_unawaited(task):
-                raise TypeError(UNAWAITED)  # noqa: TRY301 - another function would take from the recursion limit
+                raise TypeError(UNAWAITED)  # noqa: TRY301 - another function would use up recursion depth
         except BaseException as error:  # noqa: BLE001 - any end of a program is an outcome
             setrecursionlimit(self.recursion_limit + HEADROOM)
             return self.ended_by(error)
         return self.ended_by(LimitReachedError()) if self.spent else '{"end":"finished"}'
 
     def forget(self, names: dict[str, Any]) -> None:
-        """Restore the state before the run of a program with these names."""
+        """Reset the state after a run, and provide only the given names."""
         self.now = 0.0
         self.spent = self.entered = False
         self.refused_at = None
@@ -93,9 +91,9 @@ class ProgramRun:
         provided.update(names)
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe the error that ended the program; its class may be the program's own."""
+        """Describe as JSON the error that ended the program; its class may be the program's own."""
         kind, line = type(error), self.refused_at or _last_line(error)
-        message = str.__getitem__(_message_of(error), slice(1000))  # a subclass may use fuel
+        message = str.__getitem__(_message_of(error), slice(1000))  # a subclass of `str` may use fuel
         where = f'"line":{"null" if line is None else line}'
         if self.spent or issubclass(kind, LimitReachedError):
             return f'{{"end":"timeout",{where}}}'
@@ -114,33 +112,33 @@ class ProgramRun:
         return f'{{"end":"python-error","kind":{quoted(name)},"message":{quoted(message)},{where}}}'
 
     def counters(self) -> dict[str, Callable[[], None]]:
-        """The functions that compiled programs call in addition, by name."""
+        """Return the functions that we insert into compiled programs, by name."""
         use_fuel = self.fuel_counter()
         return {
             FUEL: use_fuel,
             CAUGHT: self.catcher(use_fuel),
-            # Goes one call deeper than a skill before it lifts the recursion limit, and so meets it first.
+            # Goes one call deeper than a skill before it lifts the recursion limit, so hits the limit first.
             ENTRY: lambda: use_fuel(),  # noqa: PLW0108 - see above
             ENTER: self.enter,
             BY_NAME: self.start_task,
         }
 
     def enter(self) -> None:
-        """Note that the program has entered a function of its module."""
+        """Record that the program has entered one of its module's functions."""
         code = getframe(1).f_code
         self.codes.add(code)
         self.entered = self.entered or code.co_name == "task_program"
 
     def start_task(self) -> None:
-        """Note that the program calls `task_program` by this name."""
+        """Record that the program calls `task_program` by this name."""
         self.entered = True
 
     def has_entered(self, task: object) -> bool:
-        """Whether the program has run its task itself, by any name."""
+        """Return whether the program has called its task itself, by any name."""
         return self.entered or (type(task) is types.FunctionType and task.__code__ in self.codes)
 
     def is_unawaited(self, task: object) -> bool:
-        """Whether the task is a coroutine that never began."""
+        """Return whether the task is a coroutine that never started."""
         return (
             type(task) is types.FunctionType
             and task.__code__.co_flags & COROUTINE != 0
@@ -148,7 +146,7 @@ class ProgramRun:
         )
 
     def fuel_counter(self) -> Callable[[], None]:
-        """The function that uses one unit of fuel, and raises at each call when all is used."""
+        """Return a function that uses one unit of fuel per call, and raises once all fuel is used."""
         self.refuel()
 
         def use_fuel() -> None:
@@ -159,15 +157,15 @@ class ProgramRun:
         return use_fuel
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """The function that is called at the start of each `except` and `finally`."""
+        """Return the function to call at the start of each `except` and `finally`."""
         return use_fuel
 
     def refuel(self) -> None:
-        """Give back all fuel."""
+        """Refill the fuel."""
         self.count = itertools.count(1).__next__
 
     def skill(self, name: str, parameters: tuple[ParameterDescription, ...]) -> object:
-        """The function that a program calls for a skill."""
+        """Return the function that a program calls to execute a skill."""
         names = ", ".join(parameter[0] for parameter in parameters)
         arguments = "".join(f"{parameter[0]}, " for parameter in parameters)
         types_: list[tuple[type | str, ParameterDescription]] = [
@@ -178,7 +176,7 @@ class ProgramRun:
             "perform": lambda *values: self.perform(name, types_, values),
             "limit": setrecursionlimit,
         }
-        exec(  # noqa: S102 - of trusted text
+        exec(  # noqa: S102 - made from trusted text
             f"def {name}({names}):\n"
             f"    limit({self.recursion_limit + HEADROOM})\n"
             f"    try: return perform({arguments})\n"
@@ -189,8 +187,8 @@ class ProgramRun:
 
     def perform(
         self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
-    ) -> Any:  # noqa: ANN401 - what a skill returns
-        """Execute a skill; texts must be exactly `str`, and options exactly a `list`."""
+    ) -> Any:  # noqa: ANN401 - a skill may return any type
+        """Execute a skill; texts must be of type `str` and options of type `list`, not of subclasses."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
@@ -202,11 +200,11 @@ class ProgramRun:
         if type(result) is int:
             for (kind, _), options in zip(parameters, arguments, strict=True):
                 if kind is list and options:
-                    return options[result]  # the same object that the program gave
+                    return options[result]  # the same object that the program passed
         return result
 
-    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
-        """Ask the engine for a skill."""
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
+        """Ask the engine to execute a skill."""
         kinds = self.kinds[name]
         given = [
             JSON_WRITERS.get(kind, _value_text)(value) for kind, value in zip(kinds, arguments, strict=True)
@@ -214,7 +212,7 @@ class ProgramRun:
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
-        """Let time pass; the engine learns of simulated time at the next request, or at its limit."""
+        """Advance time; the engine learns of simulated time with the next request, or at the time limit."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
@@ -227,10 +225,10 @@ class ProgramRun:
             self.request('"sleep",[]')
 
     def wait_for_ever(self) -> None:
-        """End the run: a program is alone, so that it would wait for ever."""
+        """End the run, since nothing else is running that could end the wait."""
         self.request('"wait",[]')
 
-    def request(self, request: str) -> Any:  # noqa: ANN401 - what a skill returns
+    def request(self, request: str) -> Any:  # noqa: ANN401 - a skill may return any type
         """Send one request, and wait for its reply."""
         if self.spent:
             raise LimitReachedError
@@ -249,18 +247,18 @@ class ProgramRun:
 
 
 def call_task() -> object:
-    """Code to run with the program's names; source text would be compiled again in each child."""
-    return task_program()  # type: ignore[name-defined] # noqa: F821 - the program's
+    """Call the task; this code runs with the program's names, and need not be compiled in each child."""
+    return task_program()  # type: ignore[name-defined] # noqa: F821 - defined by the program
 
 
 def _options_text(options: list[Any]) -> str:
-    """Options as JSON: the text of each, and whether it is a `str`."""
+    """Encode options as JSON: for each, its text and whether it is a `str`."""
     texts = [(str(option), issubclass(type(option), str)) for option in options]
     parts = [f"[{quoted(text)},{'true' if is_text else 'false'}]" for text, is_text in texts]
     return f"[{','.join(parts)}]"
 
 
-def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: type) -> None:  # noqa: ANN401 - the program's
+def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: type) -> None:  # noqa: ANN401 - any value of the program
     named, kind, choices, words = parameter
     base = kind[5:-1] if kind[:5] == "list[" else ""
     if base and given is list:
@@ -286,7 +284,7 @@ def _value_text(value: Any) -> str:  # noqa: ANN401 - a scalar or a list of them
 
 
 def _line_at_work() -> int:
-    """The line of the program that calls us; 0 if none does."""
+    """Return the program's line that called us, or 0 if there is none."""
     frame: types.FrameType | None = getframe(1)
     while frame is not None and frame.f_code.co_filename != PROGRAM:
         frame = frame.f_back
@@ -303,7 +301,7 @@ def _last_line(error: BaseException) -> int | None:
 
 
 def _own(kind: type[BaseException], name: str, error: BaseException) -> Any:  # noqa: ANN401 - of any type
-    """An attribute of an exception as its base class has it, whatever a class of the program overrides."""
+    """Read an exception's attribute as its base class defines it, whatever the program overrides."""
     return kind.__dict__[name].__get__(error)
 
 
@@ -317,27 +315,27 @@ def _message_of(error: BaseException) -> str:
 EXACT_TYPES: dict[str, type] = {"str": str, "list": list}
 PARAMETER_TYPES: dict[str, type] = {**EXACT_TYPES, "int": int, "float": float, "bool": bool}
 JSON_WRITERS: dict[str, Callable[[Any], str]] = {"str": quoted, "list": _options_text}
-MAX_EXACT_INT = 2**53  # JSON carries integers up to this one exactly
+MAX_EXACT_INT = 2**53  # JSON preserves integers up to this size
 NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
-"""The name of a class, whatever a metaclass of the program overrides."""
+"""Returns the name of a class, whatever the program's metaclass overrides."""
 
 
 class LimitReachedError(BaseException):
-    """The run has reached a limit; any further use of fuel or a skill raises it again."""
+    """The run has reached a limit; any further use of fuel or a skill raises this error again."""
 
 
 class SkillError(Exception):
-    """The robot failed to execute a skill."""
+    """The robot could not execute a skill."""
 
-    number = -1  # identifies it to the engine; a class has the latest one of its kind
+    number = -1  # identifies the error to the engine; a class has the number of its latest error
 
 
-SkillError.__name__ = SkillError.__qualname__ = "RobotError"  # as programs see it
+SkillError.__name__ = SkillError.__qualname__ = "RobotError"  # the name that programs see
 ROBOT_ERROR_CLASSES: dict[str, type[SkillError]] = {}
 
 
 def robot_error(number: int, kind: str, text: str) -> SkillError:
-    """An error of the robot; there is one class for each kind."""
+    """Return the exception for a robot error; each kind of error has its own class."""
     if kind not in ROBOT_ERROR_CLASSES:
         ROBOT_ERROR_CLASSES[kind] = type(kind, (SkillError,), {"__module__": "robot"})
     ROBOT_ERROR_CLASSES[kind].number = number
@@ -347,9 +345,9 @@ def robot_error(number: int, kind: str, text: str) -> SkillError:
 
 
 def _number_of(error: BaseException) -> int | None:
-    """The number of a robot's error; None for an error that the program made itself."""
+    """Return the number of a robot error, or None if the program created the error itself."""
     try:
-        number = error.number  # type: ignore[attr-defined]  # perhaps overridden by the program
+        number = error.number  # type: ignore[attr-defined]  # the program may override it
     except BaseException:  # noqa: BLE001 - see above
         return None
     return number if type(number) is int and number >= 0 else None

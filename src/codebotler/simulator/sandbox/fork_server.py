@@ -1,4 +1,4 @@
-"""Forks a process for each run or batch, always from the same memory image, and reports how each ended."""
+"""Forks a process for each run or batch from the same memory image, and reports how each process ended."""
 
 from __future__ import annotations
 
@@ -25,18 +25,15 @@ if TYPE_CHECKING:
 
     Run = TypeVar("Run", bound=ProgramRun)
 
-RUN_DOOR, REPORT_DESCRIPTOR = (
-    5,
-    6,
-)  # descriptors for requests of runs, and for reported numbers
-PID_BYTES = 8  # bytes of a process id; the size of an int in memory would depend on its value
-DESCRIPTOR_BYTES = 4  # bytes of one descriptor in a message
+RUN_DOOR, REPORT_DESCRIPTOR = 5, 6  # descriptors for requests of runs, and for reported numbers
+PID_BYTES = 8  # size of a process id as bytes; the size of an int object would depend on its value
+DESCRIPTOR_BYTES = 4  # size of a descriptor in a message
 
 
 def get_ready(
     role: str,
 ) -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
-    """Prepare everything that runs share, and return the arguments of `serve`."""
+    """Prepare everything that runs share, and return the arguments for `serve`."""
     seconds = LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
     door = socket(fileno=RUN_DOOR)
     run = ProgramRun()
@@ -49,7 +46,7 @@ def get_ready(
         del sys.modules[name]
     for module in sys.modules.values():
         if hasattr(module, "__path__"):
-            module.__path__ = [""]  # hides folders of this machine; `logging` needs one
+            module.__path__ = [""]  # hides this machine's folders; `logging` needs an entry
             if module.__spec__ is not None:
                 module.__spec__.submodule_search_locations = module.__path__
     sys.meta_path[:] = [_NothingMore()]
@@ -62,7 +59,7 @@ def get_ready(
 def serve(
     door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
 ) -> None:
-    """Fork a child for each run that the engine requests, one at a time, until it hangs up."""
+    """Fork a child for each run that the engine requests, one at a time, until the engine hangs up."""
     gc.collect()
     gc.freeze()
     _report(0 if seccomp is None else 1)
@@ -71,7 +68,7 @@ def serve(
 
 
 def _warm_up(run: ProgramRun, door: socket, lessons: int) -> None:
-    """Run the engine's own program here, so that all children share the specialized bytecode."""
+    """Run the engine's own program in this process, so that all children share the specialized bytecode."""
     _report(lessons)
     names = vars(run.namespace).copy()
     for _ in range(lessons):
@@ -85,7 +82,7 @@ def _warm_up(run: ProgramRun, door: socket, lessons: int) -> None:
 
 
 class _NothingMore:
-    """An importer that finds nothing: all permitted modules are already imported."""
+    """Importer that finds nothing, since all permitted modules are already imported."""
 
     def find_spec(self, name: str, *_: object) -> NoReturn:
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
@@ -94,9 +91,9 @@ class _NothingMore:
 def _one_run(
     door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
 ) -> bool:
-    """Fork the child of one run, and report its process id and later its status.
+    """Fork the child for one run, and report its process id and later its exit status.
 
-    The dead child is reaped at the request of the next run, so that its process id stays its own until then.
+    The dead child is reaped when the next run is requested, so that its process id is not reused before.
     """
     line = _asked_for(door)
     if line < 0:
@@ -117,11 +114,11 @@ def _one_run(
 
 
 def _asked_for(door: socket) -> int:
-    """Wait for the next request, reap the last child, and return the new one's socket; -1 at the end."""
+    """Wait for the next request, reap the last child, and return the next one's socket, or -1 at the end."""
     ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR_BYTES))[1]
     if not ancillary:
         return -1
-    try:  # noqa: SIM105 - contextlib is large
+    try:  # noqa: SIM105 - contextlib is too large to import
         os.waitpid(-1, 0)
     except ChildProcessError:
         pass
@@ -129,8 +126,8 @@ def _asked_for(door: socket) -> int:
 
 
 def _end_of(pid: int) -> int:
-    """Wait for the end of a child, and return its status, or minus the signal."""
-    if sys.platform != "linux":  # which has `waitid` since Python 3.13
+    """Wait for a child to end, and return its exit status, or minus the signal."""
+    if sys.platform != "linux":  # macOS has `waitid` only since Python 3.13
         return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     if ended is None:
@@ -139,17 +136,17 @@ def _end_of(pid: int) -> int:
 
 
 def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
-    """Isolate the forked child: make the socket its channel, and apply limits and seccomp."""
+    """Isolate the forked child: make the socket its channel, and apply the limits and seccomp."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
-    if getppid().to_bytes(PID_BYTES, "big") != parent:  # the parent has died, and no signal will come
+    if getppid().to_bytes(PID_BYTES, "big") != parent:  # the parent has died already
         os._exit(1)
     enclose(seccomp, seconds)
 
 
 def execute(run: ProgramRun) -> None:
-    """Run the program that the engine sends, and send how it ended."""
+    """Run the program that the engine sends, and report how it ended."""
     code, skills, parameters = receive()
     if skills != run.skills:
         run.provide(skills)

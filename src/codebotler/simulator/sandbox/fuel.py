@@ -1,4 +1,4 @@
-"""Fuel, the deterministic limit on computing: each turn of a loop and each call of a function uses some."""
+"""Fuel, a deterministic limit on computation: each loop iteration and each function call uses some."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PROGRAM_TOO_LARGE = "the program is too large, or nested too deeply"
 MAX_TREE_DEPTH = 250
 MAX_NESTED_BLOCKS = 20
 BLOCK_NODES = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
-LEAF_FIELDS = frozenset({"ctx", "op", "ops"})  # fields of operators and contexts
+LEAF_FIELDS = frozenset({"ctx", "op", "ops"})  # fields that hold operators and contexts
 WITH_LEAVES = frozenset(
     {*(ast.Name, ast.Attribute, ast.Subscript, ast.Starred, ast.List, ast.Tuple), *(ast.BinOp, ast.BoolOp)}
     | {ast.UnaryOp, ast.Compare, ast.AugAssign}
@@ -35,7 +35,7 @@ SCOPE_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 def prepared(
     source: str, *, lowercase: bool, skills: frozenset[str] | None = None
 ) -> tuple[types.CodeType, bool]:
-    """A program's code, which uses fuel, and whether it is tame; without skills, it counts as wild."""
+    """Compile a program that uses fuel, and return whether it is tame; without skills, it counts as wild."""
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
@@ -54,9 +54,9 @@ def prepared(
 
 
 def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
-    """The nodes of a tree by their type, without operators and contexts.
+    """Return the nodes of a tree by type, without operators and contexts.
 
-    Raises MemoryError or SyntaxError if it is nested too deeply: versions of Python have different limits.
+    Raise MemoryError or SyntaxError if it is nested too deeply: Python's own limits depend on its version.
     """
     nodes: defaultdict[type[ast.AST], list[Any]] = defaultdict(list)
     waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]
@@ -70,7 +70,7 @@ def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
         elif kind in BLOCK_NODES:
             blocks += 1
             if blocks > MAX_NESTED_BLOCKS:
-                raise SyntaxError("too many statically nested blocks", (PROGRAM, node.lineno, 1, None))  # type: ignore[attr-defined]  # by the line above
+                raise SyntaxError("too many statically nested blocks", (PROGRAM, node.lineno, 1, None))  # type: ignore[attr-defined]  # all block nodes have it
         nodes[kind].append(node)
         depth += 1
         for name in kind._fields:
@@ -84,7 +84,7 @@ def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
 
 
 def _lower_literals(nodes: dict[type[ast.AST], list[Any]]) -> None:
-    """Lower-case all string literals, but not the format specifications of f-strings."""
+    """Convert all string literals to lowercase, except for format specifications in f-strings."""
     specifications = {
         id(part)
         for node in nodes.get(ast.FormattedValue, ())
@@ -97,7 +97,7 @@ def _lower_literals(nodes: dict[type[ast.AST], list[Any]]) -> None:
 
 
 def _use_fuel(nodes: dict[type[ast.AST], list[Any]]) -> None:
-    """Insert calls that use fuel wherever code may run again, and one that notes a call of the task."""
+    """Insert calls that use fuel wherever code may repeat, and calls that record a call of the task."""
     for node in (*nodes.get(ast.FunctionDef, ()), *nodes.get(ast.AsyncFunctionDef, ())):
         _insert_head(node, ENTRY)
     for name, part, kinds in FUELED_BLOCKS:
@@ -116,7 +116,7 @@ def _use_fuel(nodes: dict[type[ast.AST], list[Any]]) -> None:
 
 
 def _note_entries(statement: ast.stmt) -> None:
-    """Insert calls that note the entry of functions of the module: any may be the task, by another name."""
+    """Insert calls that record the entry of module functions: each may be the task under another name."""
     waiting: list[ast.AST] = [statement]
     while waiting:
         node = waiting.pop()
@@ -139,5 +139,5 @@ def _call(name: str, where: ast.AST) -> ast.Expr:
 
 
 def _call_before(name: str, node: ast.expr) -> ast.expr:
-    """The expression `name() or node`; our functions return None."""
+    """Return the expression `name() or node`; our functions return None."""
     return ast.copy_location(ast.BoolOp(ast.Or(), [_call(name, node).value, node]), node)

@@ -1,4 +1,4 @@
-"""Isolation by the kernel: resource limits, dropped privileges, and a seccomp filter of system calls."""
+"""Isolates processes with the kernel: resource limits, dropped privileges and a seccomp filter."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    Filter: TypeAlias = tuple[bytes, bytes]  # a `struct sock_fprog`, and the code that it points to
+    Filter: TypeAlias = tuple[bytes, bytes]  # a `struct sock_fprog`, and the BPF code it points to
 
 
 def give_up_rights(memory: int = MEMORY) -> None:
-    """Drop for ever the rights that neither this process nor its children need."""
+    """Permanently drop the privileges that neither this process nor its children need."""
     for name in ("CORE", "FSIZE", "MEMLOCK", "MSGQUEUE"):
         set_limit(name, 0)
     set_limit("AS", memory)
     become_nobody()
     die_with_parent()
-    prctl(PR_SET_DUMPABLE, 0)  # no process of the same user can trace it or read its memory
+    prctl(PR_SET_DUMPABLE, 0)  # stops other processes of the user from tracing it or reading its memory
     refuse_new_rights()
 
 
 def enclose(seccomp: Filter | None, seconds: int) -> None:
-    """Leave only the channel, and limit processor time; call `give_up_rights` first."""
+    """Leave only the channel open, and limit processor time; call `give_up_rights` first."""
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
     limit_time(seconds)
@@ -37,7 +37,7 @@ def enclose(seccomp: Filter | None, seconds: int) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Set one limit for ever; other systems than Linux lack some limits, or refuse small values."""
+    """Permanently set one limit; systems other than Linux lack some limits, or refuse small values."""
     kind = getattr(resource, "RLIMIT_" + name, None)
     try:
         if kind is not None:
@@ -48,12 +48,12 @@ def set_limit(name: str, value: int) -> None:
 
 
 def limit_time(seconds: int) -> None:
-    """Limit processor time: SIGXCPU ends this process then, or SIGKILL a second later."""
+    """Limit processor time: SIGXCPU ends this process at the limit, or SIGKILL a second later."""
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
 
 def become_nobody() -> None:
-    """Stop being root, who is exempt from RLIMIT_NPROC."""
+    """Switch from root, which is exempt from RLIMIT_NPROC, to the user nobody."""
     if os.geteuid() != 0:
         return
     os.setgroups([])
@@ -66,17 +66,17 @@ def become_nobody() -> None:
 
 
 def die_with_parent() -> None:
-    """Get killed at the end of the thread that started this process; a change of user undoes this."""
+    """Die when the thread that started this process ends; changing the user undoes this."""
     prctl(PR_SET_PDEATHSIG, SIGKILL)
 
 
 def refuse_new_rights() -> None:
-    """Never gain rights by executing a program, such as a setuid one."""
+    """Never gain privileges by executing a program, such as a setuid program."""
     prctl(PR_SET_NO_NEW_PRIVS, 1)
 
 
 def install(seccomp: Filter) -> None:
-    """Allow only the system calls of a filter."""
+    """Install a filter that allows only its system calls."""
     prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, seccomp[0])
 
 
@@ -85,11 +85,11 @@ SIGKILL = 9
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 38
 MACHINE = os.uname().machine
 SECCOMP_MODE_FILTER = 2
-LIBC = _ctypes.dlopen(None, 0)  # type: ignore[arg-type]  # instead of `ctypes`, which is large and would slow each fork down
+LIBC = _ctypes.dlopen(None, 0)  # type: ignore[arg-type]  # instead of `ctypes`, which is large and would slow down each fork
 
 
 def prctl(option: int, value: int = 0, other: int | bytes = 0) -> None:
-    """Change an attribute of this process; on Linux only."""
+    """Change an attribute of this process; does nothing on systems other than Linux."""
     if sys.platform != "linux":
         return
     if _ctypes.call_function(_ctypes.dlsym(LIBC, "prctl"), (option, value, other, 0, 0)) != 0:
@@ -119,10 +119,10 @@ FUTEX_WAKE_PRIVATE = 129
 
 
 def seccomp_filter(machine: str = MACHINE) -> Filter | None:
-    """The allowed system calls of a child, as a BPF program; None on an unknown machine.
+    """Return a BPF program with a child's allowed system calls, or None on an unsupported architecture.
 
-    Reading and writing go to the channel only, memory is never executable, and a futex wakes but never waits,
-    since no other thread could wake it; all other calls fail with EPERM.
+    Only the channel can be read and written, memory is never executable, and a futex can wake but not wait,
+    since no other thread could wake it. All other calls fail with EPERM.
     """
     if machine not in SYSCALLS or sys.platform != "linux":
         return None
@@ -132,7 +132,7 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
         **dict.fromkeys(("mmap", "mprotect"), (THIRD_ARGUMENT, (ANY_BIT, 1, 0, PROT_EXEC))),
         "futex": (SECOND_ARGUMENT, (EQUAL, 0, 1, FUTEX_WAKE_PRIVATE)),
     }
-    code = [  # of each instruction: operation, jump if true, jump if false, operand
+    code = [  # each instruction: operation, jump if true, jump if false, operand
         (LOAD, 0, 0, ARCHITECTURE),
         (EQUAL, 1, 0, architecture),
         (RETURN, 0, 0, KILL),
@@ -151,12 +151,12 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
         operation.to_bytes(2, sys.byteorder) + bytes((if_true, if_false)) + operand.to_bytes(4, sys.byteorder)
         for operation, if_true, if_false, operand in code
     )
-    address = id(instructions) + bytes.__basicsize__ - 1  # the content follows the header of the object
+    address = id(instructions) + bytes.__basicsize__ - 1  # the bytes follow the object's header
     return len(code).to_bytes(8, sys.byteorder) + address.to_bytes(8, sys.byteorder), instructions
 
 
 def usable_filter() -> Filter | None:
-    """The filter for this machine if the kernel accepts it in a fork, which a container may forbid."""
+    """Return the filter for this machine if the kernel accepts it, which containers may prevent, or None."""
     seccomp = seccomp_filter()
     if seccomp is None:
         return None

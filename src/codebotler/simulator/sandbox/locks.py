@@ -1,4 +1,4 @@
-"""Simulated locks: a program is alone, so that waiting for a lock only passes simulated time."""
+"""Simulates locks: no other thread can release a lock, so waiting for one only passes simulated time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from codebotler.simulator.sandbox.execution import ProgramRun
 
 
 class Lock:
-    """Replaces `_thread.lock`; a held lock stays held, since no other thread could release it."""
+    """Replaces `_thread.lock`; there is no other thread that could release a held lock."""
 
     run: ProgramRun
 
@@ -16,7 +16,7 @@ class Lock:
         self._times = 0
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take the lock if it is free; else wait for simulated time, or without a timeout end the run."""
+        """Take the lock if it is free; otherwise let the timeout pass, or end the run if there is none."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if self._is_free():
@@ -35,7 +35,7 @@ class Lock:
         self._times -= 1
 
     def locked(self) -> bool:
-        """Whether it is held."""
+        """Return whether the lock is held."""
         return self._times > 0
 
     def __enter__(self) -> bool:
@@ -55,7 +55,7 @@ class RLock(Lock):
     """Replaces `_thread.RLock`, with the methods that `threading.Condition` needs."""
 
     def release(self) -> None:
-        """Release the lock once."""
+        """Undo one `acquire`."""
         if not self._times:
             raise RuntimeError("cannot release un-acquired lock")
         self._times -= 1
@@ -78,7 +78,7 @@ class RLock(Lock):
 
 
 def simulate_locks(run: ProgramRun) -> None:
-    """Replace all locks made from now on; `threading` must not be imported yet."""
+    """Replace all locks created from now on; call this before `threading` is imported."""
     Lock.run = run
     for each in (Lock, RLock):
         each.__module__ = "_thread"

@@ -1,13 +1,13 @@
-"""Parses and compiles programs in an isolated process, decides which are tame, and never executes them.
+"""Parses and compiles programs in an isolated process, and decides which are tame, but never executes them.
 
-A program runs in several worlds; it is compiled once, in a process that is warm. The engine passes the code
-on, unopened, to the child that runs it.
+A program that runs in several worlds is compiled only once. The engine passes the code on to the child that
+runs it, without unmarshalling it.
 """
 
 from __future__ import annotations
 
 import os
-import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: an isolated process can import nothing
+import unicodedata as _  # noqa: F401 - needed to parse "\N{...}", and cannot be imported later
 from _json import encode_basestring_ascii as quoted
 from marshal import dumps
 
@@ -33,7 +33,7 @@ REHEARSAL = "def task_program():\n    for room in get_all_rooms():\n        say(
 
 
 def get_ready(_role: str) -> tuple[()]:
-    """Isolate this process."""
+    """Prepare and isolate this process."""
     give_up_rights()
     seccomp = usable_filter()
     answer(REHEARSAL, lowercase=True, skills=("get_all_rooms", "say"))
@@ -44,21 +44,21 @@ def get_ready(_role: str) -> tuple[()]:
 
 
 def serve() -> NoReturn:
-    """Prepare the programs that the engine sends until it closes its end."""
+    """Compile the programs that the engine sends until it hangs up."""
     while True:
         sources, lowercase, skills = receive_at_once()
         send_frames([answer(source, lowercase=lowercase, skills=skills) for source in sources])
 
 
 def answer(source: str, *, lowercase: bool, skills: tuple[str, ...] | None = None) -> bytes:
-    """PLAIN or TAME and a program's code, or REFUSED and the reason as JSON."""
+    """Return PLAIN or TAME followed by the compiled program, or REFUSED followed by the reason as JSON."""
     try:
         names = None if skills is None else frozenset(skills)
         code, tame = prepared(source, lowercase=lowercase, skills=names)
         data = dumps(code, WITHOUT_REFERENCES)
         if len(data) > MAX_CODE:
-            raise MemoryError(PROGRAM_TOO_LARGE)  # noqa: TRY301 - as by the compiler
-    except Exception as error:  # noqa: BLE001 - the compiler raises many errors
+            raise MemoryError(PROGRAM_TOO_LARGE)  # noqa: TRY301 - the error that the compiler would raise
+    except Exception as error:  # noqa: BLE001 - the compiler may raise many errors
         line = error.lineno if isinstance(error, SyntaxError) else None
         message = error.msg if isinstance(error, SyntaxError) else str(error)
         kind = quoted(type(error).__name__)

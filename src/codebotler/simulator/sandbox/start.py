@@ -1,4 +1,4 @@
-"""Starts every isolated process: fixes its memory layout and limits, then serves in its role."""
+"""Starts each isolated process: fixes its memory layout and limits, then serves in the requested role."""
 
 from __future__ import annotations
 
@@ -12,50 +12,50 @@ if TYPE_CHECKING:
     import types
     from typing import NoReturn
 
-FIRST_DESCRIPTOR = 4  # from the engine: a file with the code of our modules
+FIRST_DESCRIPTOR = 4  # a file from the engine with the code of our modules
 STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
 
 def main(module: str, role: str, descriptors: list[str]) -> None:
-    """Start the interpreter again if there are descriptors, else serve in a role of a module."""
+    """Restart the interpreter if descriptors are given, else import a module and serve in a role."""
     if descriptors:
         start_again(list(map(int, descriptors)))
     if role not in ("preparer", "batch-fork-server"):
-        sys.pycache_prefix = os.devnull  # bytecode that exists only sometimes would move the heap
+        sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap
     modules = _CompiledModules(loads(os.pread(FIRST_DESCRIPTOR, os.fstat(FIRST_DESCRIPTOR).st_size, 0)))  # noqa: S302 - from the engine
     sys.meta_path.insert(0, modules)
     os.close(FIRST_DESCRIPTOR)
     serving = __import__(module, fromlist=["serve"])
     ready = serving.get_ready(role)
-    modules.codes.clear()  # there are no further imports
+    modules.codes.clear()  # there are no more imports
     serving.serve(*ready)
 
 
 class _CompiledModules:
-    """Importer of modules that the engine has compiled: a compiler would double the size of a fork server.
+    """Imports modules that the engine has compiled, since a compiler would double a fork server's size.
 
-    Modules of the standard library look as if they came from a file.
+    Modules of the standard library look as if they were loaded from a file.
     """
 
     def __init__(self, codes: dict[str, bytes]) -> None:
-        self.codes = codes  # marshalled, by the name of the module
+        self.codes = codes  # marshalled code by module name
 
     def find_spec(self, name: str, *_: object) -> ModuleSpec | None:
         if name not in self.codes:
             return None
         is_package = any(other.startswith(name + ".") for other in self.codes)
-        spec = ModuleSpec(name, self, is_package=is_package)  # type: ignore[arg-type]  # it has the needed methods
-        if is_package and name.partition(".")[0] != "codebotler":  # some of it may be missing here
+        spec = ModuleSpec(name, self, is_package=is_package)  # type: ignore[arg-type]  # it has the methods of a loader
+        if is_package and name.partition(".")[0] != "codebotler":  # some submodules may be missing
             folder = os.__file__.rpartition("/")[0]
             spec.submodule_search_locations = [f"{folder}/{name.replace('.', '/')}"]
         return spec
 
     def create_module(self, _: ModuleSpec) -> None:
-        """Make an ordinary module."""
+        """Leave the creation of the module to Python."""
 
     def exec_module(self, module: types.ModuleType) -> None:
-        """Run its code, and drop it."""
+        """Run a module's code, and discard it."""
         name, spec = module.__name__, module.__spec__
         if spec is not None and name.partition(".")[0] != "codebotler":
             module.__file__ = spec.origin = f"{name}.py"
@@ -64,12 +64,12 @@ class _CompiledModules:
 
 
 def start_again(descriptors: list[int]) -> NoReturn:
-    """Start the interpreter again, with descriptors from FIRST_DESCRIPTOR on and with fixed addresses.
+    """Restart the interpreter with fixed addresses, and with the descriptors from FIRST_DESCRIPTOR on.
 
-    A program may print an address, which must be the same in every start; even the lengths of arguments and
-    the numbers of descriptors would move it.
+    A program may print an address, which must be the same after every start; even the length of an argument
+    or the number of a descriptor would change it.
     """
-    import ctypes  # noqa: PLC0415 - large, and unused in the second start
+    import ctypes  # noqa: PLC0415 - large, and not needed after the restart
     from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - see above
 
     forget_the_shell()
@@ -80,12 +80,12 @@ def start_again(descriptors: list[int]) -> NoReturn:
     os.closerange(end, 65536)
     if sys.platform == "linux":
         ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
-    os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - this program
+    os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - runs this program again
 
 
 def forget_the_shell() -> None:
-    """Reset the settings inherited from a shell: ignored signals, the size of the stack."""
-    import _signal  # type: ignore[import-not-found] # noqa: PLC0415 - unused in the second start
+    """Reset the settings inherited from the shell: signal handling and the stack size."""
+    import _signal  # type: ignore[import-not-found] # noqa: PLC0415 - not needed after the restart
     from resource import RLIMIT_STACK, getrlimit, setrlimit  # noqa: PLC0415 - see above
 
     for number in _signal.valid_signals() - {_signal.SIGKILL, _signal.SIGSTOP}:

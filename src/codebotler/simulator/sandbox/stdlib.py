@@ -1,8 +1,8 @@
-"""The standard library as programs see it: loaded before isolation, on a simulated clock and fixed seeds.
+"""Loads the standard library for programs before isolation, with a simulated clock and fixed seeds.
 
-An isolated process can import nothing, so that programs can import the modules listed here, the same under
-every version of Python. Functions that tell the time, draw at random or wait are replaced before other
-modules import them.
+An isolated process cannot import files, so programs can only import the modules listed here, which are the
+same for all Python versions. Functions that tell the time, return random values or wait are replaced before
+other modules import them.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ SOME_VERSIONS_HAVE = ("typing.io", "typing.re")
 
 
 def load_stdlib(run: ProgramRun) -> None:
-    """Import all that a program may import."""
+    """Import all modules that a program may import."""
     import select  # noqa: PLC0415 - see the module's first lines
 
     vars(select)["select"] = Select(run)
     simulate_chance()
     vars(_thread)["get_native_id"] = lambda: 1
-    # The interpreter would specialize a hook after some dozens of forks, which changes the heap.
+    # The interpreter would specialize a hook after some dozens of forks, which would change the heap.
     os.register_at_fork = posix.register_at_fork = lambda **_: None
-    sys.modules["_queue"] = None  # type: ignore[assignment]  # `queue` then uses its Python code, with simulated locks
+    sys.modules["_queue"] = None  # type: ignore[assignment]  # makes `queue` use its Python code, with simulated locks
     for name in IMPORTED:
         importlib.import_module(name)
     for name in (*SOME_VERSIONS_HAVE, "_queue"):
@@ -63,7 +63,7 @@ def load_stdlib(run: ProgramRun) -> None:
 
 
 def simulate_chance() -> None:
-    """Make random numbers repeatable, even where a program wants an unpredictable seed."""
+    """Make random numbers repeatable, even if a program asks for an unpredictable seed."""
 
     class Random(_random.Random):
         def __new__(cls, *_: object, **__: object) -> Self:
@@ -75,7 +75,7 @@ def simulate_chance() -> None:
         def seed(self, a: Any = None, /) -> None:  # noqa: ANN401 - as in _random
             super().seed(0 if a is None else a)
 
-    _random.Random = Random  # type: ignore[misc]  # `random` uses this one
+    _random.Random = Random  # type: ignore[misc]  # `random` uses this class
     source = Random()
 
     def urandom(size: int, /) -> bytes:
@@ -85,7 +85,7 @@ def simulate_chance() -> None:
 
 
 def simulate_identities() -> None:
-    """Let `uuid` use the simulated clock, and hide this machine from it and from `platform`."""
+    """Make `uuid` use the simulated clock, and hide this machine from `uuid` and `platform`."""
     import platform  # noqa: PLC0415 - see the module's first lines
     import uuid  # noqa: PLC0415 - see the module's first lines
 
@@ -95,7 +95,7 @@ def simulate_identities() -> None:
 
 
 def hide_folders() -> None:
-    """Hide folders of this machine from modules and tracebacks."""
+    """Hide this machine's folders from modules and tracebacks."""
     for name, module in list(sys.modules.items()):
         if getattr(module, "__file__", None):
             module.__file__ = f"{name}.py"
@@ -112,9 +112,9 @@ def hide_folders() -> None:
 
 
 class Select:
-    """Replaces `select.select`: a wait for files is forbidden, and any other is a sleep.
+    """Replaces `select.select`: waiting for files is forbidden, and a wait without files is a sleep.
 
-    It is no function, which would become a method of a class in `selectors`.
+    A class, since a function would become a method in `selectors`.
     """
 
     def __init__(self, run: ProgramRun) -> None:
@@ -123,7 +123,7 @@ class Select:
     def __call__(
         self, read: list[object], write: list[object], other: list[object], timeout: float | None = None, /
     ) -> tuple[list[object], list[object], list[object]]:
-        """Wait for some seconds, or for ever."""
+        """Wait for some seconds, or end the run if there is no timeout."""
         if read or write or other:
             raise PermissionError(1, "Operation not permitted")
         if timeout is None:

@@ -1,17 +1,17 @@
-"""Decides whether a program is tame: so plain that no run of it can leave anything behind in its process.
+"""Decides whether a program is tame: so simple that no run of it can leave anything behind in its process.
 
-Tame programs share a process with others, one run after the other. An allowlist over the syntax tree keeps
-them to functions over None, truth values, numbers, texts, lists, tuples and dictionaries:
+Tame programs share a process, and run one after another. An allowlist for the syntax tree restricts them to
+functions that work on None, booleans, numbers, strings, lists, tuples and dictionaries:
 
-- Functions, skills, builtins and `time` are named only to be called, or given to a builtin that calls them on
-  the spot; none is rebound. So no variable ever holds one, and no address of one can be said.
-- Attributes are methods of data, called at once. Nothing is read or written that begins with two underscores.
-- Iterators and views of dictionaries are used up where they arise. Sets are not allowed, since their order
-  depends on the earlier runs of the process.
-- `is` compares with None, True and False only, since all else may be one object or two.
+- Functions, skills, builtins and `time` may only be called, or passed to a builtin that calls them at once,
+  and are never rebound. So no variable can hold a function, and no program can print its address.
+- Attributes are methods of data, and are called immediately. No name may begin with two underscores.
+- Iterators and dictionary views are consumed where they are created. Sets are not allowed, since their order
+  depends on earlier runs in the process.
+- `is` may only compare with None, True and False, since equal values may or may not be the same object.
 
-Any other program is wild, and runs in a process of its own. So does a tame program that exhausts time, memory
-or depth, which this module does not check.
+Any other program is wild, and runs in its own process. So does a tame program that exhausts time, memory or
+depth, which this module does not check.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ OWN_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.DictComp, ast.Gener
 
 
 def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
-    """Whether a program is tame.
+    """Return whether a program is tame.
 
     Args:
-        tree: its syntax tree.
+        tree: the program's syntax tree.
         nodes: all nodes of the tree by type.
-        skills: the names of the skills that it may call.
+        skills: the names of the skills that the program may call.
     """
     try:
         ProgramVerifier(nodes, skills).check_statements(tree.body)
@@ -52,13 +52,10 @@ def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
 
 
 class ProgramVerifier(ExpressionVerifier):
-    """Raises WildError at the first part of a program that is not on the allowlist.
-
-    `STATEMENTS` has a check for each allowed kind of statement.
-    """
+    """Raises WildError for a statement that is not allowed; `STATEMENTS` has a check per allowed kind."""
 
     def check_statements(self, body: Sequence[ast.stmt]) -> None:
-        """Allow statements."""
+        """Check a block of statements."""
         for node in body:
             self.STATEMENTS.get(type(node), wild)(self, node)
 
@@ -69,7 +66,7 @@ class ProgramVerifier(ExpressionVerifier):
             super()._check_part(part)
 
     def _check_function(self, node: ast.FunctionDef) -> None:
-        """Allow a function, in which a special name may be that of data."""
+        """Allow a function, which may use a special name for its own data."""
         if node.decorator_list or getattr(node, "type_params", None):
             wild()
         if node.returns is not None:
@@ -86,13 +83,13 @@ class ProgramVerifier(ExpressionVerifier):
                 wild()
 
     def _check_import(self, node: ast.Import) -> None:
-        """Allow `import time`, which a program finds anyway."""
+        """Allow `import time`, which programs can use without an import as well."""
         for alias in node.names:
             if alias.name != "time" or alias.asname not in {None, "time"} or self.is_data("time"):
                 wild()
 
     def _check_annotated(self, node: ast.AnnAssign) -> None:
-        """Allow an assignment with an annotation, but not `(name): int`, which binds nothing."""
+        """Allow an annotated assignment, but not `(name): int`, which binds nothing."""
         if node.value is None and not node.simple:
             wild()
         self._check_value(node.target)
@@ -106,7 +103,7 @@ class ProgramVerifier(ExpressionVerifier):
         self.check_statements([*node.body, *node.orelse])
 
     def _check_try(self, node: ast.Try) -> None:
-        """Allow `try`; the error that it catches may be shown or raised again, like any data."""
+        """Allow `try`; a caught error may be printed or raised again, like any data."""
         self.check_statements(node.body)
         for handler in node.handlers:
             if handler.name is not None and not self.is_data(handler.name):
@@ -145,7 +142,7 @@ class ProgramVerifier(ExpressionVerifier):
 
 
 def _names_bound_in(function: ast.FunctionDef) -> set[str]:
-    """The names that a function binds by itself, and that hide others of the same name in all of it."""
+    """Return the function's local names, which hide the same names of the module throughout its body."""
     names = set(parameters_of(function.args))
     waiting: list[Any] = list(function.body)
     while waiting:

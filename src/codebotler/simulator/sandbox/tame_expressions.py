@@ -1,4 +1,4 @@
-"""The names that a tame program may use, and the expressions that it may consist of; see `tame`."""
+"""Checks that the names and expressions in a program are allowed in tame programs; see `tame`."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-# Builtins that use up their first argument on the spot, and those that only take data.
+# Consumers use up their first argument immediately; all other functions take only data.
 CONSUMERS = _words("all any dict len list max min next sorted sum tuple")
 FUNCTIONS = CONSUMERS | _words("abs bool chr divmod float int ord pow print range repr round str")
 ITERATORS = _words("enumerate filter map reversed zip")
-DATA_CLASSES = _words("bool dict float int list str tuple")  # for `isinstance` and annotations
+DATA_CLASSES = _words("bool dict float int list str tuple")  # allowed in `isinstance` and annotations
 ERRORS = _words(
     """
     ArithmeticError AssertionError AttributeError BaseException EOFError Exception IndexError KeyError
@@ -31,8 +31,8 @@ ERRORS = _words(
     StopIteration TimeoutError TypeError UnboundLocalError ValueError ZeroDivisionError
     """
 )
-GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program finds
-# Names that some programs find; all of them find the name of their module.
+GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program can use
+# Names that programs may have without binding them; every program has `__name__`, with data.
 EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"}) - {"__name__"}
 
 TEXT_METHODS = _words(
@@ -55,36 +55,33 @@ OPERATOR_NODES = (ast.operator, ast.boolop, ast.unaryop, ast.expr_context)
 
 
 class WildError(Exception):
-    """Something is not on the allowlist."""
+    """Part of a program is not on the allowlist."""
 
 
 def wild(*_: object) -> NoReturn:
-    """Raise WildError."""
+    """Reject a node: raise WildError."""
     raise WildError
 
 
 def parameters_of(given: ast.arguments) -> list[str]:
-    """The names of the parameters of a function."""
+    """Return the names of a function's parameters."""
     several = (*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg)
     return [arg.arg for arg in several if arg is not None]
 
 
 class ExpressionVerifier:
-    """Raises WildError at the first part of an expression that is not on the allowlist.
-
-    `VALUES` has a check for each allowed kind of expression; the value of each is data.
-    """
+    """Raises WildError for an expression that is not allowed; `VALUES` has a check per allowed kind."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
         self.functions = {node.name for node in nodes.get(ast.FunctionDef, ())}
-        self.bound = {  # names that are bound in any way but by `def`
+        self.bound = {  # names that are bound other than by `def`
             *(node.id for node in nodes.get(ast.Name, ()) if type(node.ctx) is not ast.Load),
             *(node.arg for node in nodes.get(ast.arg, ())),
             *(node.name for node in nodes.get(ast.ExceptHandler, ()) if node.name),
         }
-        self.special = skills | GIVEN | EXISTING  # names that a program finds without binding them
-        self.hidden: list[frozenset[str]] = []  # of each function around: special names that are data there
+        self.special = skills | GIVEN | EXISTING  # names that exist without being bound by the program
+        self.hidden: list[frozenset[str]] = []  # special names that are data in each enclosing function
         for name in self.functions | self.bound:
             if name.startswith("__"):
                 wild()
@@ -92,7 +89,7 @@ class ExpressionVerifier:
             wild()
 
     def is_data(self, name: str) -> bool:
-        """Whether a name is bound to data here, or to nothing at all."""
+        """Return whether a name is bound to data here, or not bound at all."""
         if name in self.functions:
             return False
         if name not in self.special:
@@ -100,7 +97,7 @@ class ExpressionVerifier:
         return any(name in names for names in self.hidden)
 
     def _is_own(self, name: str) -> bool:
-        """Whether a name is that of a function that the program defines, or of a skill."""
+        """Return whether a name refers to one of the program's functions, or to a skill."""
         return name in self.functions or (name in self.skills and not self.is_data(name))
 
     def _is_given(self, name: str, among: frozenset[str]) -> bool:
@@ -114,7 +111,7 @@ class ExpressionVerifier:
             wild()
 
     def check_parts(self, node: ast.AST) -> None:
-        """Allow a node of which all parts are allowed."""
+        """Allow a node if all its parts are allowed."""
         for name in node._fields:
             part = getattr(node, name)
             for each in part if type(part) is list else (part,):
@@ -127,7 +124,7 @@ class ExpressionVerifier:
             wild()
 
     def _check_iterable(self, node: ast.expr) -> None:
-        """Allow data, or an iterator or a view that is used up on the spot."""
+        """Allow data, or an iterator or view that is consumed immediately."""
         match node:
             case ast.GeneratorExp():
                 self._check_comprehension(node)
@@ -146,7 +143,7 @@ class ExpressionVerifier:
                 self._check_value(node)
 
     def _check_callback(self, node: ast.expr) -> None:
-        """Allow what a builtin calls on the spot: a function, a skill, a builtin, a method, a lambda."""
+        """Allow a function, skill, builtin, method or lambda that a builtin calls immediately."""
         match node:
             case ast.Lambda(args, body):
                 if not self.special.isdisjoint(parameters_of(args)):
@@ -172,7 +169,7 @@ class ExpressionVerifier:
                 self._check_annotation(arg.annotation)
 
     def _check_annotation(self, node: ast.expr) -> None:
-        """Allow an annotation, which is never looked at again."""
+        """Allow an annotation; programs cannot read annotations."""
         match node:
             case ast.Constant(value) if value is None or value is ... or isinstance(value, str):
                 pass
@@ -194,7 +191,7 @@ class ExpressionVerifier:
             case ast.Name("isinstance") if self._is_given("isinstance", GIVEN):
                 self._check_isinstance(node)
             case ast.Name(name) if self._is_given(name, FUNCTIONS):
-                picks = name in {"max", "min"}  # one of several arguments is their result
+                picks = name in {"max", "min"}  # with several arguments, they return one of them
                 uses_up = name in CONSUMERS and not (picks and len(node.args) > 1)
                 self._check_call_of_builtin(node, uses_up=uses_up, calls_key=picks or name == "sorted")
             case ast.Attribute(ast.Name("time"), method) if not self.is_data("time"):
@@ -221,7 +218,7 @@ class ExpressionVerifier:
                 wild()
 
     def _check_call_of_builtin(self, node: ast.Call, *, uses_up: bool, calls_key: bool) -> None:
-        """Allow data as arguments; a builtin may use up the first one on the spot, and call `key`."""
+        """Allow data as arguments; the builtin may consume its first argument, and call `key`."""
         for number, each in enumerate(node.args):
             if uses_up and number == 0:
                 self._check_iterable(each)
@@ -250,7 +247,7 @@ class ExpressionVerifier:
             self._check_argument(each)
 
     def _check_comprehension(self, node: ast.ListComp | ast.DictComp | ast.GeneratorExp) -> None:
-        """Allow a comprehension that binds no special name."""
+        """Allow a comprehension unless it binds a special name."""
         for each in node.generators:
             for inner in ast.walk(each.target):
                 if isinstance(inner, ast.Name) and inner.id in self.special:
@@ -265,14 +262,14 @@ class ExpressionVerifier:
             self._check_value(part)
 
     def _check_assignment(self, node: ast.NamedExpr) -> None:
-        """Allow an assignment to no special name, since its scope may be another one."""
+        """Allow `:=` unless it binds a special name, since it may belong to an outer scope."""
         if node.target.id in self.special:
             wild()
         self._check_name(node.target)
         self._check_value(node.value)
 
     def _check_comparison(self, node: ast.Compare) -> None:
-        """Allow a comparison of data; an iterator may be searched."""
+        """Allow a comparison of data; `in` may search an iterator."""
         sides = [node.left, *node.comparators]
         self._check_value(node.left)
         for operator, left, right in zip(node.ops, sides, sides[1:], strict=False):
@@ -307,5 +304,5 @@ class ExpressionVerifier:
 
 
 def _is_single(node: ast.expr) -> bool:
-    """Whether an expression is a constant of which there is one object only."""
+    """Return whether an expression is None, True or False, each of which is a single object."""
     return isinstance(node, ast.Constant) and (node.value is None or type(node.value) is bool)
