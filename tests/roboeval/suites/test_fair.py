@@ -20,6 +20,7 @@ def programs(name: str) -> list[tuple[str, dict[str, Any]]]:
     return [(file.stem, one) for file in files for one in yaml.safe_load(file.read_text(encoding="utf-8"))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["first", "second", "third"])
 def test_verdicts_are_those_of_a_fair_reader(name: str) -> None:
     told = programs(name)
