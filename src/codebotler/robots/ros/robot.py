@@ -178,7 +178,9 @@ class RosRobot:
 
     def cancel(self) -> None:
         """Have the worker cancel the goal; if the worker hangs, start a new one that cancels all goals."""
-        has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block the lock's owner
+        has_lock = self._send_lock.acquire(
+            timeout=CANCEL_SECONDS
+        )  # a hanging worker can block the lock's owner
         try:
             self._stopped = True
             worker = self._worker

@@ -26,7 +26,9 @@ class Ros2Goal:
     """The ROS 2 state of a goal; only the executor's thread may change it."""
 
     def __init__(self) -> None:
-        self.uuid = list(uuid.uuid4().bytes)  # our own id, so that we can cancel the goal before it is accepted
+        self.uuid = list(
+            uuid.uuid4().bytes
+        )  # our own id, so that we can cancel the goal before it is accepted
         self.is_cancelling = False
         self.result_request = 0.0  # when the result was last requested
 
