@@ -95,24 +95,16 @@ def _rooms(found: CheckResult) -> Text:
 def _vain_searches(found: CheckResult) -> Iterator[Text]:
     count = sum(sample.in_vain for sample in found.samples)
     if 0 < count < len(found.samples):
-        often = f"{count} of {len(found.samples)} worlds"
-        yield Text(
-            f"in {often}, the robot waits or searches without success; this is not a problem",
-            "dim",
-        )
+        where = f"in {count} of {len(found.samples)} worlds"
+        yield Text(f"{where}, the robot waits or searches without success; this is not a problem", "dim")
 
 
 def _distinct_samples(found: CheckResult) -> list[Sample]:
     """Return one sample of each different behaviour: first those with problems, then long successful runs."""
 
     def rank(sample: Sample) -> tuple[bool, bool, bool, int]:
-        outcome = sample.outcome
-        return (
-            sample.number not in found.evidence,
-            outcome.error is not None,
-            sample.in_vain,
-            -len(outcome.trace),
-        )
+        error, trace = sample.outcome.error, sample.outcome.trace
+        return sample.number not in found.evidence, error is not None, sample.in_vain, -len(trace)
 
     different: dict[tuple[str, RunError | None], Sample] = {}
     for sample in found.samples:

@@ -34,8 +34,7 @@ RobotOption = Annotated[
     ),
 ]
 AllOption = Annotated[
-    bool,
-    typer.Option("--all", help="Show all different outcomes in imagined worlds, not just one."),
+    bool, typer.Option("--all", help="Show all different outcomes in imagined worlds, not just one.")
 ]
 ModelOption = Annotated[
     str | None,
@@ -48,11 +47,7 @@ ModelOption = Annotated[
 WorldOption = Annotated[Path | None, typer.Option(help="The world file that defines the rooms.")]
 RulesOption = Annotated[
     Path | None,
-    typer.Option(
-        envvar="CODEBOTLER_RULES",
-        help="A file of house rules for all programs.",
-        metavar="FILE",
-    ),
+    typer.Option(envvar="CODEBOTLER_RULES", help="A file of house rules for all programs.", metavar="FILE"),
 ]
 SkillsOption = Annotated[
     list[Path] | None,
@@ -103,13 +98,11 @@ SpeedOption = Annotated[
 ConnectOption = Annotated[
     Path | None,
     typer.Option(
-        help="A file that maps skills to a robot's ROS calls; it also sets --robot.",
-        metavar="FILE",
+        help="A file that maps skills to a robot's ROS calls; it also sets --robot.", metavar="FILE"
     ),
 ]
 AddressOption = Annotated[
-    str,
-    typer.Option(help="The robot: a ROS_DOMAIN_ID, a ROS master URI, or ws://HOST:PORT of a rosbridge."),
+    str, typer.Option(help="The robot: a ROS_DOMAIN_ID, a ROS master URI, or ws://HOST:PORT of a rosbridge.")
 ]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
@@ -129,11 +122,7 @@ BehindProxyOption = Annotated[
 ]
 TokenOption = Annotated[str | None, typer.Option(help="The access token for the page; a new one by default.")]
 NoTokenOption = Annotated[
-    bool,
-    typer.Option(
-        "--no-token",
-        help="Allow access without a token on this machine; not with --host or --behind-proxy.",
-    ),
+    bool, typer.Option("--no-token", help="Allow access without a token; not with --host or --behind-proxy.")
 ]
 
 

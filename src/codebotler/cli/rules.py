@@ -28,7 +28,7 @@ WHEN_WORDS = {"always": "at any time", "finally": "at the end"}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read a rules file, if given, and print notes about likely evasions; raise UserError if it is invalid."""
+    """Read a rules file, if given, and print notes about likely evasions; raise UserError if invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     note_evasions(rules, world, skills)
     return rules

@@ -90,7 +90,7 @@ def run(
         world: the map for the check, or None.
 
     Returns:
-        the exit status: 0 if the mission is done, 128 plus a signal's number if that signal stopped it, else 1.
+        the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
     program = read_program(request.what) if request.is_program else ""
     tell_missing(robot)

@@ -30,22 +30,18 @@ Each module has the functions `readiness(ros_python)` and `robot(options)`; `rob
 def open_robot(name: str, options: Options | None = None) -> Robot:
     """Open a robot without connecting it.
 
-    `name` is a kind (sim, pyrobosim, ros1, rosbridge or ros2), or a class in a file such as lab_robot.py:Spot.
+    `name` is a kind (sim, pyrobosim, ros1, rosbridge or ros2) or a class in a file, as in lab_robot.py:Spot.
 
     Raises:
         UserError: the kind or class does not exist, or an option is missing or invalid.
     """
     if is_own(name):
-        return _with_spelling(OwnRobot(name, options or Options()))
+        return cast("Robot", SpellingRobot(OwnRobot(name, options or Options())))
     if name not in ROBOT_MODULES:
         own = "or your own class, such as lab_robot.py:Spot"
         raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
     robot: Robot = _import_kind(name).robot(options or Options())
-    return robot if name == "sim" else _with_spelling(robot)
-
-
-def _with_spelling(robot: Robot) -> Robot:
-    return cast("Robot", SpellingRobot(robot))
+    return robot if name == "sim" else cast("Robot", SpellingRobot(robot))
 
 
 def open_with_face(name: str, options: Options, face: Face) -> Robot:

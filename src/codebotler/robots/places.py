@@ -88,10 +88,7 @@ class PlacesMapping(_PlacesForm):
     polygon: str = "polygon"
     yaw: Literal["radians", "degrees"] = "radians"
     resolution: Metres | None = None  # metres per pixel if positions are pixels from the image's top left
-    origin: Corner | tuple[Metres, Metres, Metres] = (
-        0.0,
-        0.0,
-    )  # the lower left corner of the image in metres
+    origin: Corner | tuple[Metres, Metres, Metres] = (0.0, 0.0)  # the image's lower left corner in metres
     height: Metres = 0.0  # the height of the image in pixels
     skip: list[str] = []
 
@@ -109,9 +106,7 @@ def read_places(source: object, at: YamlFile) -> Places:
         file = YamlFile.read(Path(at.name).parent / mapping.file)
         frames.append(file.validate(PlacesFile).frame if isinstance(one, str) else mapping.frame)
         if frames[-1] != frames[0]:
-            raise at.wrong(
-                f'these places are in "{frames[-1]}", others in "{frames[0]}"; use one frame', *here
-            )
+            raise at.wrong(f'frame "{frames[-1]}" differs from "{frames[0]}" of other places; use one', *here)
         entries = [*_find_entries(mapping, file.data)]
         if not entries:
             sentence = f'"{mapping.each}" matches no named place in {file.name}'

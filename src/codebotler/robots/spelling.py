@@ -10,7 +10,7 @@ from codebotler.robots.base import Feedback, Robot, RobotArgument, RobotResult, 
 
 
 class SpellingRobot:
-    """Wraps a robot: its results are converted to composed Unicode, and its own spelling is restored in calls."""
+    """Wraps a robot so that programs see composed names, while the robot gets names in its own spelling."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -99,9 +99,8 @@ class Floorplan:
 def plan_floor(world: World) -> Floorplan:
     """Plan the floor of a world.
 
-    Rooms without a footprint line both sides of a corridor and have one door each. Passages connect all other
-    rooms, nearest first, until every room can be reached. If the world has objects, each room that has space
-    for a table gets one.
+    Rooms without a footprint line both sides of a corridor, with one door each. Passages connect the others,
+    nearest first, until all can be reached. If the world has objects, each room gets a table if one fits.
 
     Raises:
         NotReadyError: rooms overlap or are too narrow, or no table fits into a room with objects.

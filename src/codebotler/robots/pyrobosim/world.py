@@ -47,9 +47,7 @@ class DrivableWorld:
         self._clock, self._motor = clock, Motor(clock)
         self._world = Pyroworld(name="pyrobosim.world", inflation_radius=ROBOT_RADIUS, object_radius=0.0)
         self._floors = self._build(plan)
-        self._rooms = dict(
-            zip(names, self._floors, strict=False)
-        )  # leaves out the corridor, which has no name
+        self._rooms = dict(zip(names, self._floors, strict=False))  # leaves out a corridor, which is nameless
         self._stands = dict(zip(names, plan.stands, strict=False))
         self._tables = {
             name: self._add_table(floor, table)

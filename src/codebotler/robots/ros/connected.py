@@ -93,10 +93,7 @@ class ConnectedRobot(RosRobot):
         return f"it was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report positions to a callback until the connection ends, with None whenever the position is unknown.
-
-        Return False if the connection has no poses.
-        """
+        """Report positions (None if unknown) to a callback until disconnected; return False without poses."""
         worker = self._worker
 
         def watch() -> None:
@@ -130,7 +127,7 @@ class ConnectedRobot(RosRobot):
                 detector.close()
 
     def keep_out(self, rules: Sequence[Rule]) -> None:
-        """Make the robot's planner avoid the rooms that rules forbid, if the connection has a keepout filter."""
+        """Make the robot's planner avoid the rooms that rules forbid, if there is a keepout filter."""
         places, topics = self.connection.places, self.connection.keepout
         if places is None or topics is None:
             return
@@ -143,7 +140,7 @@ class ConnectedRobot(RosRobot):
         return "" if self.connection.pose is None else self.connection.pose.topic
 
     def _pose(self) -> Pose | None:
-        """Return the last pose, waiting for the first one if necessary; return None if none arrives in time."""
+        """Return the last pose, or wait for the first; return None if no pose arrives in time."""
         worker, until = self._worker, time.monotonic() + self._waits.patience
         while worker is not None and worker.motion.pose is None and time.monotonic() < until:
             if self._stopped:

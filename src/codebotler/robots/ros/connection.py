@@ -116,15 +116,8 @@ def _action_of(skill: Skill) -> SkillCall:
     request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
     result = "" if ros.result is None else "result"
     failure = ros.failure or f"{ros.type}Failed"
-    return SkillCall(
-        "action",
-        ros.server,
-        f"{ros.package}/action/{ros.type}",
-        request,
-        ros.definition,
-        result,
-        failure=failure,
-    )
+    type_name = f"{ros.package}/action/{ros.type}"
+    return SkillCall("action", ros.server, type_name, request, ros.definition, result, failure=failure)
 
 
 def _fill(request: Any, values: Values) -> Any:  # noqa: ANN401 - a message

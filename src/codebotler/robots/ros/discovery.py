@@ -22,11 +22,8 @@ def _own_actions() -> Iterator[tuple[str, str, str, str]]:
 
 ACTION_LINE, SERVICE_LINE = "action: NAME, type: TYPE, goal: ", "service: NAME, type: TYPE, request: "
 SAY_LINE = "topic: NAME, type: TYPE, message: {data: $message}"
-PLACES_FIRST, DETECTOR_FIRST, SKILL_FIRST = (
-    "name places first",
-    "choose a detector first",
-    "declare this skill of yours first",
-)
+PLACES_FIRST, DETECTOR_FIRST = "name places first", "choose a detector first"
+SKILL_FIRST = "declare this skill of yours first"
 CHECK_FRAME = "only if the places are in its frame"
 MAPPINGS = (
     *_own_actions(),
@@ -46,8 +43,8 @@ MAPPINGS = (
     (r"sends \S+ nav_msgs/Odometry", "pose", "topic: NAME", CHECK_FRAME),
     (r"sends \S+ nav_msgs/Odometry", "velocity", "topic: NAME", ""),
 )
-"""Rules for the draft: a regex for an offer, the key (empty to derive one from the offer's name), the value, and
-what the user must do first; if that is not empty, the line becomes a comment.
+"""For each regex for offers: the key in the draft (empty to derive it from the offer's name), the value, and
+a task for the user; a line with a task is written as a comment.
 """
 
 INTERNAL_OFFERS = re.compile(
@@ -69,7 +66,7 @@ EXPECTED_KEYS = {
 
 
 def discover_offers(robot: str, address: str, python: Path) -> list[str]:
-    """List what a robot's nodes offer, one string "KIND NAME TYPE" each; KIND is action, service, hears or sends.
+    """List what a robot's nodes offer as strings "KIND NAME TYPE" (KIND: action, service, hears or sends).
 
     Args:
         robot: the version of ROS, ros1 or ros2.
@@ -95,7 +92,7 @@ def discover_offers(robot: str, address: str, python: Path) -> list[str]:
 
 
 def draft_connection(robot: str, offers: Iterable[str]) -> str:
-    """Draft a file for `--connect` from `discover_offers`; incomplete lines and unused offers become comments."""
+    """Draft a file for `--connect`; lines that need completion and unused offers become comments."""
     by_form = {re.sub("/(action|srv|msg)/", "/", offer): offer for offer in sorted(offers)}
     forms = [
         form

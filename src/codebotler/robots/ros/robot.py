@@ -127,7 +127,7 @@ class RosRobot:
         return result
 
     def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
-        """Send a request to the worker and return the robot's answer; raise an error if the request failed."""
+        """Send a request to the worker and return the robot's answer, or raise an error if it failed."""
         message = self._await_end(request, feedback)
         match message:
             case {"is": "result", "values": dict(values)}:
@@ -167,7 +167,7 @@ class RosRobot:
                     return message
 
     def _send(self, request: WorkerMessage) -> tuple[RosWorker, int]:
-        """Send a request and return the worker and the request's number; raise CancelledError after a stop."""
+        """Send a request; return the worker and the request's number; raise CancelledError after a stop."""
         with self._send_lock:
             if self._stopped:
                 raise CancelledError
@@ -178,9 +178,7 @@ class RosRobot:
 
     def cancel(self) -> None:
         """Have the worker cancel the goal; if the worker hangs, start a new one that cancels all goals."""
-        has_lock = self._send_lock.acquire(
-            timeout=CANCEL_SECONDS
-        )  # a hanging worker can block the lock's owner
+        has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
         try:
             self._stopped = True
             worker = self._worker
@@ -237,10 +235,7 @@ class RosRobot:
 def ros_readiness(
     name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
 ) -> Readiness:
-    """Check whether an interpreter has the modules that a worker needs.
-
-    `mend` returns the command that installs the missing modules.
-    """
+    """Check whether an interpreter has the modules a worker needs; `mend` gets those it lacks."""
     missing = find_missing(python, needs)
     if missing is None:
         return Readiness(

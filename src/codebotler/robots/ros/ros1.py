@@ -26,7 +26,7 @@ def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
 
 
 def master_uri(address: str = "") -> str:
-    """Return the given master URI, or else ROS_MASTER_URI, or else the default; raise UserError if invalid."""
+    """Return the given master URI, ROS_MASTER_URI, or the default; raise UserError if it is invalid."""
     uri = address or os.environ.get("ROS_MASTER_URI") or MASTER_URI
     try:
         parts = urlsplit(uri)

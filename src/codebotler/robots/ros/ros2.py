@@ -36,7 +36,7 @@ def domain_of(address: str = "") -> str:
 
 
 def choose_python(named: Path = ROS_PYTHON) -> Path:
-    """Return the interpreter the user named, or else the system's if it has ROS 2, or else CodeBotler's own."""
+    """Return the interpreter the user named, the system's if it has ROS 2, or else CodeBotler's own."""
     if named != ROS_PYTHON or find_spec("rclpy") is None:
         return named
     return named if find_missing(named, ROS2_MODULES) == [] else Path(sys.executable)

@@ -73,7 +73,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills; return whether a master was started; raise NotReadyError if ROS is unavailable."""
+        """Offer the skills; return whether a master was started; raise NotReadyError if ROS is missing."""
         worker = self._worker = self._ros1_servers() if self._ros == 1 else self._ros2_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)

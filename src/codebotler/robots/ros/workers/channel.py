@@ -23,13 +23,13 @@ class SetupError(Exception):
 
 
 class Channel:
-    """Exchanges lines of JSON on standard input and output; anything else that is printed goes to standard error."""
+    """Exchanges lines of JSON on standard input and output; all other output goes to standard error."""
 
     def __init__(self) -> None:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
         os.dup2(2, 1)
         self._in: IO[str] = os.fdopen(os.dup(0), "r", encoding="utf-8")
-        # A thread writes, because a suspended CodeBotler does not read, and stopping the robot must not block.
+        # Write in a thread, because a suspended CodeBotler does not read, and a stop must not block.
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
@@ -61,7 +61,7 @@ class Channel:
 
 
 def serve(make_worker: Callable[[Channel, Fields], Any]) -> None:
-    """Create a worker from the first message, pass it all others, and stop the robot when it ends or fails."""
+    """Create a worker from the first message, pass it all others, and stop the robot in the end."""
     channel = Channel()
     worker, status = None, 1
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):

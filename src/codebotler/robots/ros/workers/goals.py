@@ -73,9 +73,9 @@ class Server:
 class SkillWorker:
     """Performs skills, one at a time; subclasses implement at least `connect`, `send` and `listen`.
 
-    The first message contains the `address`, the `node` name, the `calls` by skill, folders of `packages`, the
-    topics for `pose`, `velocity` and `keepout`, whether to `cancel_all` goals, the path `sign` of a file that
-    names the server of a running goal, and the time limits `patience`, `silence` and `longest`.
+    The first message has the `address`, the `node` name, the `calls` by skill, folders of `packages`, topics
+    for `pose`, `velocity` and `keepout`, whether to `cancel_all` goals, the path `sign` of a file that names
+    the server of a running goal, and the time limits `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -118,7 +118,7 @@ class SkillWorker:
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object] | None:
-        """Subscribe to a topic, passing messages to `hear` as plain data; return a function that unsubscribes.
+        """Subscribe to a topic with messages as plain data; return a function that unsubscribes.
 
         If nothing publishes the topic, raise SetupError if `is_needed`, else return None.
         """
@@ -257,7 +257,6 @@ class SkillWorker:
         goal.picture_event.set()
 
     def _end_with_picture(self, goal: Goal, values: Fields) -> None:
-        """Wait for the picture of a goal for a short time, and end the goal."""
         goal.picture_event.wait(PICTURE_SECONDS)
         self.end(goal, "result", values=values)
 
@@ -280,7 +279,6 @@ class SkillWorker:
             self.end(goal, "error", state="aborted", text=text)
 
     def _listen(self, start: Fields) -> None:
-        """Subscribe to the topics with poses and velocities."""
         pose, velocity = start["pose"], start["velocity"]
         reports = MotionReports(self.channel, pose and pose["frames"])
         if pose is not None:

@@ -40,13 +40,8 @@ class Ros1Graph:
                     "stop it first"
                 )
             time.sleep(0.1)
-        rospy.init_node(
-            self.node.rpartition("/")[2],
-            argv=[],
-            disable_signals=True,
-            log_level=rospy.FATAL,
-            anonymous=False,
-        )
+        name = self.node.rpartition("/")[2]
+        rospy.init_node(name, argv=[], disable_signals=True, log_level=rospy.FATAL, anonymous=False)
         return address is not None
 
     def leave(self) -> None:

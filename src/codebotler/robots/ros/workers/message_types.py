@@ -50,9 +50,8 @@ def import_type(whole: str, kind: str) -> Any:
 def as_data(value: Any) -> Any:
     """Convert a ROS 1 or ROS 2 message, or a field value, to plain data; bytes become base64."""
     if hasattr(value, "__slots__"):
-        fields = getattr(
-            value, "get_fields_and_field_types", None
-        )  # in ROS 2, the names of slots differ from those of fields
+        # In ROS 2, the names of slots differ from those of fields.
+        fields = getattr(value, "get_fields_and_field_types", None)
         names = value.__slots__ if fields is None else fields()
         return {name: as_data(getattr(value, name)) for name in names}
     if isinstance(value, bytes) or getattr(value, "typecode", "") == "B":

@@ -16,8 +16,8 @@ Turn = tuple[float, float, float]  # the x, y and yaw of a coordinate frame rela
 class MotionReports:
     """Reports a robot's poses and velocities to CodeBotler.
 
-    If `frames` names the frames of the map and of the robot, poses are computed from transforms. Otherwise they
-    are taken from messages of any type that contains a pose.
+    With `frames`, the names of the map's and the robot's frame, poses are computed from transforms. Otherwise
+    they are taken from messages of any type that contains a pose.
     """
 
     def __init__(self, channel: Channel, frames: list[str] | None) -> None:

@@ -143,7 +143,7 @@ class Ros1Worker(SkillWorker):
     graph: Ros1Graph
 
     def connect(self, start: Fields) -> bool:
-        """Register our node and connect to all servers; return whether a dead worker has left its node behind."""
+        """Register our node and connect to all servers; return whether a dead worker left its node behind."""
         import rospy
 
         self.graph = Ros1Graph(start["node"])

@@ -38,8 +38,8 @@ class Ros2Graph:
     def enter(self, *, is_rescue: bool = False) -> bool:
         """Start our node; return whether a dead worker has left a node with the same name behind.
 
-        If workers on two machines start at the same time, both notice this and stop. A rescue does not wait for
-        the other worker, because CodeBotler has just killed it.
+        If workers on two machines start at the same time, both notice this and stop. A rescue does not look
+        for another worker, because CodeBotler has just killed it.
         """
         self._lock = self._take_lock()
         self._is_left_behind = is_rescue or self._has_dead_twin()
@@ -112,8 +112,8 @@ class Ros2Graph:
     ) -> Callable[[], object] | None:
         """Subscribe to a topic with the type that its publishers use; return a function that unsubscribes.
 
-        Wait up to `patience` seconds for a publisher, then raise SetupError. If `patience` is None, do not wait,
-        and return None if there is no publisher.
+        Wait up to `patience` seconds for a publisher, then raise SetupError. If `patience` is None, do not
+        wait, and return None if there is no publisher.
         """
         from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 

@@ -55,7 +55,7 @@ def message_types(
 
     Args:
         names: all types that the process needs, since a package is built with these types only.
-        folders: the folders of packages to build if they are not installed; they contain action/, msg/ or srv/.
+        folders: the folders of packages to build if they are not installed, with action/, msg/ or srv/.
         tell: a callback that receives a sentence before a slow step.
         actions: the texts of .action files by type name; an installed type must have the same fields.
 
@@ -277,10 +277,7 @@ class _Build:
             generator.generate(self.package, files, includes, output_path=folder)
 
     def _units(self) -> Iterator[Path]:
-        """Yield the files to compile: one per language that includes the others, and the type descriptions.
-
-        The descriptions define the same names, so each must be compiled separately.
-        """
+        """Yield the files to compile: one that includes all others, and descriptions, whose names collide."""
         for suffix in COMPILERS:
             files = sorted(self.work.rglob("*" + suffix))
             together = [path for path in files if not path.stem.endswith("__description")]

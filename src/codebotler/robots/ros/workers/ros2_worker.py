@@ -26,9 +26,7 @@ class Ros2Goal:
     """The ROS 2 state of a goal; only the executor's thread may change it."""
 
     def __init__(self) -> None:
-        self.uuid = list(
-            uuid.uuid4().bytes
-        )  # our own id, so that we can cancel the goal before it is accepted
+        self.uuid = list(uuid.uuid4().bytes)  # chosen by us, so that a goal can be cancelled early
         self.is_cancelling = False
         self.result_request = 0.0  # when the result was last requested
 
@@ -61,7 +59,7 @@ class Ros2Server(Server):
         self.has_cancelled = False
 
     def last_sign(self) -> float:
-        """Return the current time if the server is on the graph, else 0; a dead server disappears with a delay."""
+        """Return the current time if the server is on the graph, else 0; DDS removes dead servers late."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
@@ -81,7 +79,7 @@ class Ros2Server(Server):
             self.has_cancelled = True
 
     def request_cancel(self, number: list[int]) -> Any:
-        """Request the cancellation of a goal or of ALL_GOALS; return a future. Call in the executor's thread."""
+        """Request to cancel a goal, or ALL_GOALS, and return a future; call this in the executor's thread."""
         request = self._request()
         request.goal_info.goal_id.uuid = number
         return self._cancels.call_async(request)
@@ -133,7 +131,7 @@ class Ros2Worker(SkillWorker):
     silence_says = "it has left the graph; DDS reports a killed process only after its lease, by default 20 s"
 
     def connect(self, start: Fields) -> bool:
-        """Start our node and a client for each server; return whether a dead worker has left its node behind."""
+        """Start our node and a client for each server; return whether a dead worker left its node behind."""
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         calls, self._packages = start["calls"], start["packages"]
@@ -187,7 +185,7 @@ class Ros2Worker(SkillWorker):
             time.sleep(0.01)
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal in the executor's thread, because rclpy can lose answers to requests of other threads."""
+        """Send a goal in the executor's thread, because rclpy can lose answers to other threads."""
         try:
             message = fill(goal.server.message(), fields)
             _check_sendable(message, fields)

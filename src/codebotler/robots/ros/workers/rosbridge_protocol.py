@@ -39,7 +39,7 @@ class Ros1Protocol:
         theirs = {
             "result": f"{kind}Result",
             "feedback": f"{kind}Feedback",
-            "status": "actionlib_msgs/GoalStatusArray",  # last, so that it arrives after the others are set up
+            "status": "actionlib_msgs/GoalStatusArray",  # last, because it shows that the others are set up
         }
         for name, of in ours.items():
             yield {"op": "advertise", "topic": f"{server}/{name}", "type": of}
