@@ -71,10 +71,7 @@ RetriesOption = Annotated[
     int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
 ]
 RepairOption = Annotated[
-    bool,
-    typer.Option(
-        "--repair", help="Include the program and its problems when asking again; one retry by default."
-    ),
+    bool, typer.Option("--repair", help="Ask again with the program and its problems; one retry by default.")
 ]
 RecordOption = Annotated[
     Path | None, typer.Option(help="Append each attempt to this file, as a line of JSON.")
@@ -189,7 +186,7 @@ def read_world(
 def note_office(robot: str, file: Path | None) -> None:
     """Print a note if the simulated robot uses the example office because no world file is given."""
     if file is None and robot == "sim":
-        note("the robot works in an example office; use --world FILE for another world")
+        note("the robot works in an example office; --world FILE selects another world")
 
 
 def command_line(name: str, about: str) -> typer.Typer:

@@ -60,7 +60,7 @@ class Request:
         if not self.what.strip():
             raise UserError("the argument is empty; name a program, or say what the robot should do")
         if self.what.endswith(".py") and not self.is_program:
-            raise UserError("the file does not exist; name a file, or write an instruction", file=self.what)
+            raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
             raise UserError("approval cannot be read from standard input, as the program is; add --yes")
 
