@@ -91,7 +91,7 @@ def check(
     rules: options.RulesOption = None,
     skills: options.SkillsOption = None,
 ) -> None:
-    """Find problems in a program before a robot runs it.
+    """Look for problems in a program before a robot runs it.
 
     The check runs the program in imagined worlds. The exit status is 1 if there are problems.
     """
@@ -134,7 +134,7 @@ def rules(
     skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Show house rules with examples, and warn about likely mistakes.
+    """Show house rules with examples, and likely mistakes.
 
     For each rule, it shows a short example that keeps the rule and one that breaks it.
     """

@@ -105,7 +105,7 @@ def _note_attempt(attempt: Attempt, most: int) -> None:
 
 def note_programless(none: ProgramlessReply, which: str = "") -> None:
     """Print a note about why a reply contains no program, and quote the reply."""
-    hint = "" if none.higher_limit is None else f" To raise the limit, use --max-tokens {none.higher_limit}."
+    hint = "" if none.higher_limit is None else f" --max-tokens {none.higher_limit} raises the limit."
     note(f"{which}{visible(none.sentence)}{hint}")
     if none.kind != "refusal" and none.text.strip():
         note(f"  the reply: {shortened(brief(none.text, MAX_REPLY_SHOWN))}")

@@ -88,7 +88,7 @@ def robots(
     ros_python: options.RosPythonOption = options.DEFAULT_ROS_PYTHON,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """List the kinds of robots, and which of them work on this machine.
+    """List the kinds of robots, and which of them work here.
 
     For the others, it shows what is missing and how to install it.
     """
