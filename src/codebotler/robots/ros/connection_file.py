@@ -151,7 +151,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     at = ("skills", skill.name)
     named = [(kind, name) for kind in MESSAGE_KEYS if (name := getattr(form, kind)) is not None]
     if len(named) != 1 or form.type is None:
-        raise file.wrong('give either "action", "service" or "topic", and its "type"', *at)
+        raise file.wrong('give one of "action", "service" and "topic", and its "type"', *at)
     kind, name = named[0]
     for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
         if getattr(form, other):
@@ -172,7 +172,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     try:
         SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
-        raise file.wrong("a field has both a value and subfields", *at, MESSAGE_KEYS[kind]) from None
+        raise file.wrong("a path gives both a value and subfields", *at, MESSAGE_KEYS[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _full_type(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
